@@ -31,7 +31,7 @@ struct spl_view {
     struct spl_fill_params fill; /* of those that fill */
     bool partial;               /* draws what is on the device now, coarser where pages are still to come; else waits
                                    for them. A dataset's first page is waited for in any case */
-    uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = the renderer's own limit (10 s) only */
+    uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = as long as it takes */
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
     enum spl_shapes shapes;     /* the same */
 };
@@ -176,7 +176,7 @@ struct spl_render_options {
     size_t size;                    /* spl_render_options_init() */
     const struct spl_image *images; /* the caller's, at most one a layer of the view; their pixels are written */
     size_t image_count;
-    const struct spl_cancel *cancel; // may be NULL; polled before each tile and page, and every second of waiting
+    const struct spl_cancel *cancel; // may be NULL; polled before each tile and page, every second of waiting or work
 };
 
 static inline void spl_render_options_init(struct spl_render_options *options)
@@ -230,6 +230,10 @@ SPL_API int spl_renderer_pick(struct spl_renderer *renderer, const struct spl_da
 struct spl_frame_steps;
 SPL_API int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset,
                             const struct spl_view *view, struct spl_frame_steps **out, struct spl_error *err);
+
+/* The steps to come fail with SPL_E_CANCELLED soon after `cancel` was set, also in the middle of a tile that takes
+ * long. It is borrowed until the end; NULL = nothing cancels them. */
+SPL_API void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel);
 
 /* Makes the next tile, unless `deadline_ns` has passed (the view's own does not count) or the frame waits: then it
  * makes nothing and does not block. *more: there are others. Times in the frame's stats are those of its own steps.

@@ -91,7 +91,7 @@ struct spl_gpu_backend {
     int (*submit)(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err);
     /* 0 done; SPL_E_TIMEOUT; SPL_E_DEVICE_LOST. */
     int (*wait)(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err);
-    void (*read_timestamps)(struct spl_gpu *gpu); /* of the last submission, which has ended */
+    void (*read_timestamps)(struct spl_gpu *gpu); /* those that the last submission, which has ended, wrote */
 };
 
 extern const struct spl_gpu_backend spl_gpu_vulkan, spl_gpu_egl;

@@ -2,7 +2,8 @@
  * knows whether the device is lost. Backends trust what arrives here.
  *
  * Invariants: memory is accounted before it is taken, so limits.memory_bytes is never exceeded; after a loss no command
- * reaches the backend; every wait ends. Owned by the thread that opened the device. */
+ * reaches the backend, also of a list that was being recorded; every wait ends. Owned by the thread that opened the
+ * device. */
 #include "gpu/backend.h"
 
 #include <inttypes.h>
@@ -176,8 +177,16 @@ int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err)
         gpu->lost = true;
         return code;
     }
+    memset(gpu->timestamps_ns, 0, sizeof gpu->timestamps_ns);
     gpu->recording = true;
     return 0;
+}
+
+/* Is there a list that takes commands? One that was lost half-way takes them for nothing. */
+static bool takes(const struct spl_gpu *gpu)
+{
+    spl_assert(gpu->recording);
+    return !gpu->lost;
 }
 
 static void check_range(const struct spl_gpu *gpu, const struct spl_gpu_buffer *buffer, uint64_t offset,
@@ -218,7 +227,7 @@ void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
     struct spl_gpu_arguments arguments;
     check_bindings(gpu, kernel, bindings, &arguments);
     spl_assert(workgroups <= gpu->limits.workgroups);
-    if (workgroups)
+    if (takes(gpu) && workgroups)
         gpu->backend->dispatch(gpu, kernel, &arguments, workgroups, NULL, 0);
 }
 
@@ -230,13 +239,14 @@ void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kerne
     check_bindings(gpu, kernel, bindings, &arguments);
     spl_assert(offset % 4 == 0);
     check_range(gpu, counts, offset, 3 * sizeof(uint32_t));
-    gpu->backend->dispatch(gpu, kernel, &arguments, 0, counts, offset);
+    if (takes(gpu))
+        gpu->backend->dispatch(gpu, kernel, &arguments, 0, counts, offset);
 }
 
 void spl_gpu_barrier(struct spl_gpu *gpu)
 {
-    spl_assert(gpu->recording);
-    gpu->backend->barrier(gpu);
+    if (takes(gpu))
+        gpu->backend->barrier(gpu);
 }
 
 void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
@@ -246,7 +256,7 @@ void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t fro
     spl_assert(from_offset % 4 == 0 && to_offset % 4 == 0 && bytes % 4 == 0);
     check_range(gpu, from, from_offset, bytes);
     check_range(gpu, to, to_offset, bytes);
-    if (bytes)
+    if (takes(gpu) && bytes)
         gpu->backend->copy(gpu, from, from_offset, to, to_offset, bytes);
 }
 
@@ -254,25 +264,23 @@ void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t o
 {
     spl_assert(gpu->recording && buffer->kind != SPL_GPU_UPLOAD && offset % 4 == 0 && bytes % 4 == 0);
     check_range(gpu, buffer, offset, bytes);
-    if (bytes)
+    if (takes(gpu) && bytes)
         gpu->backend->fill(gpu, buffer, offset, bytes, word);
 }
 
 void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot)
 {
-    spl_assert(gpu->recording && slot < SPL_GPU_TIMESTAMPS_MAX);
-    if (gpu->limits.timestamps)
+    spl_assert(slot < SPL_GPU_TIMESTAMPS_MAX);
+    if (takes(gpu) && gpu->limits.timestamps)
         gpu->backend->timestamp(gpu, slot);
 }
 
-int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
+/* What was recorded; it may have been lost half-way. */
+static int submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
 {
-    spl_assert(gpu->recording);
-    gpu->recording = false;
-    if (gpu->inject_loss) {
-        gpu->lost = true;
+    gpu->lost |= gpu->inject_loss;
+    if (!takes(gpu))
         return lost(gpu, err);
-    }
     int code = gpu->backend->submit(gpu, gpu->tickets + 1, err);
     if (code < 0) {
         gpu->lost = true;
@@ -280,6 +288,29 @@ int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
     }
     *ticket = ++gpu->tickets;
     return 0;
+}
+
+int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
+{
+    int code = submit(gpu, ticket, err);
+    gpu->recording = false;
+    return code;
+}
+
+int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err)
+{
+    uint64_t ticket = 0;
+    struct spl_error why = {0};
+    int code = submit(gpu, &ticket, &why);
+    if (code >= 0)
+        code = wait_for(gpu, ticket, SPL_GPU_PATIENCE_NS, &why);
+    if (code < 0)
+        return spl_fail(err, SPL_E_DEVICE_LOST, "%s", why.message);
+    if (gpu->limits.timestamps)
+        gpu->backend->read_timestamps(gpu);
+    code = gpu->backend->begin(gpu, err);
+    gpu->lost |= code < 0;
+    return code;
 }
 
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err)
@@ -290,7 +321,6 @@ int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, str
     int code = wait_for(gpu, ticket, spl_remaining_ns(deadline_ns), err);
     if (code < 0)
         return code;
-    memset(gpu->timestamps_ns, 0, sizeof gpu->timestamps_ns);
     /* They are overwritten once the next list begins. */
     if (gpu->limits.timestamps && ticket == gpu->tickets)
         gpu->backend->read_timestamps(gpu);

@@ -101,11 +101,16 @@ void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t o
 enum { SPL_GPU_TIMESTAMPS_MAX = 32 };
 void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot); /* no effect without limits.timestamps */
 
+/* Runs what was recorded so far, waits for its end (10 s at most) and goes on recording: a list that would take long is
+ * cut by it into some that do not. After SPL_E_DEVICE_LOST, its only error, what is recorded of the list until its
+ * submit goes nowhere. */
+int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err);
 /* Ends recording and starts it; the next begin waits for its end. */
 int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);
 /* SPL_E_TIMEOUT once deadline_ns has passed, which also marks the device lost. */
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err);
-/* Nanoseconds of slot `slot` in the last waited submission, on the device's own clock; 0 where it was not written. */
+/* Nanoseconds of slot `slot` in the last list that was waited for, on the device's own clock; 0 where it was not
+ * written. */
 uint64_t spl_gpu_get_timestamp_ns(struct spl_gpu *gpu, uint32_t slot);
 
 /* Fault injection for tests: the next submit marks the device lost. */

@@ -1,5 +1,5 @@
 /* The draw list; see draw_list.h. Chunks come roughly front to back; entries are laid out phase by phase and page by
- * page in that order. */
+ * page in that order. A key has one batch, or several where it is much work. */
 #include "render/draw_list.h"
 
 #include <stdlib.h>
@@ -9,6 +9,8 @@
 #include "dataset/format.h" /* enum spl_chunk_kind */
 
 #define ENTRIES_MAX (1u << 28)
+
+enum { base_work = 8 }; /* of what covers no sample */
 
 static int grow(void **array, size_t *capacity, size_t wanted, size_t size, struct spl_error *err)
 {
@@ -75,7 +77,7 @@ static int check_entries(const struct spl_draw_list *list, uint32_t more, struct
 }
 
 int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
-                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds,
+                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds, uint64_t looks,
                       struct spl_error *err)
 {
     uint32_t entries = runs(origin->kind, chunk);
@@ -83,15 +85,17 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
     if (rc)
         return rc;
     if (list->chunk_count == list->chunk_capacity) {
-        size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a;
+        size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a, d = a;
         if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
             grow((void **)&list->bounds, &b, wanted, sizeof *list->bounds, err) ||
-            grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err))
+            grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err) ||
+            grow((void **)&list->work_of_chunk, &d, wanted, sizeof *list->work_of_chunk, err))
             return SPL_E_NOMEM;
-        list->chunk_capacity = c;
+        list->chunk_capacity = d;
     }
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
+    list->work_of_chunk[list->chunk_count] = splats(chunk) * (base_work + (looks < UINT32_MAX ? looks : UINT32_MAX));
     list->key_of_chunk[list->chunk_count++] = key_of(origin, chunk);
     list->entry_count += entries;
     list->listed_splats += worth(origin->kind, chunk);
@@ -126,13 +130,18 @@ static int grow_table(struct table *table, const struct spl_draw_list *list, str
     return table->batch ? SPL_OK : SPL_E_NOMEM;
 }
 
-/* The batch of `key`, which is made when it is met first. */
-static int get_batch(struct spl_draw_list *list, struct table *table, const struct spl_draw_key *key, uint32_t *batch,
-                     struct spl_error *err)
+static bool has_room(const struct spl_draw_batch *batch, uint64_t work)
+{
+    return work <= SPL_BATCH_WORK && batch->work <= SPL_BATCH_WORK - work;
+}
+
+/* The batch of `key` that has room for the work of a chunk: the last, or one that is made. */
+static int get_batch(struct spl_draw_list *list, struct table *table, const struct spl_draw_key *key, uint64_t work,
+                     uint32_t *batch, struct spl_error *err)
 {
     int rc = grow_table(table, list, err);
     uint32_t *place = rc ? NULL : find(table, list, key);
-    if (!rc && !*place) {
+    if (!rc && (!*place || !has_room(&list->batches[*place - 1], work))) {
         rc = grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err);
         if (rc)
             return rc;
@@ -157,12 +166,15 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, s
             list->first_back_chunk = i;
         before += worth(key->kind, &list->chunks[i]);
         key->back = i >= list->first_back_chunk;
-        if (i && word_of(key) == word_of(key - 1)) /* most are */
-            batch_of_chunk[i] = batch_of_chunk[i - 1];
+        const uint64_t work = list->work_of_chunk[i];
+        if (i && word_of(key) == word_of(key - 1) && has_room(&list->batches[batch_of_chunk[i - 1]], work))
+            batch_of_chunk[i] = batch_of_chunk[i - 1]; /* most are */
         else
-            rc = get_batch(list, &table, key, &batch_of_chunk[i], err);
-        if (!rc)
-            list->batches[batch_of_chunk[i]].entries += runs(key->kind, &list->chunks[i]);
+            rc = get_batch(list, &table, key, work, &batch_of_chunk[i], err);
+        if (rc)
+            break;
+        list->batches[batch_of_chunk[i]].entries += runs(key->kind, &list->chunks[i]);
+        list->batches[batch_of_chunk[i]].work += work;
     }
     free(table.batch);
     return rc;
@@ -248,5 +260,6 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->batches);
     free(list->maps);
     free(list->key_of_chunk);
+    free(list->work_of_chunk);
     *list = (struct spl_draw_list){0};
 }

@@ -14,6 +14,9 @@
 /* For the halves of what is drawn a panel is so many splats: about as much work. */
 enum { SPL_PANEL_WORTH = 32 };
 
+/* Work is counted in samples that are looked at in a pass, at most. A batch has so much, or a single chunk. */
+#define SPL_BATCH_WORK ((uint64_t)1 << 25)
+
 /* What one kernel works off. The front phase is the nearer half of the splats, whose depth occludes chunks of the back
  * phase. */
 struct spl_draw_key {
@@ -26,9 +29,10 @@ struct spl_draw_key {
     uint16_t trims; /* the station whose map trims them, plus 1; 0 = none does */
 };
 
-/* The draw-list entries of one key. */
+/* Draw-list entries of one key: all of them where they are not too much work. */
 struct spl_draw_batch {
     struct spl_draw_key key;
+    uint64_t work; /* at most, of a pass */
     uint32_t first_entry, entries;
     uint32_t first_round, round_entries; /* a round draws so many entries, the last the rest */
 };
@@ -49,6 +53,7 @@ struct spl_draw_list {
     size_t chunk_count, entry_count, batch_count, map_count;
     size_t chunk_capacity, entry_capacity, batch_capacity, map_capacity;
     struct spl_draw_key *key_of_chunk; /* chunk_count, scratch */
+    uint64_t *work_of_chunk;           /* the same */
     uint64_t drawn[SPL_CHUNK_KINDS];   /* splats, pieces of lines, panels, meshes; of the latter two those whose cells
                                           are drawn one by one, too */
     uint64_t listed_splats;            /* splats and panels, once for every window that they are drawn in; a panel counts as
@@ -69,9 +74,10 @@ struct spl_draw_origin {
     bool lined;          /* its linear splats are not drawn: lines stand for them */
 };
 
-/* Appends a chunk. SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
+/* Appends a chunk whose kernels look at `looks` samples at most for each of its splats, vertices, panels or meshes.
+ * SPL_E_NOMEM; SPL_E_LIMIT above 2^28 entries. */
 int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
-                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds,
+                      const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds, uint64_t looks,
                       struct spl_error *err);
 
 /* Lays out entries and batches of all chunks added. SPL_E_NOMEM. */

@@ -7,4 +7,7 @@
 /* The next submit reports a lost device. */
 void spl_renderer_inject_loss(struct spl_renderer *renderer);
 
+/* How much work the device is given at a time (render/draw_list.h). */
+void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work);
+
 #endif

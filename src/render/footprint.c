@@ -27,3 +27,15 @@ double spl_footprint_side(const struct spl_camera *camera, double radius, double
     double slope_y = fmax(camera->cy, camera->height - camera->cy) / camera->fy;
     return near > 0 ? 2 * radius * fmax(camera->fx * (1 + slope_x), camera->fy * (1 + slope_y)) / near + 3 : INFINITY;
 }
+
+uint64_t spl_footprint_samples(const struct spl_camera *camera, const double low[2], const double high[2],
+                               double radius, double near)
+{
+    const double size[2] = {camera->width, camera->height}, side = spl_footprint_side(camera, radius, near);
+    double samples = 1;
+    for (int i = 0; i < 2; i++) {
+        double from = fmin(fmax(low[i], 0), size[i] - 1), to = fmin(fmax(high[i], 0), size[i] - 1);
+        samples *= fmin(to - from + 1, side);
+    }
+    return (uint64_t)samples;
+}

@@ -14,4 +14,9 @@ struct spl_chunk_bounds spl_footprint_bounds(const struct spl_camera *camera, co
  * off the image does not count. INFINITY where near is not above 0. */
 double spl_footprint_side(const struct spl_camera *camera, double radius, double near);
 
+/* Samples that are looked at for a disc of `radius`, or another piece within such a ball, of which [low, high] and
+ * `near` are known, at most. */
+uint64_t spl_footprint_samples(const struct spl_camera *camera, const double low[2], const double high[2],
+                               double radius, double near);
+
 #endif

@@ -234,8 +234,8 @@ static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats
     }
 }
 
-/* Has the device draw the tile. A list that could not be recorded to its end is run all the same, for nothing:
- * parameters and half its work are the device's by then. */
+/* Has the device draw the tile. What is left of a list that could not be recorded to its end is run all the same, for
+ * nothing: parameters and half its work are the device's by then. */
 static int draw_tile(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_gpu *gpu = tile->renderer->gpu;
@@ -249,7 +249,11 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
     if (!ended)
         ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + FRAME_DEADLINE_NS, &why);
-    return rc || !ended ? rc : spl_fail(err, ended, "%s", why.message);
+    if (!ended)
+        return rc;
+    if (err)
+        *err = (struct spl_error){0}; // whatever else: whoever renders is to know at once
+    return spl_fail(err, SPL_E_DEVICE_LOST, "%s", why.message);
 }
 
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)

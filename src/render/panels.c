@@ -27,11 +27,11 @@ static int dispatch(struct spl_tile *tile, uint32_t kind, bool whole, struct spl
         rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernels.of[SPL_ENDS_TRIMMED], err);
     if (rc)
         return rc;
-    spl_tile_dispatch_splats(tile, &kernels,
-                             &(struct spl_dispatch){.phases = phases,
-                                                    .kind = kind,
-                                                    .lanes = lanes_of(kind, whole, discs)});
-    return SPL_OK;
+    return spl_tile_dispatch_splats(tile, &kernels,
+                                    &(struct spl_dispatch){.phases = phases,
+                                                           .kind = kind,
+                                                           .lanes = lanes_of(kind, whole, discs)},
+                                    err);
 }
 
 int spl_tile_dispatch_panels(struct spl_tile *tile, const struct spl_panel_kernels *names, struct spl_kernel_key key,

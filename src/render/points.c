@@ -16,7 +16,9 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
         int rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernel.of[0], err);
         if (rc)
             return rc;
-        spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
+        rc = spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
+        if (rc)
+            return rc;
         rc = spl_tile_dispatch_panels(
             tile, &(struct spl_panel_kernels){.panel_cells = "points_cells", .mesh_cells = "points_mesh_cells"}, key,
             SPL_PHASE_BOTH, err);

@@ -3,6 +3,8 @@
 #ifndef SPL_RENDER_RENDERER_H
 #define SPL_RENDER_RENDERER_H
 
+#include <stdatomic.h>
+
 #include <splatd/render.h>
 
 #include "gpu/gpu.h"
@@ -47,6 +49,7 @@ struct spl_renderer {
     struct spl_scratch scratch;
     struct spl_kernels kernels;
     struct spl_draw_list list; /* reused from tile to tile */
+    uint64_t work_at_once;     /* that the device is given, see draw_list.h */
 };
 
 /* One tile being recorded. */
@@ -60,6 +63,8 @@ struct spl_tile {
     uint64_t samples;
     struct spl_frame_params params;              /* common to all dispatches of the tile, but for map_* */
     struct spl_gpu_buffer *map;                  /* that map_* are of; NULL = none so far */
+    const atomic_bool *cancelled;                // may be NULL; borrowed
+    uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
     uint32_t stamps;                             /* timestamps written */
@@ -83,6 +88,11 @@ void spl_tile_end_group(struct spl_tile *tile); /* ends what holds until a group
 
 /* What every dispatch of the tile may see: the draw list, and the areas that hold. */
 void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT]);
+
+/* To be called before dispatches of `work` are recorded: where they would be too much for the device's patience together
+ * with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody waits for
+ * the tile any more. */
+int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err);
 
 /* Cuts the draw list's batches into rounds and takes their parameters, before anything else of the tile takes some.
  * SPL_E_LIMIT. */
@@ -111,8 +121,8 @@ struct spl_dispatch {
     bool smooth;
     struct spl_gpu_kernel *sum; /* runs before, to sum textures into SPL_AREA_SUMMED; NULL = none */
 };
-void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
-                              const struct spl_dispatch *what);
+int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
+                             const struct spl_dispatch *what, struct spl_error *err);
 /* The same by the kernel of `key`, which is made where the tile has chunks of lines alone. */
 int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, enum spl_phase phases,
                             struct spl_error *err);

@@ -178,6 +178,11 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     return begin(renderer, dataset, view, NULL, true, out, err);
 }
 
+void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel)
+{
+    steps->job.cancelled = spl_cancel_get_flag(cancel);
+}
+
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
 {
     const struct spl_camera *camera = &steps->view.camera;
@@ -185,7 +190,10 @@ static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = find_resident(steps, err); // others may have been added or removed
     if (rc)
         return rc;
-    struct spl_tile tile = {.renderer = job->renderer, .resident = job->resident, .view = &steps->view};
+    struct spl_tile tile = {.renderer = job->renderer,
+                            .resident = job->resident,
+                            .view = &steps->view,
+                            .cancelled = job->cancelled};
     spl_tiling_place(&job->tiling, steps->x, steps->y, &tile);
     if ((rc = spl_frame_render_tile(job, &tile, err)))
         return rc;

@@ -1,6 +1,9 @@
-/* Recording the dispatches of one tile: parameters, bindings, timestamps. */
+/* Recording the dispatches of one tile: parameters, bindings, timestamps. Much work runs a part at a time, so that a
+ * slow device is not taken for a lost one, whatever is drawn, and a frame that nobody waits for ends. */
 #include <string.h>
 
+#include "base/clock.h"
+#include "base/work.h"
 #include "render/method.h"
 #include "render/renderer.h"
 
@@ -31,7 +34,8 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
 static int too_many(struct spl_error *err)
 {
     return spl_fail_field(err, SPL_E_LIMIT, "lod",
-                          "a view takes more than %d dispatches, as of so many pages; raise lod", SPL_PARAMS_MAX);
+                          "a view takes more than %d dispatches, as of so many pages or of discs so large; raise lod",
+                          SPL_PARAMS_MAX);
 }
 
 static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t index,
@@ -57,6 +61,19 @@ static int next_params(struct spl_tile *tile, const struct spl_frame_params *par
 static uint32_t lanes_of(const struct spl_dispatch *what)
 {
     return what->lanes ? what->lanes : what->kind == SPL_CHUNK_LINES ? SPL_RUN_SPLATS : SPL_LANES;
+}
+
+int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err)
+{
+    tile->work += work;
+    if (tile->work <= tile->renderer->work_at_once || tile->work == work)
+        return SPL_OK;
+    tile->work = work;
+    if (spl_is_cancelled(tile->cancelled))
+        return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
+    if (spl_now_ns() >= tile->view->deadline_ns)
+        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+    return spl_gpu_run(tile->renderer->gpu, err);
 }
 
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
@@ -87,15 +104,16 @@ static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *ke
     spl_gpu_barrier(tile->renderer->gpu);
 }
 
-void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
-                              const struct spl_dispatch *what)
+int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
+                             const struct spl_dispatch *what, struct spl_error *err)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
     const uint32_t lanes = lanes_of(what);
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
+    int rc = SPL_OK;
     spl_tile_bind(tile, bindings);
-    for (size_t i = 0; i < list->batch_count; i++) {
+    for (size_t i = 0; i < list->batch_count && !rc; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
         if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || what->kind != batch->key.kind ||
             (what->by_texture && (what->planes != batch->key.planes || what->smooth != batch->key.smooth)))
@@ -112,7 +130,8 @@ void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kerne
         }
         struct spl_gpu_kernel *kernel = kernels->of[ends_of(&batch->key)];
         uint32_t round = batch->first_round;
-        for (uint32_t done = 0; done < batch->entries; done += batch->round_entries) {
+        rc = spl_tile_add_work(tile, batch->work, err);
+        for (uint32_t done = 0; done < batch->entries && !rc; done += batch->round_entries) {
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
@@ -124,6 +143,7 @@ void spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kerne
                              (uint32_t)(((uint64_t)params.entries * lanes + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
         }
     }
+    return rc;
 }
 
 int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, enum spl_phase phases,
@@ -134,7 +154,8 @@ int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, en
         return SPL_OK;
     int rc = spl_kernels_get(&tile->renderer->kernels, tile->renderer->gpu, &key, &kernel.of[0], err);
     if (!rc)
-        spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = phases, .kind = SPL_CHUNK_LINES});
+        rc = spl_tile_dispatch_splats(tile, &kernel,
+                                      &(struct spl_dispatch){.phases = phases, .kind = SPL_CHUNK_LINES}, err);
     return rc;
 }
 

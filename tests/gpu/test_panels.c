@@ -1,6 +1,5 @@
-/* Panels against the plain C reference: every kind of mask and colours, from far away, near by, within, along their
- * plane's edge; as such, and as the discs and points that their cells stand for; forged ones. One body for every
- * backend. */
+/* Panels by what must be seen of them: walls that are closed, floors at a slant, planes along their edge, cells far away,
+ * thin walls, what is hidden, what stations colour and trim, picks. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include <cmocka.h>
 
 #include "dataset/panels.h"
@@ -17,42 +15,8 @@
 #include "gpu/panel_scenes.h"
 #include "support/mapped_dataset.h"
 #include "support/sanitised.h"
-#include "support/spoil.h"
 
 enum { side = SPL_PANEL_SIDE };
-
-static void panels_match_from_every_side(void **state)
-{
-    (void)state;
-    for (uint64_t seed = 1; seed <= TEST_SIZE(6, 2); seed++) {
-        random_state = seed;
-        struct spl_dataset *dataset = random_panels(4, seed % 3 ? 300 : 0, origin, 0.01, 0);
-        struct spl_view view = looking(origin, 3, 160, 120);
-        same_of_all(dataset, &view, "aside");
-        view.supersample = 2;
-        view.lod = 0;
-        same_of_all(dataset, &view, "in full");
-        view = looking(origin, 40, 160, 120);
-        same_of_all(dataset, &view, "far away");
-        done(dataset);
-    }
-}
-
-/* Cells as large as half the image, the eye among them: windows, and panels that reach the near plane. Not of fill,
- * whose filter has tests of its own. */
-static void panels_around_the_eye_match(void **state)
-{
-    (void)state;
-    for (uint64_t seed = 1; seed <= TEST_SIZE(6, 2); seed++) {
-        random_state = 100 + seed;
-        struct spl_dataset *dataset = random_panels(4, 100, origin, 0.05, 0);
-        struct spl_view view = looking(origin, 0.1 + uniform(), 400, 240);
-        view.camera.cx += 31.7;
-        view.camera.fy *= 1.2;
-        same_of_all(dataset, &view, "among them");
-        done(dataset);
-    }
-}
 
 /* What a ball behind waves of colour shows, and sky and what was not scanned around it. */
 static void look_around(const struct make_map *map, const double d[3], double color[3], double *range)
@@ -321,115 +285,6 @@ static void a_cell_far_away_does_not_vanish(void **state)
     done(dataset);
 }
 
-/* What `primitives=off` draws is what a dataset of discs in the cells' places does, to what their coding rounds. */
-static void cells_are_discs_in_their_places(void **state)
-{
-    (void)state;
-    struct spl_dataset *dataset = random_panels(3, 0, origin, 0.02, 0);
-    uint64_t chunk_count, node_count;
-    size_t bytes, count = 0;
-    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-    const struct spl_node *node = spl_dataset_get_nodes(dataset, &node_count);
-    const uint32_t *page = spl_dataset_get_page(dataset, node->page, &bytes);
-    struct make_splat *discs = calloc(chunk_count * SPL_PANELS_MAX * side * side, sizeof *discs);
-    assert_non_null(discs);
-    for (uint64_t c = 0; c < chunk_count; c++) {
-        struct spl_panel_frame plane;
-        spl_panels_get_frame(&chunks[c], &plane);
-        for (uint32_t i = 0; i < chunks[c].count; i++) {
-            struct spl_panel panel;
-            spl_panels_decode(&chunks[c], page, i, &panel);
-            for (int y = 0; y < side; y++)
-                for (int x = 0; x < side; x++) {
-                    struct make_splat *disc = &discs[count];
-                    float u = plane.cell * (float)(side * panel.column + x + 0.5);
-                    float v = plane.cell * (float)(side * panel.row + y + 0.5);
-                    if (!(panel.cells[y] >> x & 1))
-                        continue;
-                    for (int a = 0; a < 3; a++)
-                        disc->position[a] = node->origin[a] + plane.origin[a] + u * plane.u[a] + v * plane.v[a];
-                    disc->radius = SPL_RADIUS_SPACING * plane.cell;
-                    memcpy(disc->normal, plane.normal, sizeof disc->normal);
-                    memcpy(disc->color, panel.color[y][x], 3);
-                    count++;
-                }
-        }
-    }
-    struct spl_dataset *other = make_dataset(discs, count);
-    free(discs);
-    assert_int_equal(spl_renderer_add(renderer, other, NULL), SPL_OK);
-    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
-        struct spl_view view = looking(origin, 3, 240, 180);
-        view.method = method;
-        view.lod = 0;
-        view.shapes = SPL_SHAPES_OFF;
-        struct spl_frame a = render(dataset, &view), b = render(other, &view);
-        struct tally t = compare(&a, &b);
-        size_t covered = 0, apart = 0;
-        const float *da = a.images[SPL_LAYER_DEPTH].pixels, *db = b.images[SPL_LAYER_DEPTH].pixels;
-        for (size_t i = 0; i < t.pixels; i++) {
-            covered += !isnan(da[i]);
-            apart += !isnan(da[i]) && !isnan(db[i]) && fabsf(da[i] - db[i]) > 0.005f;
-        }
-        assert_true(covered > t.pixels / 20);
-        if (t.covered_differs > covered / 15 || apart > covered / 30)
-            fail_msg("%s: of %zu pixels %zu differ in coverage, %zu in depth", spl_method_name(view.method), covered,
-                     t.covered_differs, apart);
-        spl_frame_finish(&a);
-        spl_frame_finish(&b);
-    }
-    done(dataset);
-    done(other);
-}
-
-/* Words at random in place of panels' own: what is read is held within the chunk, and drawn as C reads it. */
-static void forged_words_match(void **state)
-{
-    (void)state;
-    char folder[256], path[300];
-    struct spl_panel panels[SPL_PANELS_MAX] = {0};
-    make_folder(folder);
-    snprintf(path, sizeof path, "%s/forged.spld", folder);
-    for (int i = 0; i < SPL_PANELS_MAX; i++)
-        random_panel(&panels[i], (unsigned)i % 6, (unsigned)i / 6);
-    for (int seed = 0; seed < 8; seed++) {
-        struct make_panels made[2] = {{.plane = {.cell = 0.01f, .normal = {0.6f, -0.8f, 0}, .points = 1},
-                                       .panels = panels,
-                                       .count = SPL_PANELS_MAX,
-                                       .color_error = 2}};
-        made[1] = made[0];
-        made[1].plane.normal[2] = 1;
-        made[1].plane.normal[0] = made[1].plane.normal[1] = 0;
-        make_dataset_file_panels(path, NULL, 0, made, 2, 1);
-        struct spoil file = spoil_load(path);
-        struct spl_dataset *dataset;
-        uint64_t chunk_count;
-        assert_int_equal(spl_dataset_open(path, false, &dataset, NULL), SPL_OK);
-        const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
-        assert_int_equal(chunk_count, 2);
-        uint32_t *page = spoil_at(&file, SPL_SECTION_PAGE), first = chunks[0].geometry_word;
-        for (uint32_t w = 0; w < chunks[0].color_bits + chunks[1].color_bits; w++)
-            if (seed % 2 == 0 || uniform() < 0.1) {
-                uint32_t low = (uint32_t)(uniform() * 65536), high = (uint32_t)(uniform() * 65536);
-                page[first + w] = low | high << 16;
-                if (seed % 4 == 0 && w % 2 == 0 && w < 2 * SPL_PANELS_MAX)
-                    page[first + w] &= 0xffff0303; /* within the grid */
-            }
-        spl_dataset_close(dataset);
-        spoil_store(&file, path, true);
-        free(file.bytes);
-        assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
-        assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-        struct spl_view view = looking(origin, 1.5, 160, 120);
-        same_of_all(dataset, &view, "forged");
-        look(&view, (double[]){0.3, 0.3, 0.1}, (double[]){0, 0.1, 0});
-        same_of(dataset, &view, SPL_METHOD_SPLAT, "forged, near by");
-        done(dataset);
-    }
-    unlink(path);
-    rmdir(folder);
-}
-
 /* Two faces closer than a cell, each seen from its own side: the other's colour is not mixed in. As discs likewise. */
 static void a_thin_wall_shows_the_face_that_it_turns(void **state)
 {
@@ -526,43 +381,6 @@ static void what_is_hidden_changes_nothing(void **state)
     }
 }
 
-/* A pixel is the same in whatever tile it lies, to the bit; of splat only what has no sums (test_tiles.c). */
-static void tiles_leave_no_seams(void **state)
-{
-    (void)state;
-    struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 160 * 160};
-    struct spl_renderer *small;
-    assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
-    for (uint64_t seed = 1; seed <= TEST_SIZE(8, 2); seed++) {
-        random_state = seed;
-        struct spl_dataset *dataset = random_panels(seed % 2 ? 30 : 4, 500, origin, seed % 2 ? 0.004 : 0.03, 0);
-        assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
-        for (int setting = 0; setting < 2 * SPL_METHOD_COUNT; setting++) {
-            struct spl_view view = looking(origin, seed % 3 ? 3 : 0.7, 203, 151);
-            struct spl_frame cut, whole;
-            view.method = setting / 2;
-            view.shapes = setting % 2 ? SPL_SHAPES_ALL : SPL_SHAPES_OFF;
-            view.supersample = 1 + (double)(seed % 2);
-            view.fill.kernel = 8.0 / view.supersample;
-            whole = render(dataset, &view);
-            assert_int_equal(spl_renderer_render(small, dataset, &view, &cut, NULL), SPL_OK);
-            assert_true(cut.stats.tiles > 1 && whole.stats.tiles == 1);
-            for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-                const struct spl_image *a = &whole.images[layer], *b = &cut.images[layer];
-                bool summed = view.method == SPL_METHOD_SPLAT && layer != SPL_LAYER_COVERAGE && layer != SPL_LAYER_ID;
-                if (!summed && memcmp(a->pixels, b->pixels, (size_t)203 * 151 * spl_pixel_bytes(a->type)))
-                    fail_msg("%s, primitives %s, seed %d: layer %s differs", spl_method_name(view.method),
-                             spl_shapes_name(view.shapes), (int)seed, spl_layer_name((enum spl_layer)layer));
-            }
-            spl_frame_finish(&whole);
-            spl_frame_finish(&cut);
-        }
-        spl_renderer_remove(small, dataset);
-        done(dataset);
-    }
-    spl_renderer_destroy(small);
-}
-
 /* A pick on a panel says its id, class, plane and place. */
 static void picks_say_which_panel(void **state)
 {
@@ -592,19 +410,14 @@ static void picks_say_which_panel(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        frames_test(panels_match_from_every_side),
-        frames_test(panels_around_the_eye_match),
         frames_test(maps_colour_and_trim_panels),
         frames_test(a_wall_is_closed_and_its_hole_open),
         frames_test(a_floor_at_a_slant_is_where_it_is),
         frames_test(planes_along_their_edge_are_lines),
         frames_test(a_cell_far_away_does_not_vanish),
-        frames_test(cells_are_discs_in_their_places),
-        frames_test(forged_words_match),
         frames_test(a_thin_wall_shows_the_face_that_it_turns),
         frames_test(what_is_hidden_changes_nothing),
         frames_test(picks_say_which_panel),
-        frames_test(tiles_leave_no_seams),
     };
     return frames_run(argc, argv, "panels", tests, sizeof tests / sizeof *tests);
 }

@@ -1,6 +1,6 @@
 /* Meshes as the triangles that they are, of methods splat and nearest: against rays that meet the same triangles in
  * doubles, and closed where these are; flat ones against the panels that they are; far away, along their edges, very
- * near. test_meshes.c holds them against the plain C reference. One body for every backend. */
+ * near. test_panel_kinds.c holds them against the plain C reference. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

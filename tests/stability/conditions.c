@@ -23,9 +23,25 @@ static void must(int rc, const struct spl_error *err)
     exit(1);
 }
 
+static bool begins(const char *text, const char *beginning)
+{
+    return !strncmp(text, beginning, strlen(beginning));
+}
+
 bool conditions_wants(const struct conditions *c, const char *condition)
 {
-    return !c->only || !strncmp(c->only, condition, strlen(c->only));
+    bool named = !*c->only;
+    for (const char *const *only = c->only; *only; only++)
+        named |= begins(condition, *only);
+    return named != c->others;
+}
+
+bool conditions_wants_any(const struct conditions *c, const char *beginning)
+{
+    bool wanted = conditions_wants(c, beginning);
+    for (const char *const *only = c->only; *only && !c->others; only++)
+        wanted |= begins(*only, beginning);
+    return wanted;
 }
 
 /* The view from 1.5 pixels further right, as seen at the harmonic mean of the truth's depths. */

@@ -8,7 +8,8 @@
 struct conditions {
     struct suite *suite; /* .renderer writes the table, .other (may be NULL) is held against it */
     struct table *table;
-    const char *only;     /* how the conditions that are measured begin; may be NULL */
+    const char *const *only; /* how the conditions that are measured begin, NULL at the end; none = all */
+    bool others;             /* those that begin otherwise are, instead */
     const char *method;   /* whose rows alone are measured; may be NULL */
     const char *pictures; /* a folder for a picture of each row; may be NULL */
     bool update;
@@ -41,8 +42,9 @@ void conditions_measure_primitives(struct conditions *c, const struct world worl
                                    const char *condition, const char *value, bool whole_only,
                                    const struct worse *allowed);
 
-/* Is this condition to be measured? `only` may be the beginning of its name. */
+/* Is this condition to be measured? And is any of those that begin so? */
 bool conditions_wants(const struct conditions *c, const char *condition);
+bool conditions_wants_any(const struct conditions *c, const char *beginning);
 
 void conditions_of_scans(struct conditions *c);  /* density, noise, poses, echoes; thin, stepped, leafy, fine things */
 void conditions_of_views(struct conditions *c);  /* where the eye is, what it takes in, how large the image is */

@@ -187,7 +187,7 @@ static void stations(struct conditions *c, const struct survey *all, const struc
 void conditions_of_maps(struct conditions *c)
 {
     struct survey all = {0};
-    if (c->only && strncmp(c->only, "maps:", strlen(c->only) < 5 ? strlen(c->only) : 5))
+    if (!conditions_wants_any(c, "maps:"))
         return;
     struct spl_scene *yard = yard_create(NOBODY);
     for (int i = 0; i < 2; i++)

@@ -174,14 +174,8 @@ static void few_atoms(struct conditions *c, const struct photographs *all)
 
 void conditions_of_photographs(struct conditions *c)
 {
-    static const char *const names[] = {"photographs: what they show", "photographs: exposures",
-                                        "photographs: grazing",        "photographs: blurred",
-                                        "photographs: misplaced",      "photographs: few atoms"};
     struct photographs all = {0};
-    bool wanted = false;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        wanted |= conditions_wants(c, names[i]);
-    if (!wanted)
+    if (!conditions_wants_any(c, "photographs:"))
         return;
     struct spl_scene *scene = wall_create();
     take_all(&all, scene);

@@ -2,11 +2,12 @@
  *
  *   stability invariants vulkan|egl [THEME…]    limits from the truth and from arithmetic; all themes or these
  *   stability drivers [--whole]                 Vulkan against EGL
- *   stability conditions [--whole]              measures what degrades and compares it with table.json, either way
- *   stability conditions [NAME] [--method METHOD] --update [--whole]   writes the table's rows anew, those of the
- *                                               conditions that begin so and of the method; read it before it is
- * committed stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for
- * it catches it
+ *   stability conditions [NAME…] [--others] [--whole]   measures what degrades and compares it with table.json, either
+ *                                               way: all of it, or the conditions that begin so, or all the others
+ *   stability conditions [NAME…] [--method METHOD] --update [--whole]   writes the table's rows anew, those of these
+ *                                               conditions and of the method; read it before it is committed
+ *   stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for it
+ *                                               catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
  * prints what passes as well. Exit code 77: no such device here. */
@@ -113,9 +114,9 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     conditions_of_photographs(conditions);
     conditions_of_maps(conditions);
     conditions_of_primitives(conditions);
-    bool all = !conditions->only && !conditions->method;
-    if (all && !(conditions->update && suite->whole))
-        table_find_stale(conditions->table, &suite->report, suite->whole);
+    bool all = !*conditions->only && !conditions->method;
+    if (!conditions->method && !(conditions->update && suite->whole))
+        table_find_stale(conditions->table, &suite->report, conditions, suite->whole);
     if (conditions->update)
         table_save(conditions->table, suite->whole && all);
     table_close(conditions->table);
@@ -125,9 +126,9 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
 int main(int argc, char **argv)
 {
     struct suite suite = {0};
-    const char *words[8] = {"", ""};
+    const char *words[8] = {""}; /* NULL at the end */
     int count = 0, rc = 2;
-    struct conditions conditions = {0};
+    struct conditions conditions = {.only = words + 1};
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--whole"))
             suite.whole = true;
@@ -135,6 +136,8 @@ int main(int argc, char **argv)
             suite.report.verbose = true;
         else if (!strcmp(argv[i], "--update"))
             conditions.update = true;
+        else if (!strcmp(argv[i], "--others"))
+            conditions.others = true;
         else if (!strcmp(argv[i], "--method") && i + 1 < argc)
             conditions.method = argv[++i];
         else if (!strcmp(argv[i], "--pictures") && i + 1 < argc)
@@ -142,17 +145,17 @@ int main(int argc, char **argv)
         else if (count < 7)
             words[count++] = argv[i];
     }
-    if (!strcmp(words[0], "invariants") && *words[1])
+    if (!strcmp(words[0], "invariants") && words[1])
         rc = run_invariants(&suite, words[1], words + 2);
     else if (!strcmp(words[0], "drivers"))
         rc = run_drivers(&suite);
     else if (!strcmp(words[0], "conditions"))
-        conditions.only = *words[1] ? words[1] : NULL, rc = run_conditions(&suite, &conditions);
-    else if (!strcmp(words[0], "plant"))
+        rc = run_conditions(&suite, &conditions);
+    else if (!strcmp(words[0], "plant") && words[1])
         rc = run_plant(&suite, words[1]);
     if (rc == 2)
-        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME] [--method "
-                        "METHOD] [--update] | plant "
+        fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME…] [--others] "
+                        "[--method METHOD] [--update] | plant "
                         "half-pixel|margin-0|pop|no-trim [--whole]\n");
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);

@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "conditions.h"
+
 static const struct {
     const char *name;
     bool more_is_better;
@@ -151,15 +153,17 @@ void table_put(struct table *table, const struct row *row)
     table->seen[at] = true;
 }
 
-void table_find_stale(struct table *table, struct report *report, bool whole)
+void table_find_stale(struct table *table, struct report *report, const struct conditions *wanted, bool whole)
 {
     size_t i;
     json_t *row;
     json_array_foreach(table->rows, i, row)
     {
-        if (table->seen[i] || (!whole && json_is_true(json_object_get(row, "whole"))))
+        const char *condition = json_string_value(json_object_get(row, "condition"));
+        if (table->seen[i] || !conditions_wants(wanted, condition) ||
+            (!whole && json_is_true(json_object_get(row, "whole"))))
             continue;
-        struct place place = {json_string_value(json_object_get(row, "condition")),
+        struct place place = {condition,
                               json_string_value(json_object_get(row, "value")),
                               json_string_value(json_object_get(row, "method")), NULL};
         report_broken(report, "as-in-the-table", &place, "nobody measures this row of table.json any more");

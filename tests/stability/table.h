@@ -26,6 +26,7 @@ struct row {
 };
 
 struct table;
+struct conditions;
 
 /* Reads the file, which may be missing. What is broken ends the program. */
 struct table *table_open(const char *path);
@@ -38,8 +39,9 @@ void table_judge(struct table *table, struct report *report, const struct row *r
 /* Puts the row in the place of the file's, or at the end. */
 void table_put(struct table *table, const struct row *row);
 
-/* A failure for each row of the file that was neither judged nor put, of the small form or (`whole`) at all. */
-void table_find_stale(struct table *table, struct report *report, bool whole);
+/* A failure for each row of the file that was neither judged nor put though its condition is wanted, of the small form
+ * or (`whole`) at all. */
+void table_find_stale(struct table *table, struct report *report, const struct conditions *wanted, bool whole);
 
 /* Writes what was put, then what was in the file besides; `whole`: only the former. A temporary file, renamed. */
 void table_save(struct table *table, bool whole);

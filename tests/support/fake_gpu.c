@@ -79,6 +79,7 @@ static void fake_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64
                       uint32_t word)
 {
     (void)gpu, (void)buffer, (void)offset, (void)bytes, (void)word;
+    fake.fills++;
 }
 
 static int fake_submit(struct spl_gpu *gpu, uint64_t ticket, struct spl_error *err)

@@ -143,6 +143,7 @@ struct spl_frame_steps {
     struct spl_renderer *renderer;
     struct spl_view view;
     struct spl_frame frame;
+    const struct spl_cancel *cancel; // may be NULL
     uint64_t left;     /* samples */
     uint64_t there_ns; /* when its pages are */
 };
@@ -159,6 +160,11 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     *steps = (struct spl_frame_steps){.renderer = renderer, .view = *view, .left = spl_view_get_samples(view),
                                        .there_ns = spl_now_ns() + (uint64_t)setting("FAKE_PAGES_MS", 0) * SPL_NS_PER_MS};
     return 0;
+}
+
+void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel)
+{
+    steps->cancel = cancel;
 }
 
 static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
@@ -200,6 +206,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     while (spl_remaining_ns(until)) {
         if (!spl_remaining_ns(deadline_ns))
             return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+        if (spl_cancel_is_set(steps->cancel))
+            return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
         usleep(500);
     }
     steps->left -= tile;

@@ -130,8 +130,9 @@ void gl_read_timestamps(struct spl_gpu *base)
     gl_use(gpu);
     for (uint32_t i = 0; i < SPL_GPU_TIMESTAMPS_MAX; i++) {
         GLuint64 ns = 0;
-        if (list->written >> i & 1)
-            gpu->gl.GetQueryObjectui64v(list->queries[i], GL_QUERY_RESULT, &ns);
+        if (!(list->written >> i & 1))
+            continue;
+        gpu->gl.GetQueryObjectui64v(list->queries[i], GL_QUERY_RESULT, &ns);
         base->timestamps_ns[i] = ns;
     }
 }

@@ -2,6 +2,8 @@
 #ifndef SPL_PACK_PLANES_REGIONS_H
 #define SPL_PACK_PLANES_REGIONS_H
 
+#include <stdbool.h>
+
 #include "pack/planes/lists.h"
 #include "pack/planes/patches.h"
 
@@ -31,6 +33,24 @@ int spl_patch_graph_init(struct spl_patch_graph *graph, struct spl_plane_levels 
                          const struct spl_points *points, const uint32_t *label, struct spl_stage *stage,
                          struct spl_error *err);
 void spl_patch_graph_finish(struct spl_patch_graph *graph);
+
+/* How a region grows from its first patch on; `state` is the rule's own. */
+struct spl_region_rule {
+    void *state;
+    uint32_t rounds; /* in which those that were let go begin regions of their own */
+    void (*begin)(void *state, const struct spl_patch *seed);
+    /* Whether the region takes `next`, which lies beside `from`, one of its own. */
+    bool (*takes)(const void *state, const struct spl_region *r, const struct spl_patch *from,
+                  const struct spl_patch *next);
+    void (*took)(void *state, struct spl_region *r, const struct spl_patch *q); /* its moments are in the region's */
+    void (*fit)(struct spl_region *r);                                          /* NULL: none is let go */
+    bool (*keeps)(const void *state, const struct spl_region *r, const struct spl_patch *q); /* once it is fitted */
+};
+
+/* Regions by a rule, the largest patch first (search.c). Otherwise as spl_regions_find(). */
+int spl_regions_search(struct spl_regions *regions, uint32_t *region, const struct spl_patches *patches,
+                       const struct spl_patch_graph *graph, const struct spl_region_rule *rule,
+                       const struct spl_stage *stage, struct spl_error *err);
 
 /* Joins patches to regions; `region` of each patch is filled. On the calling thread. `regions` is finished by the
  * caller, on failure too. SPL_E_NOMEM. */

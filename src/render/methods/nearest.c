@@ -11,14 +11,12 @@ static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_p
     struct spl_disc_kernels kernels;
     struct spl_kernel_key key = {"nearest", true, {group, pass}};
     int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
-    if (rc)
-        return rc;
-    spl_tile_dispatch_splats(tile, &kernels, &(struct spl_dispatch){.phases = phases});
+    rc = rc ? rc : spl_tile_dispatch_splats(tile, &kernels, &(struct spl_dispatch){.phases = phases}, err);
     static const struct spl_panel_kernels panels = {.panels = "panel_nearest",
                                                      .meshes = "mesh_nearest",
                                                      .panel_cells = "nearest_cells",
                                                      .mesh_cells = "nearest_mesh_cells"};
-    rc = spl_tile_dispatch_panels(tile, &panels, key, phases, err);
+    rc = rc ? rc : spl_tile_dispatch_panels(tile, &panels, key, phases, err);
     struct spl_kernel_key lines = {"line_nearest", true, {group, pass}};
     rc = rc ? rc : spl_tile_dispatch_lines(tile, lines, phases, err);
     spl_gpu_barrier(r->gpu);

@@ -8,12 +8,12 @@
 static int draw_depth(struct spl_tile *tile, const struct spl_disc_kernels *depth, enum spl_phase phase,
                       struct spl_error *err)
 {
-    spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = phase});
+    int rc = spl_tile_dispatch_splats(tile, depth, &(struct spl_dispatch){.phases = phase}, err);
     static const struct spl_panel_kernels panels = {.panels = "panel_depth",
                                                      .meshes = "mesh_depth",
                                                      .panel_cells = "splat_depth_cells",
                                                      .mesh_cells = "splat_depth_mesh_cells"};
-    int rc = spl_tile_dispatch_panels(tile, &panels, (struct spl_kernel_key){0}, phase, err);
+    rc = rc ? rc : spl_tile_dispatch_panels(tile, &panels, (struct spl_kernel_key){0}, phase, err);
     rc = rc ? rc : spl_tile_dispatch_lines(tile, (struct spl_kernel_key){.name = "line_depth"}, phase, err);
     spl_gpu_barrier(tile->renderer->gpu);
     return rc;
@@ -61,9 +61,8 @@ static int shade_colors(struct spl_tile *tile, const struct spl_disc_kernels *pl
     for (size_t i = 0; i < list->batch_count; i++)
         seen |= 1ull << (2 * list->batches[i].key.planes + list->batches[i].key.smooth);
     struct spl_dispatch what = {.phases = SPL_PHASE_BOTH, .by_texture = true};
-    spl_tile_dispatch_splats(tile, plain, &what);
-    int rc = SPL_OK;
-    for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1); kind++) {
+    int rc = spl_tile_dispatch_splats(tile, plain, &what, err);
+    for (uint32_t kind = 2; kind < 2 * (SPL_TEXTURE_ATOMS + 1) && !rc; kind++) {
         struct spl_disc_kernels kernels;
         if (!(seen >> kind & 1))
             continue;
@@ -73,7 +72,7 @@ static int shade_colors(struct spl_tile *tile, const struct spl_disc_kernels *pl
             break;
         if (what.smooth)
             spl_tile_begin_area(tile, SPL_AREA_SUMMED);
-        spl_tile_dispatch_splats(tile, &kernels, &what);
+        rc = spl_tile_dispatch_splats(tile, &kernels, &what, err);
         if (what.smooth)
             spl_tile_end_area(tile, SPL_AREA_SUMMED);
     }
@@ -83,14 +82,10 @@ static int shade_colors(struct spl_tile *tile, const struct spl_disc_kernels *pl
 /* Records the shade pass of a group of layers. */
 static int shade(struct spl_tile *tile, uint32_t group, const struct spl_disc_kernels *kernels, struct spl_error *err)
 {
-    if (group != SPL_SUMS_COLOR) {
-        spl_tile_dispatch_splats(tile, kernels, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH});
-    } else {
-        int rc = shade_colors(tile, kernels, err);
-        if (rc)
-            return rc;
-    }
-    int rc = shade_panels(tile, group, err);
+    int rc = group == SPL_SUMS_COLOR
+                 ? shade_colors(tile, kernels, err)
+                 : spl_tile_dispatch_splats(tile, kernels, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
+    rc = rc ? rc : shade_panels(tile, group, err);
     struct spl_kernel_key lines = {"line_shade", true, {group}};
     return rc ? rc : spl_tile_dispatch_lines(tile, lines, SPL_PHASE_BOTH, err);
 }

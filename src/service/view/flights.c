@@ -175,6 +175,6 @@ void spl_ticket_drop(struct ticket *ticket)
         return;
     LIST_REMOVE(flight, link);
     flight->job->owner = NULL;
-    atomic_store(&flight->job->dropped, true);
+    spl_cancel_set(&flight->job->dropped);
     finish(flight);
 }

@@ -23,7 +23,7 @@ void spl_job_destroy(struct spl_job *job)
 
 bool spl_job_is_over(struct spl_job *job)
 {
-    if (atomic_load(&job->dropped))
+    if (spl_cancel_is_set(&job->dropped))
         spl_fail(&job->err, SPL_E_CANCELLED, "the client has left");
     else if (!spl_remaining_ns(job->deadline_ns))
         spl_fail(&job->err, SPL_E_TIMEOUT, "the deadline of %.0f ms passed before the view was ready",

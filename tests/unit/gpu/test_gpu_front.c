@@ -175,6 +175,38 @@ static void injected_and_real_losses_stick(void **state)
     }
 }
 
+/* What was recorded runs and has ended before more is; after a loss what is recorded goes nowhere. */
+static void a_list_runs_in_parts(void **state)
+{
+    (void)state;
+    struct spl_gpu gpu = make();
+    struct spl_gpu_buffer *buffer;
+    struct spl_error err = {0};
+    uint64_t ticket;
+    fake.ended = 2;
+    assert_int_equal(spl_gpu_buffer_create(&gpu, SPL_GPU_DEVICE, 64, &buffer, NULL), 0);
+    assert_int_equal(spl_gpu_begin(&gpu, NULL), 0);
+    for (int part = 1; part <= 2; part++) {
+        spl_gpu_fill(&gpu, buffer, 0, 64, 1);
+        assert_int_equal(spl_gpu_run(&gpu, NULL), 0);
+        assert_int_equal(fake.waits, part);
+        assert_int_equal(fake.last_timeout_ns, SPL_GPU_PATIENCE_NS);
+        assert_int_equal(fake.fills, part);
+    }
+    assert_int_equal(spl_gpu_run(&gpu, &err), SPL_E_DEVICE_LOST); // it does not end
+    assert_string_equal(err.message, "not yet");
+    spl_gpu_fill(&gpu, buffer, 0, 64, 1);
+    spl_gpu_barrier(&gpu);
+    spl_gpu_timestamp(&gpu, 0);
+    assert_int_equal(spl_gpu_run(&gpu, NULL), SPL_E_DEVICE_LOST);
+    assert_int_equal(spl_gpu_submit(&gpu, &ticket, NULL), SPL_E_DEVICE_LOST);
+    assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_DEVICE_LOST);
+    assert_int_equal(fake.fills, 2);
+    assert_int_equal(gpu.tickets, 3);
+    fake.ended = 3;
+    spl_gpu_buffer_destroy(&gpu, buffer);
+}
+
 static void selftest_names_the_wrong_word(void **state)
 {
     (void)state;
@@ -341,6 +373,7 @@ int main(void)
         cmocka_unit_test(past_deadline_is_no_loss_once_it_ended),
         cmocka_unit_test(work_without_end_keeps_its_memory),
         cmocka_unit_test(injected_and_real_losses_stick),
+        cmocka_unit_test(a_list_runs_in_parts),
         cmocka_unit_test(selftest_names_the_wrong_word),
         cmocka_unit_test(kernels_bind_what_they_declare),
         cmocka_unit_test(every_kernel_is_as_declared),

@@ -14,19 +14,10 @@
 #include "clouds.h"
 #include "dataset/dataset.h"
 #include "dataset/panels.h"
+#include "support/folder.h"
 
-static char folder[] = "/tmp/splatd-pack-meshes-XXXXXX";
 enum { ground = 30000, ball = 12000, bush = 600, corners_most = 200000 };
 static const double noise = 0.0005, radius = 0.4;
-
-static const char *path_of(const char *name)
-{
-    static char paths[8][512];
-    static int next;
-    char *path = paths[next++ % 8];
-    snprintf(path, 512, "%s/%s", folder, name);
-    return path;
-}
 
 static double wave(double x, double y)
 {
@@ -37,7 +28,7 @@ static double wave(double x, double y)
 static const char *write_scan(void)
 {
     uint64_t random = 9;
-    const char *path = path_of("scan.csv");
+    const char *path = in_folder("scan.csv");
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     fprintf(f, "x,y,z,red,green,blue\n");
@@ -60,7 +51,7 @@ static void pack(const char *output, enum spl_pack_primitives primitives, unsign
                  struct spl_pack_report *report)
 {
     struct spl_error err = {0};
-    const char *input = path_of("scan.csv");
+    const char *input = in_folder("scan.csv");
     const struct spl_pack_options options = {.size = sizeof options, .inputs = &input, .input_count = 1,
                                              .output = output, .threads = threads, .primitives = primitives};
     if (spl_pack(&options, report, &err))
@@ -153,9 +144,9 @@ static void meshes_lie_on_what_was_scanned(void **state)
     size_t count = 0;
     (void)state;
     write_scan();
-    pack(path_of("off.spld"), SPL_PRIMITIVES_OFF, 2, &off);
-    pack(path_of("on.spld"), SPL_PRIMITIVES_ALL, 2, &on);
-    if (spl_dataset_open_whole(path_of("on.spld"), true, &dataset, &err))
+    pack(in_folder("off.spld"), SPL_PRIMITIVES_OFF, 2, &off);
+    pack(in_folder("on.spld"), SPL_PRIMITIVES_ALL, 2, &on);
+    if (spl_dataset_open_whole(in_folder("on.spld"), true, &dataset, &err))
         fail_msg("%s", err.message);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
@@ -180,7 +171,7 @@ static void meshes_lie_on_what_was_scanned(void **state)
     assert_int_equal(points, info->panel_points + info->mesh_points);
     assert_int_equal(on.mesh_points, info->mesh_points);
     assert_true((double)info->mesh_points > 0.9 * (ground + ball));
-    assert_true((double)size_of(path_of("on.spld")) < 0.6 * (double)size_of(path_of("off.spld")));
+    assert_true((double)size_of(in_folder("on.spld")) < 0.6 * (double)size_of(in_folder("off.spld")));
     assert_true(cells > 0 && sqrt(sum / cells) < 0.0025);
 
     /* lattices of one piece and one size of cells meet at the same heights, but beyond its border */
@@ -209,24 +200,10 @@ static void threads_do_not_matter(void **state)
     char command[1200];
     (void)state;
     for (unsigned threads = 1; threads <= 5; threads += 4) {
-        pack(path_of("threads.spld"), SPL_PRIMITIVES_ALL, threads, NULL);
-        snprintf(command, sizeof command, "cmp %s %s", path_of("on.spld"), path_of("threads.spld"));
+        pack(in_folder("threads.spld"), SPL_PRIMITIVES_ALL, threads, NULL);
+        snprintf(command, sizeof command, "cmp %s %s", in_folder("on.spld"), in_folder("threads.spld"));
         assert_int_equal(system(command), 0);
     }
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    char command[600];
-    (void)state;
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    return system(command);
 }
 
 int main(void)
@@ -235,5 +212,5 @@ int main(void)
         cmocka_unit_test(meshes_lie_on_what_was_scanned),
         cmocka_unit_test(threads_do_not_matter),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -18,8 +18,7 @@
 #include "dataset/dataset.h"
 #include "dataset/rewrite.h"
 #include "pack/scalars.h"
-
-static char folder[] = "/tmp/splatd-scalars-XXXXXX";
+#include "support/folder.h"
 
 enum { most = 1000 };
 
@@ -167,15 +166,6 @@ static void points_without_any(void **state)
     free(s.values);
 }
 
-static char *path_of(const char *name)
-{
-    static char paths[8][512];
-    static int next;
-    char *path = paths[next++ % 8];
-    snprintf(path, 512, "%s/%s", folder, name);
-    return path;
-}
-
 enum { side = 200, points = side * side };
 
 static double time_of(unsigned i)
@@ -186,7 +176,7 @@ static double time_of(unsigned i)
 /* A plane of points; the number of each is its red and green. */
 static const char *write_csv(const char *name, double z, bool attributes)
 {
-    char *path = path_of(name);
+    const char *path = in_folder(name);
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     fprintf(f, "x,y,z,red,green,blue%s\n", attributes ? ",intensity,return_number,number_of_returns,Time,flat" : "");
@@ -231,7 +221,7 @@ static struct spl_dataset *open_packed(const char *const *inputs, size_t count, 
 {
     struct spl_dataset *dataset = NULL;
     struct spl_error err = {0};
-    const char *output = path_of("out.spld");
+    const char *output = in_folder("out.spld");
     if (pack(inputs, count, keep, output, &err) || spl_dataset_open_whole(output, true, &dataset, &err))
         fail_msg("%s", err.message);
     return dataset;
@@ -293,9 +283,9 @@ static void a_dataset_has_what_scans_brought(void **state)
     check_packed(dataset);
     /* photographs change the colours alone */
     struct spl_rewrite rewrite = {.from = dataset};
-    assert_int_equal(spl_dataset_rewrite(&rewrite, path_of("again.spld"), &err), 0);
+    assert_int_equal(spl_dataset_rewrite(&rewrite, in_folder("again.spld"), &err), 0);
     spl_dataset_close(dataset);
-    assert_int_equal(spl_dataset_open_whole(path_of("again.spld"), true, &dataset, &err), 0);
+    assert_int_equal(spl_dataset_open_whole(in_folder("again.spld"), true, &dataset, &err), 0);
     check_packed(dataset);
     spl_dataset_close(dataset);
 
@@ -303,14 +293,14 @@ static void a_dataset_has_what_scans_brought(void **state)
     assert_int_equal(spl_dataset_get_info(dataset)->stream_count, 2);
     assert_true(value(dataset, "number_of_returns", 77) == 3);
     spl_dataset_close(dataset);
-    assert_int_equal(pack(&scan, 1, "tiem", path_of("no.spld"), &err), SPL_E_USAGE);
+    assert_int_equal(pack(&scan, 1, "tiem", in_folder("no.spld"), &err), SPL_E_USAGE);
     assert_string_equal(err.field, "keep");
     assert_non_null(strstr(err.message, "\"tiem\" in scan.csv, which has: x, y, z, red, green, blue, intensity"));
-    assert_int_equal(access(path_of("no.spld"), F_OK), -1);
+    assert_int_equal(access(in_folder("no.spld"), F_OK), -1);
     const char *const bad[] = {"linear", "total", "uncertainty", "\xff", "x"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         err = (struct spl_error){0};
-        assert_int_equal(pack(&scan, 1, bad[i], path_of("no.spld"), &err), SPL_E_USAGE);
+        assert_int_equal(pack(&scan, 1, bad[i], in_folder("no.spld"), &err), SPL_E_USAGE);
         assert_string_equal(err.field, "keep");
     }
 }
@@ -387,20 +377,6 @@ static void panels_have_what_their_points_have(void **state)
     spl_dataset_close(dataset);
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    char command[600];
-    (void)state;
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    return system(command);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -412,5 +388,5 @@ int main(void)
         cmocka_unit_test(several_scans_are_numbered),
         cmocka_unit_test(panels_have_what_their_points_have),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -14,14 +14,14 @@ static void add(struct spl_draw_list *list, uint32_t page, uint32_t splats, uint
     const struct spl_draw_chunk chunk = {
         .count = splats, .texture = texture, .color_bits = clipped ? 1u << SPL_COLOR_CLIP : 0};
     assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, SPL_CHUNK_DISCS, 0}, &chunk,
-                                       &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+                                       &(struct spl_chunk_bounds){0}, 1, NULL), SPL_OK);
 }
 
 static void add_kind(struct spl_draw_list *list, uint32_t page, uint32_t kind, uint32_t count)
 {
     const struct spl_draw_chunk chunk = {.count = count};
     assert_int_equal(spl_draw_list_add(list, &(struct spl_draw_origin){page, kind, 0}, &chunk,
-                                       &(struct spl_chunk_bounds){0}, NULL),
+                                       &(struct spl_chunk_bounds){0}, 1, NULL),
                      SPL_OK);
 }
 
@@ -81,7 +81,7 @@ static void stations_are_told_apart(void **state)
     spl_draw_list_clear(&list);
     for (uint16_t i = 0; i < chunks; i++)
         assert_int_equal(spl_draw_list_add(&list, &(struct spl_draw_origin){7, SPL_CHUNK_DISCS, i % (stations + 1)},
-                                           &chunk, &(struct spl_chunk_bounds){0}, NULL), SPL_OK);
+                                           &chunk, &(struct spl_chunk_bounds){0}, 1, NULL), SPL_OK);
     assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
     size_t entries = list.entry_count;
     assert_int_equal(entries, 2 * chunks);
@@ -216,6 +216,44 @@ static void panels_count_as_much_work(void **state)
     spl_draw_list_finish(&list);
 }
 
+/* A batch is no more work than it may be, or one chunk, and is full before the next of its key begins; chunks keep
+ * their order from one to the next, also beside chunks of other keys and once there are many. */
+static void much_work_is_many_batches(void **state)
+{
+    enum { chunks = 3000, pages = 3 };
+    struct spl_draw_list list = {0};
+    (void)state;
+    spl_draw_list_clear(&list);
+    for (uint32_t i = 0; i < chunks; i++) {
+        const struct spl_draw_chunk chunk = {.count = 32};
+        const uint64_t looks = i % 100 == 50 ? UINT64_MAX : i % pages == 0 ? 1 : SPL_BATCH_WORK / 32 / 10;
+        assert_int_equal(spl_draw_list_add(&list, &(struct spl_draw_origin){i % pages, SPL_CHUNK_DISCS}, &chunk,
+                                           &(struct spl_chunk_bounds){0}, looks, NULL), SPL_OK);
+    }
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    uint32_t entries = 0, last[2][pages] = {0}, alone = 0, of_little = 0;
+    uint64_t before[2][pages] = {0};
+    for (size_t b = 0; b < list.batch_count; b++) {
+        const struct spl_draw_batch *batch = &list.batches[b];
+        const uint32_t page = batch->key.page, back = batch->key.back;
+        assert_int_equal(batch->first_entry, entries);
+        assert_true(batch->work <= SPL_BATCH_WORK || batch->entries == 1);
+        for (uint32_t e = 0; e < batch->entries; e++) {
+            uint32_t chunk = list.entries[entries++] >> SPL_RUN_BITS;
+            assert_true(chunk % pages == page && (!last[back][page] || chunk > last[back][page]));
+            last[back][page] = chunk;
+        }
+        alone += batch->work > SPL_BATCH_WORK;
+        of_little += page == 0;
+        assert_true(!before[back][page] || before[back][page] + batch->work > SPL_BATCH_WORK);
+        before[back][page] = batch->work;
+    }
+    assert_int_equal(entries, chunks);
+    assert_int_equal(alone, chunks / 100);
+    assert_true(of_little > 2 && of_little < 2 + 3 * chunks / 100);
+    spl_draw_list_finish(&list);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -226,6 +264,7 @@ int main(void)
         cmocka_unit_test(runs_hold_every_splat),
         cmocka_unit_test(the_nearer_half_goes_first),
         cmocka_unit_test(panels_count_as_much_work),
+        cmocka_unit_test(much_work_is_many_batches),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

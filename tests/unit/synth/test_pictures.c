@@ -17,6 +17,7 @@
 
 #include "base/memory.h"
 #include "image/load.h"
+#include "support/folder.h"
 #include "support/sanitised.h"
 #include "synth/exact.h"
 #include "synth/photos.h"
@@ -26,16 +27,6 @@
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))
 
-static char folder[] = "/tmp/splatd-pictures-XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][256];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
 
 static struct spl_pictures_options options_for(const char *directory)
 {
@@ -340,20 +331,6 @@ static void failures_leave_whole_files_only(void **state)
     assert_non_null(strstr(err.message, "0001.png"));
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    return system(command);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -365,5 +342,5 @@ int main(void)
         cmocka_unit_test(what_is_wrong_is_named_and_nothing_is_written),
         cmocka_unit_test(failures_leave_whole_files_only),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -17,22 +17,13 @@
 
 #include "base/memory.h"
 #include "cloud/cloud.h"
+#include "support/folder.h"
 #include "support/sanitised.h"
 #include "synth/light.h"
 #include "synth/scene.h"
 #include "synth/synth.h"
 #include "synth/vector.h"
 
-static char folder[] = "/tmp/splatd-synth-XXXXXX";
-
-static const char *in_folder(const char *name)
-{
-    static char path[2][128];
-    static int turn;
-    turn ^= 1;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
 
 static char *read_all(const char *path, size_t *bytes)
 {
@@ -158,9 +149,9 @@ static void faulty_scans_do_not_depend_on_threads(void **state)
             scan(o);
         }
         for (int f = 0; f < 2; f++) {
-            char paths[3][160];
+            char paths[3][300];
             for (int i = 0; i < 3; i++)
-                snprintf(paths[i], sizeof paths[i], "%s/%s/%s.%s", folder, names[i], scenes[s], f ? "ply" : "las");
+                snprintf(paths[i], sizeof paths[i], "%s/%s/%s.%s", test_folder, names[i], scenes[s], f ? "ply" : "las");
             assert_true(same_files(paths[0], paths[1]));
             assert_false(same_files(paths[0], paths[2]));
         }
@@ -577,20 +568,6 @@ static void the_command_line_names_what_is_wrong(void **state)
     assert_string_equal(output, expected);
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[64];
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    return system(command);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -611,5 +588,5 @@ int main(void)
 #ifdef __SANITIZE_THREAD__ /* which looks for what threads share, ten times as long */
     cmocka_set_test_filter("*threads*");
 #endif
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -1,6 +1,6 @@
-/* Meshes, panels with relief, against the plain C reference: every level of lattice, from far away, near by, within; as
- * the discs and points that their cells stand for; flat ones, which are panels; forged ones. One body for every
- * backend. */
+/* Panels, and meshes, which are panels with relief, against the plain C reference: every kind of mask and colours, every
+ * level of lattice, from far away, near by, within; as the discs and points that their cells stand for; forged ones; in
+ * tiles. One body for both kinds and every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,12 +19,20 @@
 
 enum { side = SPL_PANEL_SIDE };
 
-static void meshes_match_from_every_side(void **state)
+/* What the tests are given as their state. */
+enum { PANELS, MESHES };
+struct kind {
+    double relief[2]; /* cells that heights reach to, of some datasets and of others */
+};
+
+static struct kind kinds[] = {[PANELS] = {{0, 0}}, [MESHES] = {{4, 12}}};
+
+static void match_from_every_side(void **state)
 {
-    (void)state;
+    const struct kind *kind = *state;
     for (uint64_t seed = 1; seed <= TEST_SIZE(2, 1); seed++) {
         random_state = seed;
-        struct spl_dataset *dataset = random_panels(4, seed % 3 ? 300 : 0, origin, 0.01, seed % 2 ? 3 : 12);
+        struct spl_dataset *dataset = random_panels(4, seed % 2 ? 300 : 0, origin, 0.01, kind->relief[seed % 2 == 0]);
         struct spl_view view = looking(origin, 3, 160, 120);
         same_of_all(dataset, &view, "aside");
         view.supersample = 2;
@@ -36,13 +44,14 @@ static void meshes_match_from_every_side(void **state)
     }
 }
 
-/* Cells as large as half the image, the eye among them: windows, and meshes that reach the near plane. */
-static void meshes_around_the_eye_match(void **state)
+/* Cells as large as half the image, the eye among them: windows, and panels that reach the near plane. Not of fill,
+ * whose filter has tests of its own. */
+static void around_the_eye_they_match(void **state)
 {
-    (void)state;
+    const struct kind *kind = *state;
     for (uint64_t seed = 1; seed <= TEST_SIZE(2, 1); seed++) {
         random_state = 100 + seed;
-        struct spl_dataset *dataset = random_panels(4, 100, origin, 0.05, 4);
+        struct spl_dataset *dataset = random_panels(4, 100, origin, 0.05, kind->relief[0]);
         struct spl_view view = looking(origin, 0.1 + uniform(), 400, 240);
         view.camera.cx += 31.7;
         view.camera.fy *= 1.2;
@@ -68,7 +77,7 @@ static double height_of(const struct spl_relief *relief, int x, int y, double ri
     return (1 - least - more) * h00 + more * h + least * h11;
 }
 
-/* The discs that the cells of the dataset's meshes stand for; the caller's. */
+/* The discs that the cells of the dataset's panels stand for; the caller's. */
 static struct make_splat *make_discs(const struct spl_dataset *dataset, size_t *count)
 {
     uint64_t chunk_count, node_count;
@@ -113,9 +122,9 @@ static struct make_splat *make_discs(const struct spl_dataset *dataset, size_t *
 /* What `primitives=off` draws is what a dataset of discs in the cells' places does, to what their coding rounds. */
 static void cells_are_discs_on_the_surface(void **state)
 {
-    (void)state;
+    const struct kind *kind = *state;
     size_t count;
-    struct spl_dataset *dataset = random_panels(4, 0, origin, 0.02, 5);
+    struct spl_dataset *dataset = random_panels(3, 0, origin, 0.02, kind->relief[0]);
     struct make_splat *discs = make_discs(dataset, &count);
     struct spl_dataset *other = make_dataset(discs, count);
     free(discs);
@@ -217,10 +226,10 @@ static void flat_meshes_are_panels(void **state)
     done(plain);
 }
 
-/* Words at random in place of meshes' own: what is read is held within the chunk, and drawn as C reads it. */
+/* Words at random in place of panels' own: what is read is held within the chunk, and drawn as C reads it. */
 static void forged_words_match(void **state)
 {
-    (void)state;
+    const struct kind *kind = *state;
     char folder[256], path[300];
     struct spl_panel panels[SPL_PANELS_MAX] = {0};
     struct spl_relief reliefs[SPL_PANELS_MAX];
@@ -233,7 +242,7 @@ static void forged_words_match(void **state)
         }
         struct make_panels made[2] = {{.plane = {.cell = 0.01f, .normal = {0.6f, -0.8f, 0}, .points = 1},
                                        .panels = panels,
-                                       .reliefs = reliefs,
+                                       .reliefs = kind->relief[0] > 0 ? reliefs : NULL,
                                        .count = SPL_PANELS_MAX,
                                        .color_error = 2}};
         made[1] = made[0];
@@ -260,6 +269,8 @@ static void forged_words_match(void **state)
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
         struct spl_view view = looking(origin, 1.5, 160, 120);
         same_of_all(dataset, &view, "forged");
+        look(&view, (double[]){0.3, 0.3, 0.1}, (double[]){0, 0.1, 0});
+        same_of(dataset, &view, SPL_METHOD_SPLAT, "forged, near by");
         done(dataset);
     }
     unlink(path);
@@ -269,13 +280,14 @@ static void forged_words_match(void **state)
 /* A pixel is the same in whatever tile it lies, to the bit; of splat only what has no sums (test_tiles.c). */
 static void tiles_leave_no_seams(void **state)
 {
-    (void)state;
+    const struct kind *kind = *state;
     struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
     for (uint64_t seed = 1; seed <= TEST_SIZE(3, 1); seed++) {
         random_state = seed;
-        struct spl_dataset *dataset = random_panels(seed % 2 ? 30 : 4, 500, origin, seed % 2 ? 0.004 : 0.03, 6);
+        struct spl_dataset *dataset = random_panels(seed % 2 ? 30 : 4, 500, origin, seed % 2 ? 0.004 : 0.03,
+                                                    kind->relief[0]);
         assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
         for (int setting = 0; setting < 2 * SPL_METHOD_COUNT; setting++) {
             struct spl_view view = looking(origin, seed % 3 ? 3 : 0.7, 203, 151);
@@ -303,12 +315,18 @@ static void tiles_leave_no_seams(void **state)
     spl_renderer_destroy(small);
 }
 
+#define OF_KIND(test, kind) {#test ", " #kind, test, frames_seed, NULL, &kinds[kind]}
+#define OF_BOTH(test) OF_KIND(test, PANELS), OF_KIND(test, MESHES)
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        frames_test(meshes_match_from_every_side), frames_test(meshes_around_the_eye_match),
-        frames_test(cells_are_discs_on_the_surface), frames_test(flat_meshes_are_panels),
-        frames_test(forged_words_match),           frames_test(tiles_leave_no_seams),
+        OF_BOTH(match_from_every_side),
+        OF_BOTH(around_the_eye_they_match),
+        OF_BOTH(cells_are_discs_on_the_surface),
+        OF_BOTH(forged_words_match),
+        OF_BOTH(tiles_leave_no_seams),
+        frames_test(flat_meshes_are_panels),
     };
-    return frames_run(argc, argv, "meshes", tests, sizeof tests / sizeof *tests);
+    return frames_run(argc, argv, "panel-kinds", tests, sizeof tests / sizeof *tests);
 }

@@ -1,0 +1,274 @@
+/* Scans into a dataset: the stages in a row.
+ *
+ * Memory, bytes a point: 30 while reading (42 with given normals), 54 (66) while sorting, 59 while neighbours are
+ * found, 63 while clip lines are, and the inner levels' 12 on top of 54 while encoding. Where planes are looked for, 93
+ * meanwhile and 4 more from then on; outlining them for an export takes 4, and each thread 60 MB and 20 a point of a
+ * plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes
+ * 60 more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until
+ * the end. Stations have seen points, not panels: where there are both, the scan is written once more without panels.
+ * The output's temporary file is made first, so that an unwritable place is known before hours of work, and is gone
+ * unless the last rename succeeded. Runs on the caller's thread; parallel loops end before it goes on. */
+#include "pack/build.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "pack/bound.h"
+#include "pack/build_parts.h"
+#include "pack/check.h"
+#include "pack/export/export.h"
+#include "pack/eyes.h"
+#include "pack/linear.h"
+#include "pack/median.h"
+#include "pack/texture/pass.h"
+#include "pack/up.h"
+
+static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
+{
+    size_t sample = points->count < 65536 ? points->count : 65536;
+    float *radii = spl_alloc_raw(sample, sizeof *radii, err);
+    if (!radii)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < sample; i++)
+        radii[i] = points->radius[i * points->count / sample];
+    *median = spl_median(radii, sample);
+    free(radii);
+    return 0;
+}
+
+static int write_dataset(struct spl_build *p, struct spl_error *err)
+{
+    struct spl_default_view view;
+    double radius;
+    int rc = spl_default_view_find(&p->points, &view, err);
+    if (!rc)
+        rc = median_radius(&p->points, &radius, err);
+    if (!rc)
+        rc = spl_emit(&p->tree, &p->points, &p->wires, &p->chunk, p->writer, p->stage, &p->emitted, err);
+    if (rc)
+        return rc;
+    if ((rc = spl_stage_check(p->stage, err)))
+        return rc;
+    json_t *meta = spl_build_describe(p, radius, &view);
+    if (!meta)
+        return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
+    spl_stage_begin(p->stage, "writing", NULL, 0);
+    rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
+                                   p->emitted.chunk_count, meta, err);
+    json_decref(meta);
+    spl_stage_end(p->stage);
+    return rc;
+}
+
+/* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
+static void plan(const struct spl_build *p, const struct spl_passes *later)
+{
+    static const struct {
+        const char *name;
+        double seconds;
+        bool of_surface;
+    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"planes", 0.5, true},
+                 {"joining wires", 0.05, false}, {"outlines", 0.2, true},    {"panels", 0.3, true},
+                 {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
+    uint64_t points = 0;
+    bool twice =
+        later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF; /* the end, without panels */
+    for (size_t i = 0; i < p->scans.count; i++)
+        points += p->scans.list[i].points_expected;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        if ((!parts[i].of_surface || !p->options->points_only) &&
+            ((strcmp(parts[i].name, "planes") && strcmp(parts[i].name, "panels")) ||
+             p->options->primitives != SPL_PRIMITIVES_OFF) &&
+            (strcmp(parts[i].name, "outlines") || p->options->export_primitives))
+            spl_stage_plan(p->stage, parts[i].name,
+                           (parts[i].seconds + (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
+                               (double)points,
+                           i ? 0 : points);
+    if (later && later->photographs.count)
+        spl_photos_plan(p->options->photos, p->stage, (uint32_t)later->photographs.count,
+                        (uint64_t)(1.33 * (double)points), 0);
+    if (later && p->options->maps) /* scans say with their points how many stations they have */
+        spl_maps_plan(p->stage, &later->pictures, 1, points);
+}
+
+static int find_planes(struct spl_build *p, struct spl_error *err)
+{
+    double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
+    const struct spl_planes_options planes = {.error = p->options->error / unit, .relief = true};
+    const struct spl_bound bound = {.error = planes.error, .unit_m = unit};
+    char doubt[SPL_BOUND_TEXT_MAX];
+    if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
+        return 0;
+    int rc = spl_bound_check(&bound, &p->points, err);
+    if (!rc)
+        rc = spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
+    if (!rc && p->options->warn && spl_bound_find_doubt(&bound, &p->planes, doubt))
+        p->options->warn(p->options->progress_context, doubt);
+    return rc;
+}
+
+/* The tree with its levels; panels first, which inner nodes are made of too. */
+static int build_tree(struct spl_build *p, struct spl_error *err)
+{
+    int rc = spl_tree_build(&p->tree, &p->points, err);
+    if (!rc && p->planes.count) {
+        p->tree.panels = &p->panels;
+        rc = spl_panel_maker_init(&p->panels, &p->points, &p->planes, p->stage->threads, err);
+        if (!rc)
+            rc = spl_panels_make_leaves(&p->panels, &p->tree, p->stage, err);
+    }
+    if (!rc)
+        rc = spl_levels_build(&p->tree, &p->points, p->stage, err);
+    spl_panel_maker_finish(&p->panels);
+    p->tree.panels = NULL;
+    return rc;
+}
+
+/* The dataset as it is without panels: what stations saw, for maps. After the other, of which nothing is left in *p. */
+static int write_points(const struct spl_build *p, const char *output, struct spl_error *err)
+{
+    struct spl_build discs = *p;
+    discs.points.plane = NULL;
+    discs.planes = (struct spl_planes){0};
+    discs.tree = (struct spl_tree){0};
+    discs.writer = NULL;
+    int rc = spl_dataset_writer_create(output, &discs.writer, err);
+    if (!rc)
+        rc = build_tree(&discs, err);
+    if (!rc)
+        rc = write_dataset(&discs, err);
+    spl_dataset_writer_destroy(discs.writer);
+    spl_emitted_finish(&discs.emitted);
+    spl_tree_finish(&discs.tree);
+    return rc;
+}
+
+static int join_wires(struct spl_build *p, struct spl_error *err)
+{
+    double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
+    const struct spl_wires_options options = {.noise = p->planes.noise, .error = p->options->error / unit};
+    bool lines = p->options->primitives != SPL_PRIMITIVES_OFF && !p->options->points_only;
+    int rc = spl_wires_find(&p->wires, &p->points, lines ? &options : NULL, p->stage, err);
+    if (!rc && p->wires.cut_short && p->options->warn)
+        p->options->warn(p->options->progress_context,
+                         "points on wires, poles and cables take more steps to join than those of a scan; the rest of "
+                         "them stays open: pack with --no-linear if there are none");
+    return rc;
+}
+
+static int export_primitives(struct spl_build *p, struct spl_build_outputs *out, struct spl_error *err)
+{
+    if (!p->options->export_primitives)
+        return 0;
+    return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
+                                 p->stage, &out->drawing, &out->drawing_length, &out->drawn, err);
+}
+
+/* What is up: as the user says; else, in a world that only photographs hold together, as they do; else z. */
+static void settle_up(struct spl_build *p, const struct spl_view_list *photographs)
+{
+    const double *said = p->options->up;
+    double *up = p->points.up, most = fmax(fmax(fabs(said[0]), fabs(said[1])), fabs(said[2])), length = 0;
+    if (most > 0) {
+        for (int c = 0; c < 3; c++)
+            length += said[c] / most * (said[c] / most);
+        for (int c = 0; c < 3; c++)
+            up[c] = said[c] / most / sqrt(length);
+        p->up_from = "given";
+    } else if (photographs && !p->system.crs && spl_up_from_cameras(photographs, up))
+        p->up_from = "cameras";
+}
+
+/* A scan that turns out to be broken has no say in what the others' coordinates are. */
+static int gather(struct spl_build *p, struct spl_system_options *said, struct spl_error *err)
+{
+    size_t count = p->scans.count;
+    int rc = spl_points_gather(&p->points, &p->scans, p->stage, err);
+    if (rc || p->scans.count == count)
+        return rc;
+    spl_system_finish(&p->system);
+    said->warn = NULL;
+    return spl_system_find(&p->system, &p->scans, said, err);
+}
+
+int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs, const struct spl_passes *later,
+              struct spl_build_outputs *out, struct spl_stage *stage, struct spl_pack_report *report,
+              struct spl_error *err)
+{
+    struct spl_build p = {.options = options, .stage = stage};
+    struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
+    uint64_t begin_ns = spl_now_ns();
+    int rc = spl_pack_check(options, &p.neighbours, &p.chunk, err);
+    if (!rc && options->export_primitives)
+        rc = spl_export_check(options->export_primitives, (const char *const *)inputs->paths, inputs->count, err);
+    if (!rc)
+        rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc)
+        rc = spl_dataset_writer_create(out->dataset, &p.writer, err);
+    if (!rc)
+        rc = spl_scans_init(&p.scans, inputs,
+                            &(struct spl_cloud_options){.columns = options->columns,
+                                                        .intensity = options->intensity,
+                                                        .keep = &p.keep,
+                                                        .max_points = options->max_points},
+                            stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p.scans, err);
+    if (!rc)
+        rc = spl_system_find(&p.system, &p.scans, &said, err);
+    if (!rc) {
+        plan(&p, later);
+        rc = gather(&p, &said, err);
+    }
+    if (!rc && later && options->maps)
+        spl_maps_plan(stage, &later->pictures, p.points.station_count, p.points.count);
+    if (!rc)
+        settle_up(&p, later && options->photos ? &later->photographs : NULL);
+    if (!rc && later)
+        rc = spl_eyes_take(&p.points, later->photographs.count ? &later->photographs : &later->pictures, err);
+    if (!rc)
+        rc = spl_stage_check(stage, err);
+    if (!rc && options->warn)
+        spl_scans_compare(&p.scans, options->warn, options->progress_context);
+    if (!rc)
+        rc = spl_points_order(&p.points, stage, err);
+    if (!rc)
+        rc = spl_stage_check(stage, err);
+    if (!rc && !options->no_linear)
+        rc = spl_linear_find(&p.points, stage, err);
+    if (!rc)
+        rc = options->points_only ? spl_bare_points(&p.points, stage, err)
+                                  : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
+    if (!rc)
+        rc = find_planes(&p, err);
+    if (!rc)
+        rc = join_wires(&p, err);
+    if (!rc)
+        rc = export_primitives(&p, out, err);
+    p.tree.for_pruning = options->prune > 1;
+    if (!rc)
+        rc = build_tree(&p, err);
+    if (!rc)
+        rc = write_dataset(&p, err);
+    if (!rc && report) {
+        spl_build_report(&p, report);
+        report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
+    }
+    spl_dataset_writer_destroy(p.writer);
+    spl_emitted_finish(&p.emitted);
+    spl_tree_finish(&p.tree);
+    if (!rc && out->points && p.planes.count) {
+        rc = write_points(&p, out->points, err);
+        out->has_points = !rc;
+    }
+    spl_wires_finish(&p.wires);
+    spl_planes_finish(&p.planes);
+    spl_points_finish(&p.points);
+    spl_system_finish(&p.system);
+    spl_scans_finish(&p.scans);
+    return rc;
+}

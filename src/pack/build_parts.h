@@ -1,0 +1,38 @@
+/* A build as its files share it. */
+#ifndef SPL_PACK_BUILD_PARTS_H
+#define SPL_PACK_BUILD_PARTS_H
+
+#include <jansson.h>
+
+#include "pack/build.h"
+#include "pack/emit.h"
+#include "pack/kept.h"
+#include "pack/planes/planes.h"
+#include "pack/scans.h"
+#include "pack/system.h"
+#include "pack/view.h"
+
+struct spl_build {
+    const struct spl_pack_options *options;
+    struct spl_chunk_options chunk;
+    unsigned neighbours;
+    struct spl_stage *stage;
+    struct spl_keep keep;
+    struct spl_scans scans;
+    struct spl_system system;
+    const char *up_from; /* static; NULL: z is up, because nobody says otherwise */
+    struct spl_points points;
+    struct spl_planes planes; /* none unless options->primitives */
+    struct spl_wires wires;
+    struct spl_panel_maker panels;
+    struct spl_tree tree;
+    struct spl_emitted emitted;
+    struct spl_dataset_writer *writer;
+};
+
+/* META of the dataset, once it is encoded; NULL: no memory (describe.c). */
+json_t *spl_build_describe(const struct spl_build *build, double radius, const struct spl_default_view *view);
+/* All of *report but what later passes add, and the seconds (describe.c). */
+void spl_build_report(const struct spl_build *build, struct spl_pack_report *report);
+
+#endif
