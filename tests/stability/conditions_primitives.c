@@ -39,8 +39,8 @@ static const struct {
        bound. */
     {"primitives: class borders", .flat = FLAT_BORDERS, .found = {0.6, 0.85, 100},
      .sights = {{"a hedge at a wall, wires", NULL, {0, -2.6, 1.4}, {0, 0, 1}, .worse = {1.3, 0.001, 0.001, 0.02}}}},
-    /* Rings whose points lie 60 times as close as the rings do are wires: a flaw, and what is lost is lost to it. */
-    {"primitives: far scan lines", .flat = FLAT_LINES, .found = {0.75, 1, 9000},
+    /* Of rings whose points lie 60 to 150 times as close as the rings do the outermost are wires: none is beyond. */
+    {"primitives: far scan lines", .flat = FLAT_LINES, .found = {0.75, 1, 1200},
      .sights = {{"rings 10 to 25 m away", NULL, {0, -3, 1.7}, {0, 15, 0}, .worse = {0.7, 0.008, 0.001, 0.31}},
                 {"from above", NULL, {0, 8, 6}, {0, 16, 0}, .worse = {0.4, 0.04, 0.001, 0.7}}}},
     /* Treads change colour from one to the next, and colours of panels are kept within 3 levels, not within none. */
