@@ -41,6 +41,8 @@
 #include "pack/view.h"
 #include "pack/wires/wires.h"
 
+static const double prune_near = 1.1; /* times the factor, or as much less: not worth a word */
+
 struct pack {
     const struct spl_pack_options *options;
     struct spl_chunk_options chunk;
@@ -369,7 +371,8 @@ static int pack_scan(const struct spl_pack_options *options, struct spl_inputs *
         rc = join_wires(&p, err);
     if (!rc)
         rc = export_primitives(&p, drawing, err);
-    p.tree.for_pruning = options->prune > 1;
+    if (options->prune > 1)
+        p.tree.pruned_to = p.points.count / options->prune + 1;
     if (!rc)
         rc = build_tree(&p, err);
     if (!rc)
@@ -411,6 +414,19 @@ static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_
         report->streams[s].bits = info->streams[s].bits;
 }
 
+/* Whole nodes are kept or dropped, so that not every number can be reached. */
+static void tell_what_is_left(const struct spl_pack_options *options, const struct spl_pack_report *report)
+{
+    char text[160];
+    double all = (double)(report->pruned_of ? report->pruned_of : report->leaf_splats);
+    double reached = all / (double)report->leaf_splats, off = reached / options->prune;
+    if (options->prune <= 1 || !options->warn || (off > 1 / prune_near && off < prune_near))
+        return;
+    snprintf(text, sizeof text, "--prune %u leaves one splat of %.1f: no nodes of the octree come closer", options->prune,
+             reached);
+    options->warn(options->progress_context, text);
+}
+
 static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct drawing *drawing,
                        struct spl_pack_report *report, struct spl_error *err)
 {
@@ -436,6 +452,7 @@ static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct d
         fill_rewritten(spl_dataset_get_info(dataset), report);
         report->photos = p->photos;
         report->maps = p->maps;
+        tell_what_is_left(options, report);
         report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     }
     spl_dataset_close(dataset);
