@@ -11,7 +11,7 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 
-/* src/render/select.c draws clusters of inner nodes this much smaller. */
+/* src/render/select_draw.c draws clusters of inner nodes this much smaller. */
 static const double cluster_radius_share = 0.9;
 
 struct spl_tolerance {

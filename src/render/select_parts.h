@@ -1,0 +1,86 @@
+/* The walk of a selection, as its files share it: select.c goes through the tree, select_draw.c lists what a node draws
+ * by the kind of its chunks, select_list.c says where a chunk falls and how it is listed. */
+#ifndef SPL_RENDER_SELECT_PARTS_H
+#define SPL_RENDER_SELECT_PARTS_H
+
+#include "render/children.h"
+#include "render/frustum.h"
+#include "render/map_cells.h"
+#include "render/occupancy.h"
+#include "render/select.h"
+
+struct spl_walk {
+    const struct spl_select_params *params;
+    struct spl_draw_list *list;
+    const struct spl_tables *tables;     /* of the node being drawn */
+    double focal;                        /* larger of fx, fy */
+    struct spl_occupancy splats, panels; /* the latter once there are any */
+    struct spl_map_cells cells;
+    bool lined;      /* the node being drawn has lines that stand for its linear splats */
+    double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
+};
+
+/* Spacings from 2^(i / 4) samples on. */
+enum { SPACING_CLASSES = 64 };
+
+/* What of a splat, panel, mesh or piece of a line is drawn as one: how many of them, each within a ball of `radius`;
+ * `looks`: instead of it, samples that are looked at for each at most, 0 = as of the ball. */
+struct spl_walk_pieces {
+    uint64_t count;
+    double radius;
+    uint64_t looks;
+};
+
+/* What a chunk's box says: where it lies on the image, its depth where it is bounded; its chunk's splats or panels are
+ * counted for all samples that it may reach. */
+struct spl_walk_reach {
+    double low[2], high[2], near; /* near 0: it is not bounded */
+};
+
+static inline struct spl_view_box spl_view_box_grown(struct spl_view_box box, double by)
+{
+    for (int i = 0; i < 3; i++)
+        box.half[i] += by;
+    return box;
+}
+
+/* What pruning adds to most radii of a node, and more. */
+static inline double spl_walk_typical(const struct spl_node *node)
+{
+    return 2 * node->spacing;
+}
+
+/* Boxes of nodes, in view space (select.c): what the node and its descendants draw but for discs much larger than most,
+ * and all that is looked for of a node that is drawn. */
+struct spl_view_box spl_walk_node_box(const struct spl_walk *w, const struct spl_node *node);
+struct spl_view_box spl_walk_drawn_box(const struct spl_walk *w, const struct spl_found_node *found);
+
+/* Lists what the node draws (select_draw.c). */
+int spl_walk_draw(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err);
+
+/* Of discs, or of those that the cells of panels and meshes stand for. */
+double spl_walk_largest_radius(const struct spl_chunk *chunk);
+
+/* How a chunk is listed (select_list.c). What any kind of chunk is drawn by, radii as they are: */
+struct spl_draw_chunk spl_walk_begin(const struct spl_walk *w, const struct spl_chunk *chunk, const double origin[3]);
+/* Where its box lies; its splats or panels are counted for all samples that they may reach. */
+struct spl_walk_reach spl_walk_project(const struct spl_walk *w, struct spl_occupancy *counted,
+                                       const struct spl_view_box *box, uint32_t count);
+/* Marks the cells that the stations of a chunk, whose box is `box`, give colours to; returns the station that trims it,
+ * plus 1, or 0; below 0 an error. Where the node, of box `whole`, is not looked at, nothing marks cells: in that tile
+ * alone. */
+int spl_walk_add_map_cells(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box,
+                           const struct spl_view_box *whole, struct spl_error *err);
+/* Samples that are looked at for a splat, panel, mesh or piece of a line on samples [low, high] at most. */
+uint64_t spl_walk_count_looks(const struct spl_walk *w, const struct spl_walk_pieces *pieces, const double low[2],
+                              const double high[2], double near);
+/* Lists the chunk, by windows where what is `radius` around its middle may be wider than `side` samples; or by windows,
+ * once for each of the tile that samples [low, high] reach into. */
+int spl_walk_list(struct spl_walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,
+                  const struct spl_walk_pieces *pieces, const struct spl_walk_reach *reach, double radius, double side,
+                  struct spl_error *err);
+int spl_walk_list_windows(struct spl_walk *w, const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk,
+                          const struct spl_walk_pieces *pieces, const double low[2], const double high[2], double near,
+                          struct spl_error *err);
+
+#endif
