@@ -12,6 +12,7 @@
 
 #include "geom/polar.h"
 #include "gpu/frames.h"
+#include "render/fault.h"
 #include "shared.h"
 #include "support/mapped_dataset.h"
 #include "support/sanitised.h"
@@ -90,6 +91,7 @@ static void maps_match_the_reference(void **state)
         struct spl_dataset *dataset =
             random_mapped(rows[i].splats, rows[i].radius, rows[i].levels, rows[i].stations, rows[i].trims,
                           rows[i].trims ? 0 : rows[i].distance);
+        spl_renderer_set_work_at_once(renderer, i % 2 ? UINT64_MAX : 1); // in parts, or not
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             struct spl_view view = looking(origin, rows[i].distance, 160, 120);
             char what[64];
