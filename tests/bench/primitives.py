@@ -3,6 +3,7 @@
 
 usage: primitives.py [SCENE…] [--points N] [--noise SIGMA] [--size WxH] [--repeats N] [--lods LIST] [--keep DIR]
        primitives.py --scan FILE --views FILE [--repeats N] [--lods LIST] [--keep DIR]
+       either with --levels
 
 SCENE (courtyard, interior, steps, thin-walls) is one of `splatd synth`'s; its truth is exact. FILE is a scan of which no
 truth is known: the reference is the render of all its points as splats with 16 samples a pixel. Each is packed without
@@ -11,7 +12,8 @@ accuracy by lod (0, 1) and method. Sizes are MB and shares of those of splats al
 optional attributes, and panels stand by themselves, since their bytes are both. Depths are of pixels of layer primitive
 that are panels, along the axis against the truth's; pixels where the truth has nothing, or something else (beyond 0.5 m)
 behind an edge, are not in median and 99 %, but count as outside of the bound. --keep: where scans and datasets go, and
-are found again.
+are found again. --levels prints other tables instead, of what is packed with all: how many of each kind each level has,
+with bytes by the mean of their kind, and accuracy by lod (0, 1, 2, 4, 8, 16) of it and of splats alone, method splat.
 
 environment: SPLATD_BINARY (splatd)
 """
@@ -140,18 +142,56 @@ def measure(title, scan, views, truth, o, folder):
         accuracy_rows(name, dataset, info, views, truth, o, folder, plain)
 
 
+def level_rows(info):
+    """A line for each level: counts and MB of each kind, and both as shares of the level with most of it."""
+    kinds, levels = ("splats", "panels", "meshes", "pieces"), info["by_level"]
+    known = info["primitives"]
+    size = {kind: known[kind]["bytes"] / max(known[kind]["count"], 1) for kind in ("panels", "meshes")}
+    size["pieces"] = known["lines"]["bytes"] / max(known["lines"]["count"], 1)
+    size["splats"] = (info["file_bytes"] - sum(part["bytes"] for part in known.values())) / max(info["splats"], 1)
+    most = {kind: max(level[kind] for level in levels) for kind in kinds}
+    for i, level in enumerate(levels):
+        cells = [f"{level[k]:,}, {level[k] * size[k] / 1e6:.3f}, {100 * level[k] / max(most[k], 1):.0f} %" for k in kinds]
+        print("| " + " | ".join([str(i), str(level["nodes"]), f"{1000 * level['spacing']:.0f}", *cells]) + " |", flush=True)
+
+
+def measure_levels(title, scan, views, truth, o, folder):
+    """What each level has, and what coarser ones lose."""
+    packed = {}
+    for name, options in PACKED[:2]:
+        packed[name] = folder / f"{name}.spld"
+        if not packed[name].exists():
+            run("pack", scan, "--no-panoramas", *options, "-o", packed[name])
+    if o.scan:
+        make_reference(packed["splats"], views, truth)
+    print(f"\n{title}")
+    table(["level", "nodes", "spacing mm"] + [f"{k}, MB, of the most" for k in ("splats", "panels", "meshes", "pieces")])
+    level_rows(json.loads(run("info", packed["all"], "--json")))
+    table(["lod", "splats alone, dB", "off the finest", "all, dB", "off the finest"])
+    found = {name: {p["lod"]: p["psnr_overall"] for p in bench(dataset, views, truth, o.lods, o.repeats)["points"]}
+             for name, dataset in packed.items()}
+    for lod in sorted(found["all"]):
+        cells = [f"{lod:g}"]
+        for name in ("splats", "all"):
+            cells += [f"{found[name][lod]:.2f}", f"{found[name][lod] - found[name][min(found[name])]:+.2f}"]
+        print("| " + " | ".join(cells) + " |", flush=True)
+
+
 def main():
-    parser = argparse.ArgumentParser(usage=__doc__)
+    parser = argparse.ArgumentParser(usage=__doc__.replace("%", "%%"))
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--points", default="1000000")
     parser.add_argument("--noise")
     parser.add_argument("--size", default="640x360")
     parser.add_argument("--repeats", default=3, type=int)
-    parser.add_argument("--lods", default="0,1")
+    parser.add_argument("--lods")
+    parser.add_argument("--levels", action="store_true")
     parser.add_argument("--keep", type=pathlib.Path)
     for path in ("scan", "views"):
         parser.add_argument(f"--{path}", type=pathlib.Path)
     o = parser.parse_args()
+    o.lods = o.lods or ("0,1,2,4,8,16" if o.levels else "0,1")
+    say = measure_levels if o.levels else measure
     if bool(o.scan) != bool(o.views) or (o.scan and o.scenes):
         parser.error("--scan and --views go together, without a SCENE")
     with tempfile.TemporaryDirectory() as temporary:
@@ -160,12 +200,12 @@ def main():
             folder = root / scene
             folder.mkdir(parents=True, exist_ok=True)
             if o.scan:
-                measure(f"{o.scan.name}, against all its points as splats", o.scan, o.views, folder / "truth", o, folder)
+                say(f"{o.scan.name}, against all its points as splats", o.scan, o.views, folder / "truth", o, folder)
                 continue
             noise = ["--noise", o.noise] if o.noise else []
             scan, views, truth = make_scene(scene, folder, o.size, "--points", o.points, *noise)
-            measure(f"{scene}, {int(float(o.points)):,} points, noise {o.noise or 'of the scene'}, {o.size}, exact truth",
-                    scan, views, truth, o, folder)
+            say(f"{scene}, {int(float(o.points)):,} points, noise {o.noise or 'of the scene'}, {o.size}, exact truth",
+                scan, views, truth, o, folder)
 
 
 main()
