@@ -75,6 +75,8 @@ struct spl_dataset_info {
     uint64_t panels;                /* of all levels */
     uint64_t panel_points;          /* of the points, those that the leaves' panels stand for */
     uint64_t meshes, mesh_points;   /* the same of panels with relief, which are not counted as panels */
+    bool has_sides; /* the scan said where it was taken from: normals show there, and discs that turn their back to an
+                       eye lie behind those that face it */
 };
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are

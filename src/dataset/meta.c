@@ -129,7 +129,7 @@ static int get_attributes(struct spl_dataset *dataset, struct spl_error *err)
 }
 
 /* Optional. Scanner poses: what a panorama or an orientation refers to. */
-static int check_stations(struct spl_dataset *dataset, struct spl_error *err)
+static int get_stations(struct spl_dataset *dataset, struct spl_error *err)
 {
     const char *key = "stations";
     const json_t *stations = json_object_get(dataset->meta, key);
@@ -143,6 +143,7 @@ static int check_stations(struct spl_dataset *dataset, struct spl_error *err)
         if (!good)
             return wrong_entry(dataset, err, key, i, NULL, matrix, "a matrix of 16 numbers");
     }
+    dataset->info.has_sides = dataset->info.has_surface && json_array_size(stations) > 0;
     return SPL_OK;
 }
 
@@ -278,7 +279,7 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     if (!rc)
         rc = check_sources(dataset, err);
     if (!rc)
-        rc = check_stations(dataset, err);
+        rc = get_stations(dataset, err);
     if (!rc)
         rc = check_color(dataset, err);
     if (!rc)

@@ -249,7 +249,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = join_wires(&p, err);
     if (!rc)
         rc = export_primitives(&p, out, err);
-    p.tree.for_pruning = options->prune > 1;
+    if (options->prune > 1)
+        p.tree.pruned_to = p.points.count / options->prune + 1;
     if (!rc)
         rc = build_tree(&p, err);
     if (!rc)

@@ -26,7 +26,7 @@
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
  */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
-enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
+enum { attempts = 6, closer_steps = 24, inner_most = 12288, pruned_inner_most = 768 };
 
 /* Surfaces of a cell: their normals differ by more than so much (cosine), or their planes by such a share of the
  * cell. The fourth takes what faces its way at all. */
@@ -225,6 +225,23 @@ static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit
     return clusters - 1;
 }
 
+/* Clusters by surfaces at the cell whose number of clusters comes nearest to `aim`. */
+static size_t cluster_to(struct scratch *w, size_t count, size_t aim, double *cell)
+{
+    double fine = 0, coarse = INFINITY, best = *cell, best_off = INFINITY;
+    for (int i = 0; i < closer_steps && best_off > 0.01; i++) {
+        double clusters = (double)cluster(w, count, *cell, count, true), off = fabs(log(clusters / (double)aim));
+        if (off < best_off) {
+            best_off = off;
+            best = *cell;
+        }
+        *(clusters > (double)aim ? &fine : &coarse) = *cell;
+        *cell = isinf(coarse) ? 2 * fine : fine > 0 ? sqrt(fine * coarse) : coarse / 2;
+    }
+    *cell = best;
+    return cluster(w, count, best, count, true);
+}
+
 static void finish_cluster(const struct cluster *k, double cell, struct spl_inner_splat *out)
 {
     double mean2 = 0, length = 0, weight = k->weight;
@@ -293,7 +310,7 @@ static bool make_left(struct levels *l, struct scratch *w, const struct spl_tree
         load_point(l->points, node, left->points[i], &w->input[i]);
         spl_scalars_take_point(l->points, left->points[i], w->numbers + i * l->scalars);
     }
-    size_t clusters = cluster(w, left->count, left->cell, left->count, l->tree->for_pruning);
+    size_t clusters = cluster(w, left->count, left->cell, left->count, l->tree->pruned_to > 0);
     w->left_splats = spl_alloc_raw(clusters, sizeof *w->left_splats, NULL);
     if (!w->left_splats)
         return false;
@@ -317,7 +334,9 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
     count += w->left_count;
     if (!count)
         return true; /* of panels alone */
-    if (!reserve(w, count, count / 3 + 8, l->scalars))
+    /* Nothing is coarser than the root: where it alone is to be left, it has just as many as are wanted. */
+    bool last = node == l->tree->nodes && l->tree->pruned_to && l->tree->pruned_to < count && !l->tree->panels;
+    if (!reserve(w, count, last ? count + 2 : count / 3 + 8, l->scalars))
         return false;
     for (uint32_t c = 0; c < node->child_count; c++)
         at = take_child(l, w, node, &children[c], at);
@@ -327,11 +346,13 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
             w->numbers[at * l->scalars + k] = w->left_numbers[k];
     }
 
-    bool surfaces = l->tree->for_pruning;
+    bool surfaces = l->tree->pruned_to > 0;
     double base = fmin((double)count, (surfaces ? pruned_inner_most : inner_most) / most);
     size_t limit = base * most > 2 ? (size_t)(base * most) : 2; /* two opposed splats never become one */
     double cell = 2 * median_radius(w->input, count, radii) / 1.128379, too_fine = 0;
-    for (int attempt = 0;; attempt++) {
+    if (last)
+        clusters = cluster_to(w, count, l->tree->pruned_to, &cell);
+    for (int attempt = 0; !last; attempt++) {
         /* In a large enough cell there are two sides, but as many surfaces as there are normals. */
         clusters = cluster(w, count, cell, limit, surfaces && attempt <= attempts);
         double share = (double)clusters / base;

@@ -1,6 +1,6 @@
 /* Lines that are none: edges, and scan lines of a surface. A line with other things beside it within two cells is the
  * edge of a surface or a volume. Lines with two parallel ones on both sides in one plane are a surface's: far scan
- * lines lie up to some fifty times their points' spacing apart. Those beside such lines are its border. A pair of wires
+ * lines lie up to some 150 times their points' spacing apart. Those beside such lines are its border. A pair of wires
  * is neither. Lines are found by buckets of their cells' keys; each is judged by itself, in rounds that see the states
  * of the round before. */
 #include <math.h>
@@ -10,7 +10,7 @@
 #include "pack/linear_level.h"
 
 enum { parallel_min = 2, around_most = 3 };
-static const double apart_most = 100;   /* spacings within which a surface has two more scan lines on a side */
+static const double apart_most = 300;   /* spacings within which a surface has two more scan lines on a side */
 static const double lateral_reach = 12; /* cells within which a line's neighbours are looked for */
 
 static uint32_t find_bucket(const struct spl_linear_level *l, uint64_t key)

@@ -17,6 +17,8 @@
 #include "pack/check.h"
 #include "pack/prune.h"
 
+static const double prune_near = 1.1; /* times the factor, or as much less: not worth a word */
+
 /* What the file that was written last has. */
 static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_report *report)
 {
@@ -35,6 +37,19 @@ static void fill_rewritten(const struct spl_dataset_info *info, struct spl_pack_
     report->pages = info->pages;
     for (uint32_t s = 0; s < report->stream_count; s++)
         report->streams[s].bits = info->streams[s].bits;
+}
+
+/* Whole nodes are kept or dropped, so that not every number can be reached. */
+static void tell_what_is_left(const struct spl_pack_options *options, const struct spl_pack_report *report)
+{
+    char text[160];
+    double all = (double)(report->pruned_of ? report->pruned_of : report->leaf_splats);
+    double reached = all / (double)report->leaf_splats, off = reached / options->prune;
+    if (options->prune <= 1 || !options->warn || (off > 1 / prune_near && off < prune_near))
+        return;
+    snprintf(text, sizeof text, "--prune %u leaves one splat of %.1f: no nodes of the octree come closer", options->prune,
+             reached);
+    options->warn(options->progress_context, text);
 }
 
 static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct spl_build_outputs *out,
@@ -63,6 +78,7 @@ static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct s
         fill_rewritten(spl_dataset_get_info(dataset), report);
         report->photos = p->photos;
         report->maps = p->maps;
+        tell_what_is_left(options, report);
         report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     }
     spl_dataset_close(dataset);

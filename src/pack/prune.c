@@ -19,10 +19,11 @@ struct cut {
 
 struct plan {
     struct spl_prune_loss input;
-    uint64_t nodes;
+    uint64_t nodes, before; /* leaf splats before */
     double *loss;            /* of inner nodes; 0 of leaves */
     double *least;           /* loss + slope * splats, of the best cut below each node */
     uint64_t *count, *below; /* splats of the node; leaf splats below it, or its own */
+    uint64_t *left;          /* leaf splats that the dataset has of it where it is drawn; their number is asked for */
     uint8_t *steps;          /* levels above the lowest leaf below it */
     bool *leaf, *gone;       /* the cut: loses its children; lies below one that does */
     bool *split;             /* is split where the slope is just too small */
@@ -51,6 +52,7 @@ static void count_splats(struct plan *p)
     for (uint64_t n = p->nodes; n-- > 0;) {
         const struct spl_node *node = &p->input.nodes[n];
         p->count[n] = spl_prune_count(&p->input, n);
+        p->left[n] = spl_prune_left(&p->input, n);
         p->below[n] = node->child_count ? 0 : p->count[n];
         p->steps[n] = 0;
         for (uint64_t c = node->first_child; c < node->first_child + node->child_count; c++) {
@@ -75,7 +77,7 @@ static uint64_t drop(struct plan *p)
         p->leaf[n] = p->leaf[n] && !p->gone[n] && nodes[n].child_count;
         for (uint64_t c = nodes[n].first_child; c < nodes[n].first_child + nodes[n].child_count; c++)
             p->gone[c] = p->gone[n] || p->leaf[n];
-        splats += is_drawn(p, n) ? p->count[n] : 0;
+        splats += is_drawn(p, n) ? p->left[n] : 0;
     }
     return splats;
 }
@@ -106,9 +108,9 @@ static uint64_t fill_gap(struct plan *p, uint64_t splats, double wanted)
 {
     const struct spl_node *nodes = p->input.nodes;
     for (uint64_t n = 0; n < p->nodes; n++) {
-        uint64_t more = splats - p->count[n], first = nodes[n].first_child, end = first + nodes[n].child_count;
+        uint64_t more = splats - p->left[n], first = nodes[n].first_child, end = first + nodes[n].child_count;
         for (uint64_t c = first; c < end; c++)
-            more += p->count[c];
+            more += p->left[c];
         if (!p->leaf[n] || !p->split[n] || steps_off((double)more, wanted) >= steps_off((double)splats, wanted))
             continue;
         p->leaf[n] = false;
@@ -121,13 +123,15 @@ static uint64_t fill_gap(struct plan *p, uint64_t splats, double wanted)
     return splats;
 }
 
-/* Sets leaf[] to the cut that comes closest to `wanted` splats: between the last slope with as many, which is halved
- * down to, and the first with fewer. */
-static struct cut find_cut(struct plan *p, double wanted)
+/* Sets leaf[] to the cut that comes closest to one of `factor` leaf splats: between the last slope with as many, which
+ * is halved down to, and the first with fewer. */
+static struct cut find_cut(struct plan *p, double factor)
 {
-    struct cut many = {0, p->below[0]}, few = {1, 0};
     memset(p->leaf, 0, p->nodes);
-    if (drop(p) <= wanted)
+    p->before = drop(p);
+    struct cut many = {0, p->before}, few = {1, 0};
+    const double wanted = (double)p->before / factor;
+    if (factor <= 1)
         return many;
     while ((few.splats = cut_at(p, few.slope)) > wanted && few.slope < 4 * (double)p->below[0]) {
         many = few;
@@ -148,12 +152,12 @@ static struct cut find_cut(struct plan *p, double wanted)
 
 static void fill_report(const struct plan *p, double factor, const struct cut *cut, struct spl_prune_report *report)
 {
-    *report = (struct spl_prune_report){.before = p->below[0], .after = cut->splats, .slope = cut->slope};
+    *report = (struct spl_prune_report){.before = p->before, .after = cut->splats, .slope = cut->slope};
     for (uint64_t n = 0; n < p->nodes; n++) {
         if (!is_drawn(p, n))
             continue;
-        report->by_steps[p->steps[n] < SPL_PRUNE_STEPS ? p->steps[n] : SPL_PRUNE_STEPS - 1] += p->count[n];
-        report->dense += (double)p->count[n] * factor > 2 * (double)p->below[n] ? p->count[n] : 0;
+        report->by_steps[p->steps[n] < SPL_PRUNE_STEPS ? p->steps[n] : SPL_PRUNE_STEPS - 1] += p->left[n];
+        report->dense += (double)p->count[n] * factor > 2 * (double)p->below[n] ? p->left[n] : 0;
         report->lost += p->leaf[n] ? p->loss[n] / (double)p->below[0] : 0;
     }
 }
@@ -163,12 +167,13 @@ static int allocate(struct plan *p, struct spl_error *err)
     p->loss = spl_alloc(p->nodes, sizeof *p->loss, err);
     p->least = spl_alloc(p->nodes, sizeof *p->least, err);
     p->count = spl_alloc_raw(p->nodes, sizeof *p->count, err);
+    p->left = spl_alloc_raw(p->nodes, sizeof *p->left, err);
     p->below = spl_alloc_raw(p->nodes, sizeof *p->below, err);
     p->steps = spl_alloc_raw(p->nodes, sizeof *p->steps, err);
     p->gone = spl_alloc_raw(p->nodes, sizeof *p->gone, err);
     p->split = spl_alloc_raw(p->nodes, sizeof *p->split, err);
     p->shapes = spl_alloc(p->stage->threads, sizeof(struct spl_prune_shapes *), err);
-    if (!p->loss || !p->least || !p->count || !p->below || !p->steps || !p->gone || !p->split || !p->shapes)
+    if (!p->loss || !p->least || !p->count || !p->left || !p->below || !p->steps || !p->gone || !p->split || !p->shapes)
         return SPL_E_NOMEM;
     for (unsigned t = 0; t < p->stage->threads; t++)
         if (!(p->shapes[t] = spl_prune_shapes_create(err)))
@@ -197,7 +202,7 @@ int spl_prune_plan(const struct spl_dataset *dataset, const struct spl_prune_opt
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while pruning");
     if (rc || (rc = spl_stage_check(stage, err)))
         goto done;
-    struct cut cut = find_cut(&p, (double)p.below[0] / options->factor);
+    struct cut cut = find_cut(&p, options->factor);
     fill_report(&p, options->factor, &cut, report);
     spl_stage_finish(stage);
 done:
@@ -207,6 +212,7 @@ done:
     free(p.loss);
     free(p.least);
     free(p.count);
+    free(p.left);
     free(p.below);
     free(p.steps);
     free(p.gone);

@@ -34,7 +34,8 @@ struct spl_prune_options {
 
 enum { SPL_PRUNE_STEPS = 16 };
 struct spl_prune_report {
-    uint64_t before, after;            /* leaf splats, and half the cells of leaves' panels; lines are not counted */
+    uint64_t before, after;            /* leaf splats as the dataset counts them: of panels of its leaves points, of
+                                          those of a coarser level, now leaves, half the cells; not lines */
     uint64_t by_steps[SPL_PRUNE_STEPS]; /* of those after: by how many levels their node lies above its lowest leaf */
     uint64_t dense;                    /* of those after: in nodes that keep more than twice 1 / factor */
     double slope;                      /* w that a splat saved costs, at the cut's edge; 0 = nothing was dropped */

@@ -88,6 +88,19 @@ uint64_t spl_prune_count(const struct spl_prune_loss *loss, uint64_t node)
     return count;
 }
 
+uint64_t spl_prune_left(const struct spl_prune_loss *loss, uint64_t node)
+{
+    uint64_t count = 0;
+    const struct spl_chunk *chunks = loss->chunks + loss->nodes[node].first_chunk;
+    if (loss->nodes[node].child_count)
+        return spl_prune_count(loss, node);
+    for (uint32_t i = 0; i < loss->nodes[node].chunk_count; i++)
+        count += is_panels(&chunks[i])  ? spl_panels_get_points(&chunks[i])
+                 : is_discs(&chunks[i]) ? chunks[i].count
+                                        : 0;
+    return count;
+}
+
 static void get_cells(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct cells *cells)
 {
     struct spl_panel_frame frame;

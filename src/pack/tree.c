@@ -92,9 +92,20 @@ static int add_node(struct spl_tree *tree, size_t *capacity, const struct spl_tr
     return 0;
 }
 
+/* Pruning splits and joins whole nodes: of a small scan they are finer, so that it comes near what is wanted. */
+static size_t most_points(const struct spl_tree *tree, const struct spl_points *points)
+{
+    size_t most = tree->pruned_to / 16;
+    if (!tree->pruned_to)
+        return SPL_LEAF_POINTS;
+    if (points->plane || most > SPL_PRUNED_LEAF_POINTS) /* small nodes would cut panels to pieces */
+        return SPL_PRUNED_LEAF_POINTS;
+    return most > SPL_PRUNED_LEAF_LEAST ? most : SPL_PRUNED_LEAF_LEAST;
+}
+
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err)
 {
-    size_t capacity = 0, most = tree->for_pruning ? SPL_PRUNED_LEAF_POINTS : SPL_LEAF_POINTS;
+    size_t capacity = 0, most = most_points(tree, points);
     struct spl_tree_node root = {.end = points->count, .frame_size = points->cube_size};
     for (int c = 0; c < 3; c++)
         root.frame_low[c] = points->bounds_min[c];

@@ -6,7 +6,7 @@
 #include "pack/points.h"
 
 /* Most points of a leaf, and of one where nodes are what pruning chooses among: there are enough of them to choose. */
-enum { SPL_LEAF_POINTS = 8192, SPL_PRUNED_LEAF_POINTS = 512 };
+enum { SPL_LEAF_POINTS = 8192, SPL_PRUNED_LEAF_POINTS = 512, SPL_PRUNED_LEAF_LEAST = 32 };
 
 /* A splat of an inner node; position relative to the node's origin. */
 struct spl_inner_splat {
@@ -33,12 +33,13 @@ struct spl_tree_node {
 struct spl_tree {
     struct spl_tree_node *nodes; /* breadth first, siblings consecutive */
     uint32_t count, levels;
-    bool for_pruning; /* said before it is built: inner nodes are drawn for good, see levels.c */
+    size_t pruned_to; /* said before it is built: about so many splats are to be left of it, and inner nodes are drawn
+                         for good, see levels.c; 0: nothing is pruned */
     struct spl_panel_maker *panels; /* of points on planes, borrowed while levels are built; NULL: none are made */
 };
 
-/* Splits until no leaf has more than SPL_LEAF_POINTS points, for pruning SPL_PRUNED_LEAF_POINTS, or is too wide for
- * floats. `points` are sorted, with radii. */
+/* Splits until no leaf has more than SPL_LEAF_POINTS points, for pruning SPL_PRUNED_LEAF_POINTS or, of a small scan
+ * without panels, a sixteenth of what is to be left, or is too wide for floats. `points` are sorted, with radii. */
 int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struct spl_error *err);
 
 /* Fills the inner nodes, deepest first: clusters of their children's splats, at most about 28 % as many. */

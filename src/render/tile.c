@@ -94,6 +94,13 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
     return SPL_OK;
 }
 
+/* A texel that an atom is added to costs an eighth of a sample that is looked at. */
+static uint64_t sum_work(const struct spl_tile *tile, const struct spl_dispatch *what, uint32_t entries)
+{
+    const uint64_t size = tile->params.texture_size;
+    return entries * SPL_RUN_SPLATS * size * size * what->planes / 8;
+}
+
 /* Sums the textures of as many entries, for the dispatch behind to read. */
 static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
                           const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t entries)
@@ -137,6 +144,8 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             params.first_entry = batch->first_entry + done;
             params.entries = left < batch->round_entries ? left : batch->round_entries;
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
+            if (what->sum && (rc = spl_tile_add_work(tile, sum_work(tile, what, params.entries), err)))
+                break;
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
             spl_gpu_dispatch(tile->renderer->gpu, kernel ? kernel : kernels->of[0], bindings,
@@ -190,15 +199,37 @@ static int dispatch_range(struct spl_tile *tile, const struct spl_kernel_key *ke
     return rc;
 }
 
+/* Looks at the occlusion tiles of the chunk, each of which costs more than a sample that most discs miss. */
+static uint64_t occlusion_work(const struct spl_chunk_bounds *bounds)
+{
+    enum { tile_work = 4 };
+    uint64_t columns = (bounds->last & 0xffffu) - (bounds->first & 0xffffu) + 1;
+    uint64_t rows = (bounds->last >> 16) - (bounds->first >> 16) + 1;
+    return bounds->near > 0 ? tile_work * columns * rows : 1;
+}
+
+/* Chunks from `first` on, as many at a time as are not too much work. */
+static int dispatch_chunks(struct spl_tile *tile, size_t first, struct spl_error *err)
+{
+    const struct spl_draw_list *list = &tile->renderer->list;
+    int rc = SPL_OK;
+    for (size_t end = first; first < list->chunk_count && !rc; first = end) {
+        uint64_t work = 0;
+        while (end < list->chunk_count && work < SPL_BATCH_WORK)
+            work += occlusion_work(&list->bounds[end++]);
+        rc = spl_tile_add_work(tile, work, err);
+        rc = rc ? rc : dispatch_range(tile, &(struct spl_kernel_key){.name = "occlusion_chunks"}, first, end, err);
+    }
+    return rc;
+}
+
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err)
 {
     enum { side = SPL_OCCLUSION_TILE };
     size_t tiles = (size_t)((tile->camera.width + side - 1) / side) * ((tile->camera.height + side - 1) / side);
     spl_tile_begin_area(tile, SPL_AREA_OCCLUDERS);
     int rc = dispatch_range(tile, &(struct spl_kernel_key){"occlusion_tiles", false, {wide}}, 0, tiles, err);
-    if (!rc)
-        rc = dispatch_range(tile, &(struct spl_kernel_key){.name = "occlusion_chunks"}, first_chunk,
-                            tile->renderer->list.chunk_count, err);
+    rc = rc ? rc : dispatch_chunks(tile, first_chunk, err);
     spl_tile_end_area(tile, SPL_AREA_OCCLUDERS);
     return rc;
 }

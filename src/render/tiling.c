@@ -54,6 +54,13 @@ static void widen(const struct spl_reach *reach, uint32_t side, uint32_t size, u
     *to = *to > (int64_t)size * side + reach->guard ? (int64_t)size * side + reach->guard : *to;
 }
 
+/* Do backs of discs lie behind what faces the eye? Only where sides are not guessed: a room turned inside out would show
+ * its neighbours' walls. */
+static bool has_sides(const struct spl_dataset_info *info, const struct spl_view *view)
+{
+    return info->has_sides || info->panels || info->meshes || (info->maps && spl_view_get_maps(view));
+}
+
 static void set_params(struct spl_tile *tile)
 {
     const struct spl_camera *camera = &tile->camera;
@@ -77,7 +84,7 @@ static void set_params(struct spl_tile *tile)
         .background = b[0] | b[1] << 8 | b[2] << 16 | (uint32_t)b[3] << 24,
         .crop_width = tile->width,
         .crop_height = tile->height,
-        .flags = info->panels || info->meshes || (info->maps && spl_view_get_maps(view)) ? SPL_FRAME_SIDED : 0,
+        .flags = has_sides(info, view) ? SPL_FRAME_SIDED : 0,
     };
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)

@@ -10,6 +10,7 @@
 
 #include "dataset/dictionary.h"
 #include "gpu/frames.h"
+#include "render/fault.h"
 #include "support/make_textures.h"
 #include "support/reference.h"
 
@@ -103,6 +104,7 @@ static void textures_match_the_reference(void **state)
         spl_dataset_close(plain);
         spl_dictionary_finish(&dictionary);
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+        spl_renderer_set_work_at_once(renderer, i % 2 ? UINT64_MAX : 1); // in parts, or not
         struct spl_view view = colored(rows[i].distance, 160, 120);
         view.lod = rows[i].lod;
         static const uint32_t atoms[2][3] = {{8, 3, 0}, {7, 5, 1}};

@@ -51,6 +51,34 @@ def test_what_its_disk_did_not_give_in_time_is_tried_again():
         assert small(d, "a").status == 200
 
 
+def test_what_costs_the_device_twice_is_put_aside():
+    with folder() as home:
+        put(home, "a", wall())
+        put(home, "b", wall())
+        with Daemon(FAKE, *WATCH, datasets=[home], SPLATD_INJECT_LOSS_AFTER="1x6") as d:
+            def ready(count):
+                eventually(lambda: d.status()["counters"]["device_losses"] == count and d.status()["state"] == "ready")
+            for losses in (1, 2):  # a view of `a`, then the device is lost with one of `b`
+                assert small(d, "a").status == 200
+                lost = small(d, "b")
+                assert lost.status == 503 and lost.json()["type"] == "urn:splatd:error:device-lost", lost.body
+                ready(losses)
+            eventually(lambda: listed(d)["b"]["state"] == "failed")
+            assert "lost twice" in listed(d)["b"]["reason"] and listed(d)["a"]["state"] == "ready"
+            refused = small(d, "b")
+            assert refused.status == 404 and "lost twice" in refused.json()["detail"], refused.body
+            assert small(d, "a").status == 200
+            assert any("dataset b is put aside" in line for line in d.lines), d.lines
+            put(home, "b", other())  # another file: tried again
+            eventually(lambda: listed(d)["b"]["state"] == "ready")
+            for losses in (3, 4, 5):  # `b` again, then the last that there is, which is not put aside
+                name = "b" if losses < 5 else "a"
+                eventually(lambda: small(d, name).status == 503)
+                ready(losses)
+            assert listed(d)["b"]["state"] == "failed" and listed(d)["a"]["state"] == "ready"
+            assert "SPLATD" not in listed(d)["b"]["reason"] and home not in listed(d)["b"]["reason"]
+
+
 def test_an_empty_directory_fills_up():
     with folder() as home, Daemon(REAL, *WATCH, datasets=[home]) as d:
         assert listed(d) == {} and d.ask("/").json()["views"] == []

@@ -54,6 +54,9 @@ extern double make_dataset_normal_error;
 /* What META of files that follow says; default "us-ft" and "EPSG:2263". NULL = nothing. */
 extern const char *make_dataset_unit, *make_dataset_crs;
 
+/* META of files that follow says a station at the origin: normals show to it. */
+extern bool make_dataset_station;
+
 /* Bytes of the pages of files that follow; default SPL_PAGE_BYTES. 0 = a page for each node. */
 extern size_t make_dataset_page_bytes;
 

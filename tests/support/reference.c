@@ -551,9 +551,9 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     s.camera.cx *= view->supersample;
     s.camera.cy *= view->supersample;
     s.margin = (float)view->disc.margin;
-    const bool mapped =
-        spl_dataset_get_info(dataset)->maps && view->maps == SPL_MAPS_ON && draws_discs(view);
-    s.sided = mapped || spl_dataset_get_info(dataset)->panels || spl_dataset_get_info(dataset)->meshes;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    const bool mapped = info->maps && view->maps == SPL_MAPS_ON && draws_discs(view);
+    s.sided = mapped || info->has_sides || info->panels || info->meshes;
     const struct naive_options options = {.dataset = dataset,
                                           .camera = &s.camera,
                                           .lod = view->lod,

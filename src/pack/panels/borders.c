@@ -2,9 +2,9 @@
  * of a plaque and the wall a spacing behind it, a step of a stair and the next.
  *
  * A point near another plane asks the points around it. Where those of the other plane are among them and those of its
- * own lie on one side of the line in which both meet, its plane ends at that line: cells that lie beyond it as a whole
- * are not there, so that planes meet without a gap. Else, where it lies before the other one, it ends where its own
- * points do; what lies behind goes on beneath it, since scans seldom see where to.
+ * own lie on one side of the line in which both meet, its plane goes on to that line and ends there: cells that lie
+ * beyond it as a whole are not there, so that planes meet without a gap. Else, where it lies before the other one, it
+ * ends where its own points do; what lies behind goes on beneath it, since scans seldom see where to.
  *
  * Only points that lie near a plane with points in the same leaf are asked; what has relief is no plane here. One
  * worker's; a point's line is its own. */
@@ -17,11 +17,10 @@
 #include "geom/tangent.h"
 
 enum { asked = 36, other_points = 4 };
-static const double beside = 1.2; /* radii from another plane, or from the box of its points, that are looked at */
-static const double meets = 0.25; /* sine of the angle from which on planes meet in a line */
-static const double astray = 0.3; /* spacings that points may lie beyond the line in which planes meet */
-static const double half_cell =
-    0.42; /* of the spacing: what a cell whose middle lies beyond a line reaches before it */
+static const double beside = 1.5;     /* radii from another plane, or from the box of its points, that are looked at */
+static const double meets = 0.25;     /* sine of the angle from which on planes meet in a line */
+static const double astray = 0.3;     /* spacings that points may lie beyond the line in which planes meet */
+static const double half_disc = 0.42; /* spacings beyond that line at which discs end, where cells end at it */
 
 struct spl_panel_box {
     double low[3], high[3];
@@ -94,7 +93,6 @@ static bool find_crease(const struct spl_points *p, size_t i, const struct spl_n
         if (out > *end + astray * spacing)
             return false;
     }
-    *end += half_cell * spacing;
     return count >= other_points;
 }
 
@@ -122,13 +120,15 @@ static void find_line(const struct spl_panel_maker *m, const struct spl_nearest 
             continue;
         seen[count++] = label;
         if (find_crease(p, i, near, label, &m->planes->list[label], u, v, direction, &end) && end < least) {
+            m->crease[i] = label;
             least = end;
             best[0] = direction[0];
             best[1] = direction[1];
         }
     }
-    if (!(least < INFINITY) && behind > before &&
-        spl_clip_find_border(p, i, near, &m->turns, true, u, v, direction, &end)) {
+    if (least < INFINITY)
+        least += half_disc * (double)p->radius[i] / (double)SPL_RADIUS_SPACING;
+    else if (behind > before && spl_clip_find_border(p, i, near, &m->turns, true, u, v, direction, &end)) {
         least = end;
         best[0] = direction[0];
         best[1] = direction[1];

@@ -4,7 +4,9 @@
 #include <math.h>
 
 static const double most_cells = 1 << 29; /* either way from the plane's origin */
-static const double least_up = 0.6;       /* cosine of the steepest tilt of a disc on a piece with relief */
+/* How far a cell's middle may lie beyond a crease, as a share of the cell across it. */
+static const double cut_in_corner = 0.5, cut_at_edge = 0.25, cut_at_either = 0.35;
+static const double least_up = 0.6; /* cosine of the steepest tilt of a disc on a piece with relief */
 
 static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *group)
 {
@@ -44,6 +46,29 @@ static void get_tilt(const struct spl_panel_grid *g, const float normal[3], doub
     tilt[1] = -dot(n, g->v) / copysign(fmax(fabs(up), least_up), up);
 }
 
+/* Ends the disc of point i at the line in which its plane meets `other`. In a corner, which is seen from within, it
+ * goes on to that line, and a cell that this cuts is there on both planes, so that nothing shows between them: what
+ * lies beyond is hidden. At an edge, which is seen from without, what lies beyond is seen: a cell's middle lies beyond
+ * it by less. Where nobody says from where a point was seen, it may be either. */
+static void end_at_crease(const struct spl_panel_grid *g, size_t i, const struct spl_plane *other,
+                          struct spl_panel_disc *d)
+{
+    const struct spl_points *p = g->group->points;
+    bool known = p->eye_count || (p->station && p->station[i] != SPL_NO_STATION);
+    double off[3];
+    for (int c = 0; c < 3; c++)
+        off[c] = p->axis[c][i] - other->origin[c];
+    double above = dot(off, other->normal), side = above > 0 ? -1 : 1;
+    double cut = !known ? cut_at_either : above > 0 ? cut_in_corner : cut_at_edge;
+    double along[2] = {side * dot(other->normal, g->u), side * dot(other->normal, g->v)};
+    double sine = hypot(along[0], along[1]);
+    d->clip[0] = along[0] / sine;
+    d->clip[1] = along[1] / sine;
+    d->clip_offset = fabs(above) / sine * g->inverse;
+    d->reach = known && above < 0 ? 0 : d->clip_offset;
+    d->clip_offset += cut * (fabs(d->clip[0]) + fabs(d->clip[1]));
+}
+
 struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *g, uint32_t member)
 {
     const struct spl_points *p = g->group->points;
@@ -57,7 +82,10 @@ struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *g, uint32
     const struct spl_point_clip *clip = p->clip ? &p->clip[i] : NULL;
     if (g->group->plane->heights)
         get_tilt(g, p->normal[i], d.tilt);
-    if (g->group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2])) {
+    uint32_t crease = g->group->leaf && g->group->crease ? g->group->crease[i] : SPL_NO_PLANE;
+    if (crease != SPL_NO_PLANE)
+        end_at_crease(g, i, &g->group->planes->list[crease], &d);
+    else if (g->group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2])) {
         double direction[3] = {clip->direction[0] / 127.0, clip->direction[1] / 127.0, clip->direction[2] / 127.0};
         d.clip[0] = dot(direction, g->u) + d.tilt[0] * dot(direction, g->normal);
         d.clip[1] = dot(direction, g->v) + d.tilt[1] * dot(direction, g->normal);
@@ -71,8 +99,9 @@ void spl_panel_disc_range(const struct spl_panel_disc *d, int32_t low[2], int32_
     const double at[2] = {d->x, d->y};
     for (int a = 0; a < 2; a++) {
         int32_t own = (int32_t)floor(at[a]);
-        low[a] = (int32_t)ceil(at[a] - d->radius - 0.5);
-        high[a] = (int32_t)floor(at[a] + d->radius - 0.5);
+        double end = at[a] + (d->reach > 0 ? d->reach * d->clip[a] : 0);
+        low[a] = (int32_t)ceil(fmin(at[a], end) - d->radius - 0.5);
+        high[a] = (int32_t)floor(fmax(at[a], end) + d->radius - 0.5);
         low[a] = low[a] < own ? low[a] : own;
         high[a] = high[a] > own ? high[a] : own;
     }

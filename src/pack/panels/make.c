@@ -72,8 +72,14 @@ int spl_panel_maker_init(struct spl_panel_maker *m, struct spl_points *points, c
     m->level = spl_alloc(points->count, sizeof *m->level, err);
     m->scratch = spl_alloc(threads, sizeof *m->scratch, err);
     spl_clip_turns_init(&m->turns);
-    if (points->clip && !(m->neighbours = spl_neighbours_create(points, threads, err)))
-        return SPL_E_NOMEM;
+    if (points->clip) {
+        m->neighbours = spl_neighbours_create(points, threads, err);
+        m->crease = m->neighbours ? spl_alloc_raw(points->count, sizeof *m->crease, err) : NULL;
+        if (!m->crease)
+            return SPL_E_NOMEM;
+        for (size_t i = 0; i < points->count; i++)
+            m->crease[i] = SPL_NO_PLANE;
+    }
     return m->level && m->scratch ? settle_bases(m, err) : SPL_E_NOMEM;
 }
 
@@ -86,6 +92,7 @@ void spl_panel_maker_finish(struct spl_panel_maker *m)
         free(m->scratch[t].weights);
     }
     spl_neighbours_destroy(m->neighbours);
+    free(m->crease);
     free(m->scratch);
     free(m->base);
     free(m->level);
@@ -119,7 +126,9 @@ static struct spl_panel_group group_of(const struct spl_panel_maker *m, const st
                                        const struct spl_tree_node *node, uint32_t plane, uint8_t level, size_t count)
 {
     return (struct spl_panel_group){.points = m->points,
+                                    .planes = m->planes,
                                     .plane = &m->planes->list[plane],
+                                    .crease = m->crease,
                                     .node_origin = node->origin,
                                     .members = w->groups.level_members,
                                     .first = node->begin,

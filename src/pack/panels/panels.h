@@ -44,6 +44,7 @@ struct spl_panel_maker {
     float *base;                     /* by plane: cells of level SPL_PANEL_LEVEL_BASE */
     uint8_t *level; /* by point: its cells are base * 2^((level - SPL_PANEL_LEVEL_BASE) / 2); 0: it is a disc */
     struct spl_neighbours *neighbours; /* of the points; NULL: they have no clip lines */
+    uint32_t *crease;                  /* by point: the plane at which its own ends there, or SPL_NO_PLANE; likewise */
     struct spl_clip_turns turns;
     struct spl_panel_scratch *scratch;
     unsigned workers;

@@ -3,6 +3,8 @@
 #ifndef SPL_PACK_PANELS_RASTER_PARTS_H
 #define SPL_PACK_PANELS_RASTER_PARTS_H
 
+#include <math.h>
+
 #include "pack/panels/raster.h"
 
 /* A panel that discs reach into. */
@@ -31,12 +33,17 @@ struct spl_panel_grid {
 struct spl_panel_disc {
     double x, y, radius;         /* in cells */
     double clip[2], clip_offset; /* not drawn where clip . d > clip_offset, d from its middle */
+    double reach;                /* along clip, how far off the crease is that it goes on to; 0: none */
     double tilt[2];              /* how it rises along u and v; 0 on what is flat */
 };
 
-/* The square of how far the place (dx, dy) cells from the disc's middle is from it, along the disc. */
+/* The square of how far the place (dx, dy) cells from the disc's middle is from it, along the disc; or, if that is
+ * less, from what lies between it and its crease. */
 static inline double spl_panel_disc_squared(const struct spl_panel_disc *disc, double dx, double dy)
 {
+    double along = fmin(fmax(disc->clip[0] * dx + disc->clip[1] * dy, 0), disc->reach);
+    dx -= along * disc->clip[0];
+    dy -= along * disc->clip[1];
     double up = disc->tilt[0] * dx + disc->tilt[1] * dy;
     return dx * dx + dy * dy + up * up;
 }
@@ -45,7 +52,7 @@ static inline double spl_panel_disc_squared(const struct spl_panel_disc *disc, d
 bool spl_panel_grid_init(struct spl_panel_grid *grid, const struct spl_panel_group *group);
 struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *grid, uint32_t member);
 
-/* The cells whose middles a disc can cover, and its own. */
+/* The cells whose middles a disc, or what lies between it and its crease, can cover, and its own. */
 void spl_panel_disc_range(const struct spl_panel_disc *disc, int32_t low[2], int32_t high[2]);
 
 /* The column, axis 0, or row of the panel that has a cell, counted from the grid's first on. */

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "base/array.h"
+#include "base/memory.h"
 
 /* 21 bits an axis; wider scans wrap, which makes no difference but work. */
 static uint64_t key_of(const struct spl_wires_grid *grid, const double position[3], const int shift[3])
@@ -16,6 +17,16 @@ static uint64_t key_of(const struct spl_wires_grid *grid, const double position[
         key = key << 21 | ((uint64_t)(int64_t)cell & 0x1fffff);
     }
     return key;
+}
+
+int spl_wires_grid_reserve(struct spl_wires_grid *grid, size_t count, struct spl_error *err)
+{
+    struct spl_wires_cell *cells = spl_realloc(grid->cells, count + 1, sizeof *cells, err);
+    if (!cells)
+        return SPL_E_NOMEM;
+    grid->cells = cells;
+    grid->capacity = count + 1;
+    return SPL_OK;
 }
 
 int spl_wires_grid_add(struct spl_wires_grid *grid, const double position[3], uint32_t item, struct spl_error *err)

@@ -18,6 +18,9 @@ struct spl_wires_grid { // zeroed before first use
     double low[3], edge; // the caller's to set: least corner, side of a cell
 };
 
+/* Room for `count` items in all, so that adding them takes no more; SPL_E_NOMEM. */
+int spl_wires_grid_reserve(struct spl_wires_grid *grid, size_t count, struct spl_error *err);
+
 /* Adds an item; SPL_E_NOMEM. */
 int spl_wires_grid_add(struct spl_wires_grid *grid, const double position[3], uint32_t item, struct spl_error *err);
 

@@ -114,23 +114,65 @@ static bool is_on(const struct spl_wire_vertex *v, const double at[3], double re
     return squared <= reach * reach;
 }
 
-/* Adds a piece to all cells that lie within its reach. */
-static int add_piece(struct spl_wires_grid *grid, const struct spl_wire_vertex *v, uint32_t piece, double reach,
-                     struct spl_error *err)
+static double length_of(const struct spl_wire_vertex *v)
+{
+    double squared = 0;
+    for (int c = 0; c < 3; c++)
+        squared += (v[1].position[c] - v[0].position[c]) * (v[1].position[c] - v[0].position[c]);
+    return sqrt(squared);
+}
+
+/* Adds a piece to the cells that its reach, which is a quarter of one at most, touches: stretch by stretch, each no
+ * longer than a cell, those of the box around it. `grid` NULL: only counts them. */
+static int add_piece(struct spl_wires_grid *grid, double edge, const double low[3], const struct spl_wire_vertex *v,
+                     uint32_t piece, double reach, size_t *count, struct spl_error *err)
+{
+    uint32_t steps = (uint32_t)fmin(ceil(length_of(v) / edge), 1e6);
+    int rc = SPL_OK;
+    steps += !steps;
+    for (uint32_t s = 0; s < steps; s++) {
+        double first[3];
+        uint32_t across[3];
+        for (int c = 0; c < 3; c++) {
+            double way = v[1].position[c] - v[0].position[c];
+            double from = v[0].position[c] + way * s / steps, to = v[0].position[c] + way * (s + 1) / steps;
+            first[c] = floor((fmin(from, to) - reach - low[c]) / edge);
+            across[c] = (uint32_t)(floor((fmax(from, to) + reach - low[c]) / edge) - first[c]) + 1;
+        }
+        *count += (size_t)across[0] * across[1] * across[2];
+        for (uint32_t k = 0; grid && k < across[0] * across[1] * across[2] && !rc; k++) {
+            const uint32_t at[3] = {k % across[0], k / across[0] % across[1], k / across[0] / across[1]};
+            double middle[3];
+            for (int c = 0; c < 3; c++)
+                middle[c] = low[c] + (first[c] + at[c] + 0.5) * edge;
+            rc = spl_wires_grid_add(grid, middle, piece, err);
+        }
+    }
+    return rc;
+}
+
+/* The pieces by the cells that they reach into: some 2 to 6 each, of 16 bytes, since a cell is twice as wide as pieces
+ * are long. */
+static int lay_pieces(struct spl_wires_grid *grid, const struct spl_wires *w, double noise, struct spl_error *err)
 {
     double length = 0;
-    for (int c = 0; c < 3; c++)
-        length += (v[1].position[c] - v[0].position[c]) * (v[1].position[c] - v[0].position[c]);
-    uint32_t steps = (uint32_t)fmin(2 * sqrt(length) / grid->edge, 1e6) + 1;
+    size_t pieces = 0, count = 0;
     int rc = SPL_OK;
-    for (uint32_t s = 0; s <= steps; s++)
-        for (int k = 0; k < 27 && !rc; k++) {
-            double at[3];
-            for (int c = 0; c < 3; c++)
-                at[c] = v[0].position[c] + (v[1].position[c] - v[0].position[c]) * s / steps +
-                        (reach + grid->edge / 4) * (k / (c == 0 ? 1 : c == 1 ? 3 : 9) % 3 - 1);
-            rc = spl_wires_grid_add(grid, at, piece, err);
-        }
+    for (size_t i = 0; i < w->count; i++) {
+        bool begins = w->vertices[i].point != SPL_WIRE_END && i + 1 < w->count;
+        grid->edge = fmax(grid->edge, 4 * reach_of(&w->vertices[i], noise));
+        length += begins ? length_of(&w->vertices[i]) : 0;
+        pieces += begins;
+    }
+    grid->edge = fmax(grid->edge, pieces ? 2 * length / (double)pieces : 0);
+    for (int adds = 0; adds < 2 && !rc; adds++) {
+        rc = adds ? spl_wires_grid_reserve(grid, count, err) : SPL_OK;
+        for (size_t i = 0; i + 1 < w->count && !rc; i++)
+            if (w->vertices[i].point != SPL_WIRE_END)
+                rc = add_piece(adds ? grid : NULL, grid->edge, grid->low, &w->vertices[i], (uint32_t)i,
+                               reach_of(&w->vertices[i], noise), &count, err);
+    }
+    spl_wires_grid_sort(grid);
     return rc;
 }
 
@@ -155,14 +197,8 @@ int spl_wires_claim(const struct spl_wires *wires, struct spl_points *points, do
                     const struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_wires_grid grid = {0};
-    int rc = SPL_OK;
-    for (size_t i = 0; i < wires->count; i++)
-        grid.edge = fmax(grid.edge, 4 * reach_of(&wires->vertices[i], noise));
     memcpy(grid.low, points->bounds_min, sizeof grid.low);
-    for (size_t i = 0; i + 1 < wires->count && !rc; i++)
-        if (wires->vertices[i].point != SPL_WIRE_END)
-            rc = add_piece(&grid, &wires->vertices[i], (uint32_t)i, reach_of(&wires->vertices[i], noise), err);
-    spl_wires_grid_sort(&grid);
+    int rc = lay_pieces(&grid, wires, noise, err);
     if (!rc)
         claim_points(&grid, wires, points, noise, stage);
     spl_wires_grid_finish(&grid);

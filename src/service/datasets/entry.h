@@ -22,6 +22,7 @@ enum spl_entry_state {
     SPL_ENTRY_LOADING,  /* on its way to the device */
     SPL_ENTRY_RESIDENT, /* can be rendered */
     SPL_ENTRY_REFUSED,  /* the device has no room for it: see err */
+    SPL_ENTRY_ASIDE,    /* it is drawn no more, since it costs the device: see err */
     SPL_ENTRY_LEAVING,  /* nobody refers to it any more */
     SPL_ENTRY_GONE,     /* the device has let go of it */
 };
@@ -49,6 +50,8 @@ struct spl_catalog_entry {
     TAILQ_ENTRY(spl_catalog_entry) resident; // owned by: gpu
     uint32_t pages_wanted;                   // owned by: gpu; first page that is not there yet
     bool loading;                            // owned by: gpu
+    bool aside;                              // owned by: gpu; no frame of it is begun any more
+    uint64_t lost_ns;                        // owned by: gpu; when the device was last lost in a frame of it, 0 = never
 };
 
 /* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. Ends with

@@ -164,11 +164,28 @@ void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *
     slot->reason[0] = '\0';
 }
 
+/* No request finds it any more; those that refer to it are refused by the device's thread. */
+static void put_aside(struct spl_service *service, struct spl_catalog_entry *entry)
+{
+    struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, entry->info->id);
+    if (slot && slot->current == entry) {
+        slot->current = NULL;
+        spl_catalog_set_reason(slot, entry->err.message);
+        spl_log_error("dataset %s is put aside: %s", slot->id, entry->err.message);
+        spl_catalog_entry_unref(entry);
+    }
+    spl_catalog_entry_unref(entry);
+}
+
 void spl_library_take_changes(struct spl_service *service)
 {
     for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_change(service->views->pipeline));) {
         if (entry->state == SPL_ENTRY_GONE) {
             close_entry(service, entry);
+            continue;
+        }
+        if (entry->state == SPL_ENTRY_ASIDE) {
+            put_aside(service, entry);
             continue;
         }
         struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, entry->info->id);

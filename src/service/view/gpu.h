@@ -31,6 +31,9 @@ void spl_gpu_tear_down(struct gpu *gpu); /* idempotent; the entries stay */
 /* Takes up what the loop wants added and lets go of what nobody refers to any more. Never blocks. */
 void spl_gpu_take_orders(struct gpu *gpu);
 
+/* Does the renderer know any that is drawn beside `entry`? */
+bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_catalog_entry *entry);
+
 /* The entry whose pages are to be loaded next, or NULL. */
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
 

@@ -177,7 +177,7 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     }
     for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
         next = TAILQ_NEXT(entry, resident);
-        if (!entry->loading && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
+        if (!entry->loading && !entry->aside && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
             return rc;
     }
     spl_gpu_publish_residency(gpu);
@@ -212,6 +212,15 @@ void spl_gpu_take_orders(struct gpu *gpu)
             refuse_entry(gpu, entry, &err);
         }
     }
+}
+
+bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_catalog_entry *entry)
+{
+    struct spl_catalog_entry *other;
+    TAILQ_FOREACH(other, &gpu->entries, resident)
+    if (other != entry && !other->aside)
+        return true;
+    return false;
 }
 
 struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu)

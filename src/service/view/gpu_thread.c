@@ -5,8 +5,9 @@
  * have had alone. Frames of tours have the turns that nobody wants.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets (gpu_datasets.c). More than SPL_GPU_REBUILDS_MAX losses within
- * `rebuild_window_ns` end the process, for its supervisor to decide.
+ * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames it is lost twice within
+ * `aside_window_ns` is put aside, where there are others. More than SPL_GPU_REBUILDS_MAX losses within
+ * `rebuild_window_ns` that are not explained by this end the process, for its supervisor to decide.
  *
  * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
  * lost, K times in all (1 when left out). */
@@ -20,7 +21,8 @@
 #include "render/fault.h"
 #include "service/view/gpu.h"
 
-static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S;
+static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S, aside_window_ns = 600 * SPL_NS_PER_S;
+static const uint64_t behind_turn_ns = 10 * SPL_NS_PER_S;
 static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
@@ -91,6 +93,23 @@ static bool may_rebuild(struct gpu *gpu)
     return allowed;
 }
 
+/* The device was lost in a frame of `entry`, to which the caller has a reference. The second time the dataset is the
+ * fault, and its losses do not count against the device. */
+static void blame(struct gpu *gpu, struct spl_catalog_entry *entry)
+{
+    uint64_t now = spl_now_ns(), before = entry->lost_ns;
+    entry->lost_ns = now;
+    if (entry->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, entry))
+        return;
+    entry->aside = true;
+    entry->err = (struct spl_error){0};
+    spl_fail(&entry->err, SPL_E_DEVICE_LOST,
+             "the device was lost twice within %d minutes while the dataset was drawn; a changed file is tried again",
+             (int)(aside_window_ns / (60 * SPL_NS_PER_S)));
+    gpu->losses = 0;
+    spl_pipeline_report_change(gpu->pipeline, spl_catalog_entry_ref(entry), SPL_ENTRY_ASIDE);
+}
+
 /* Makes a new renderer after a loss; false when the process had better end. */
 static bool recover(struct gpu *gpu, const struct spl_error *why)
 {
@@ -145,6 +164,8 @@ static bool is_over(const struct gpu *gpu, struct spl_job *job)
 
 static int begin(struct gpu *gpu, struct spl_job *job)
 {
+    if (job->entry && job->entry->aside)
+        return spl_fail(&job->err, job->entry->err.code, "%s", job->entry->err.message);
     inject(gpu);
     int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
     if (!rc)
@@ -201,6 +222,14 @@ static void put_aside(struct gpu *gpu, struct spl_job *job)
         spl_turns_add(&gpu->turns, job);
 }
 
+/* Who stands behind others has no deadline, but does not hold them up for longer than a view may take. */
+static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
+{
+    const uint64_t longest = gpu->pipeline->options.turn_ns, now = spl_now_ns(), deadline = job->deadline_ns;
+    uint64_t end = now + (longest ? longest : behind_turn_ns);
+    return job->behind && end < deadline ? end : deadline;
+}
+
 /* Renders a tile of one job and passes it on after the last; false when the thread must end. */
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
@@ -217,14 +246,17 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     if (!rc && !job->steps)
         rc = begin(gpu, job);
     if (!rc)
-        rc = spl_frame_step(job->steps, job->deadline_ns, &more, &job->err);
+        rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
     uint64_t took = spl_now_ns() - clock;
     job->frame_ns += took;
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
     if (rc) {
+        bool lost = err.code == SPL_E_DEVICE_LOST && !(job->entry && job->entry->aside);
+        if (lost && job->entry)
+            blame(gpu, job->entry);
         leave(gpu, job);
-        return err.code != SPL_E_DEVICE_LOST || recover(gpu, &err);
+        return !lost || recover(gpu, &err);
     }
     if (!spl_frame_is_waiting(job->steps))
         follow(&pipeline->turn_ns, took);

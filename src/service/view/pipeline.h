@@ -69,6 +69,7 @@ struct spl_pipeline_options {
     size_t queue, encoders;
     uint64_t samples_max;     /* of large views inside, 0 = four of 256 Mi; a view alone may have more */
     uint64_t frame_bytes_max; /* host memory for the frames of those, 0 = SPL_FRAME_BYTES_MAX; the same */
+    uint64_t turn_ns;         /* a tile of a tour's frame may take so long, for views wait meanwhile; 0 = 10 s */
     struct spl_counters *counters;
     void (*wake)(void *context); /* called from any thread: a job is done, or the state changed */
     void *wake_context;
@@ -103,7 +104,8 @@ int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, stru
 struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline);
 
 /* Makes `entry` resident, page by page between frames. Takes the caller's reference; take_change() gives it back with
- * the entry, which then is SPL_ENTRY_RESIDENT or SPL_ENTRY_REFUSED. From now on the last unref() of the entry, on any
+ * the entry, which then is SPL_ENTRY_RESIDENT or SPL_ENTRY_REFUSED; later, with a reference of its own, maybe as
+ * SPL_ENTRY_ASIDE. From now on the last unref() of the entry, on any
  * thread, sends it here, and take_change() gives it back as SPL_ENTRY_GONE, for the caller to destroy. */
 void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
 

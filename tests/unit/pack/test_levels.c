@@ -11,7 +11,7 @@
 #include "dataset/streams.h"
 #include "pack/tree.h"
 
-enum { groups = 16, parts = 4, count = groups * parts };
+enum { plenty = 1 << 20, groups = 16, parts = 4, count = groups * parts };
 
 static const double usual = 0.1; /* radius of most parts, so of the median */
 
@@ -201,7 +201,7 @@ static void a_surface_is_a_splat_of_its_own_where_inner_nodes_are_drawn_for_good
     for (int kind = 0; kind < 4; kind++) {
         struct made made = make();
         bool for_pruning = kind % 2, step = kind / 2;
-        made.tree.for_pruning = for_pruning;
+        made.tree.pruned_to = for_pruning ? plenty : 0;
         for (int i = 0; i < 2; i++) { /* as much of either */
             made.points.normal[3 * parts + i][2] = step;
             made.points.normal[3 * parts + i][0] = !step;
@@ -226,7 +226,7 @@ static void what_faces_everywhere_comes_to_an_end(void **state)
     (void)state;
     struct made made = make();
     uint64_t random = 5;
-    made.tree.for_pruning = true;
+    made.tree.pruned_to = plenty;
     for (int i = 0; i < count; i++) {
         double normal[3], length = 0;
         for (int c = 0; c < 3; c++) {

@@ -395,6 +395,60 @@ static void planes_end_where_they_meet(void **state)
     free(samples);
 }
 
+/* Where planes meet aslant to their cells, `first` spacings beyond their last points; side 1: in a corner, which is
+ * seen from within, -1: at an edge. The share of the cells before that line that are
+ * there. None lies more than `beyond` spacings
+ * behind it. */
+static double go_on_to_crease(double first, int side, double beyond)
+{
+    enum { across = 60, count = 2 * across * across };
+    const double along[3] = {cos(0.5), sin(0.5), 0}, away[2][3] = {{-sin(0.5), cos(0.5), 0}, {0, 0, 1}};
+    double normals[2][3];
+    struct sample *samples = calloc(count, sizeof *samples);
+    struct scene s;
+    uint64_t random = 3;
+    int cells = 0;
+    for (int i = 0; i < count; i++) {
+        int plane = i >= across * across;
+        double y = i % across + 0.25 + 0.5 * uniform(&random), x = i / across % across + first;
+        samples[i].plane = plane;
+        for (int c = 0; c < 3; c++)
+            samples[i].position[c] = spacing * (y * along[c] + x * away[plane][c]);
+    }
+    for (int c = 0; c < 6; c++)
+        normals[c / 3][c % 3] = (side < 0 ? -1 : 1) * away[1 - c / 3][c % 3];
+    make_sorted(&s, samples, count, (const double(*)[3])normals, 2);
+    give_lines(&s);
+    s.points.eye_count = side != 0; /* panels ask for no more */
+    build(&s, 1);
+    s.points.eye_count = 0;
+    for (int i = 0; i < 4000; i++) {
+        double y = 3 + (across - 6) * (i / 2) / 2000.0, at[3], over[3];
+        for (int c = 0; c < 3; c++) {
+            at[c] = spacing * (y * along[c] + 0.02 * away[i % 2][c]);
+            over[c] = spacing * (y * along[c] - beyond * away[i % 2][c]);
+        }
+        assert_null(find_anywhere(&s, -1, over, 1e-4));
+        cells += find_anywhere(&s, -1, at, 1e-4) != NULL;
+    }
+    done(&s);
+    free(samples);
+    return cells / 4000.0;
+}
+
+/* So that nothing shows between them; but an edge does not stand out of a thing. */
+static void planes_go_on_to_where_they_meet(void **state)
+{
+    (void)state;
+    assert_true(go_on_to_crease(0.4, 1, 1) >= 1);
+    assert_true(go_on_to_crease(1.4, 1, 1) >= 1);
+    assert_true(go_on_to_crease(2.5, 1, 1) < 0.1);
+    double edge = go_on_to_crease(0.4, -1, 0.75), far = go_on_to_crease(1.4, -1, 0.75);
+    double either = go_on_to_crease(1.4, 0, 0.85);
+    print_message("before an edge %.3f of the cells, %.3f far before it; of what is either %.3f\n", edge, far, either);
+    assert_true(edge < 1 && far < 0.8 * edge && either > 0.9);
+}
+
 /* A plaque less than a spacing before a wall: its cells end where its points do. */
 static void a_plaque_ends_before_its_wall(void **state)
 {
@@ -571,6 +625,7 @@ int main(void)
         cmocka_unit_test(colours_are_those_of_the_points),
         cmocka_unit_test(planes_are_kept_apart),
         cmocka_unit_test(planes_end_where_they_meet),
+        cmocka_unit_test(planes_go_on_to_where_they_meet),
         cmocka_unit_test(a_plaque_ends_before_its_wall),
         cmocka_unit_test(few_points_are_discs),
         cmocka_unit_test(small_planes_are_splats_above),

@@ -8,12 +8,18 @@
 #include <cmocka.h>
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "pack/planes/planes.h"
 #include "pack/stage.h"
+#include "pack/wires/sides.h"
 #include "pack/wires/wires.h"
+#include "support/sanitised.h"
 
 enum { most = 6000 };
 
@@ -241,6 +247,49 @@ static void lines_come_by_their_widths(void **state)
     finish(&c);
 }
 
+/* Bytes of memory that this process may still ask for, at most. */
+static void bound_memory(size_t more)
+{
+    unsigned long pages[6];
+    FILE *in = fopen("/proc/self/statm", "r");
+    assert_non_null(in);
+    for (int i = 0; i < 6; i++)
+        assert_int_equal(fscanf(in, "%lu", &pages[i]), 1);
+    fclose(in);
+    const rlim_t most_bytes = pages[5] * (rlim_t)sysconf(_SC_PAGESIZE) + more;
+    assert_int_equal(setrlimit(RLIMIT_DATA, &(struct rlimit){most_bytes, most_bytes}), 0);
+}
+
+/* A scan of nothing but lines: which points lie on them is found in some 100 bytes a vertex, not 2 kB. */
+static void a_scan_of_lines_takes_little_memory(void **state)
+{
+    (void)state;
+    skip_sanitised();
+    enum { vertices = 200000, bytes = 150 };
+    struct cloud c;
+    begin(&c);
+    add(&c, 100.0005, 30, 0, false);
+    add(&c, 100.0005, 31, 0, false);
+    c.wires = (struct spl_wires){.count = vertices, .with_widths = true};
+    c.wires.vertices = calloc(vertices, sizeof *c.wires.vertices);
+    for (uint32_t i = 0; i < vertices; i++)
+        c.wires.vertices[i] = (struct spl_wire_vertex){.position = {1e-3 * i, 0.3 * 1e-3 * i, 0},
+                                                       .radius = 1e-3f,
+                                                       .width = 2.5e-4f,
+                                                       .point = i + 1 < vertices ? 0 : SPL_WIRE_END};
+    struct spl_stage stage = {.threads = 1};
+    pid_t child = fork();
+    if (!child) {
+        bound_memory((size_t)vertices * bytes);
+        int rc = spl_wires_claim(&c.wires, &c.points, 0, &stage, NULL);
+        _exit(rc ? 1 : !c.points.linear[0] || c.points.linear[1] ? 2 : 0);
+    }
+    int status = 0;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(WEXITSTATUS(status), 0);
+    finish(&c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -249,6 +298,7 @@ int main(void)
         cmocka_unit_test(lines_stand_for_the_points_on_them),
         cmocka_unit_test(leaves_keep_to_the_bound),
         cmocka_unit_test(lines_come_by_their_widths),
+        cmocka_unit_test(a_scan_of_lines_takes_little_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

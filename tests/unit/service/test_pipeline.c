@@ -22,12 +22,15 @@ static void no_wake(void *context)
 
 static uint64_t samples_max, frame_bytes_max;
 
+static uint64_t turn_ns; /* of the pipelines that are started */
+
 static struct spl_pipeline *start(size_t queue)
 {
     struct spl_pipeline_options options = {.queue = queue,
                                            .encoders = 2,
                                            .samples_max = samples_max,
                                            .frame_bytes_max = frame_bytes_max,
+                                           .turn_ns = turn_ns,
                                            .counters = &counters,
                                            .wake = no_wake};
     struct spl_pipeline *pipeline = NULL;
@@ -227,6 +230,47 @@ static void a_loss_between_tiles_ends_the_large_view_too(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
+static void a_view_ends_within_its_tile_when_nobody_waits(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "30000", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *left = make_job(60000);
+    assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
+    usleep(20000); // it has begun, or ends before it begins
+    spl_cancel_set(&left->dropped);
+    assert_ptr_equal(take(pipeline), left);
+    assert_int_equal(left->err.code, SPL_E_CANCELLED);
+    assert_true(spl_now_ns() - left->accepted_ns < 20 * SPL_NS_PER_S);
+    assert_int_equal(counters.frames, 0);
+    spl_job_destroy(left);
+    unsetenv("FAKE_FRAME_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
+/* Of a tour: it has no deadline, but no tile of it keeps views waiting without end. */
+static void a_tile_behind_is_given_up(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "30000", 1);
+    turn_ns = 30 * SPL_NS_PER_MS;
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_job *behind = make_job(10000), *view = make_job(200);
+    behind->behind = true;
+    behind->deadline_ns = SPL_NEVER;
+    assert_int_equal(spl_pipeline_submit(pipeline, behind, NULL), 0);
+    assert_ptr_equal(take(pipeline), behind);
+    assert_int_equal(behind->err.code, SPL_E_TIMEOUT);
+    assert_int_equal(spl_pipeline_submit(pipeline, view, NULL), 0); // has all of its time
+    assert_ptr_equal(take(pipeline), view);
+    assert_true(spl_now_ns() - view->accepted_ns >= 200 * SPL_NS_PER_MS);
+    spl_job_destroy(behind);
+    spl_job_destroy(view);
+    turn_ns = 0;
+    unsetenv("FAKE_FRAME_MS");
+    spl_pipeline_destroy(pipeline);
+}
+
 /* Of a tour; the next start makes it. */
 static void a_frame_behind_does_not_hold_up_the_end(void **state)
 {
@@ -422,6 +466,64 @@ static struct spl_catalog_entry *take_change(struct spl_pipeline *pipeline)
     return entry;
 }
 
+static void wait_until_ready(struct spl_pipeline *pipeline, uint64_t losses)
+{
+    while (counters.device_losses < losses || spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY)
+        usleep(500);
+}
+
+/* A view of the entry, or of none. */
+static int view_of(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
+{
+    struct spl_job *job = make_job(10000);
+    job->entry = entry ? spl_catalog_entry_ref(entry) : NULL;
+    job->dataset = entry ? entry->dataset : NULL;
+    assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0);
+    assert_ptr_equal(take(pipeline), job);
+    int code = job->err.code;
+    spl_job_destroy(job);
+    return code;
+}
+
+/* The second time, where there are others; its frames cost no device any more, and it goes like any other. */
+static void what_costs_the_device_twice_is_put_aside(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x4", 1);
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
+    spl_pipeline_add(pipeline, entry);
+    assert_ptr_equal(take_change(pipeline), entry);
+    uint64_t losses = 0;
+    for (int i = 0; i < 3; i++) { // alone it stays, however often
+        assert_int_equal(view_of(pipeline, NULL), 0);
+        assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST);
+        wait_until_ready(pipeline, ++losses);
+        assert_null(spl_pipeline_take_change(pipeline));
+    }
+    spl_pipeline_add(pipeline, other);
+    assert_ptr_equal(take_change(pipeline), other);
+    assert_int_equal(view_of(pipeline, other), 0);
+    assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST);
+    assert_ptr_equal(take_change(pipeline), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_ASIDE);
+    assert_non_null(strstr(entry->err.message, "lost twice"));
+    wait_until_ready(pipeline, ++losses); // the fourth: it is no longer the device's
+    assert_int_equal(view_of(pipeline, other), 0);
+    assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST); // is refused
+    assert_int_equal(counters.device_losses, losses);
+    assert_int_equal(spl_pipeline_get_state(pipeline), SPL_PIPELINE_READY);
+    spl_catalog_entry_unref(entry);
+    assert_null(spl_pipeline_take_change(pipeline));
+    spl_catalog_entry_unref(entry); // that of the change
+    assert_ptr_equal(take_change(pipeline), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_GONE);
+    spl_catalog_entry_destroy(entry);
+    spl_catalog_entry_unref(other);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_pipeline_destroy(pipeline);
+}
+
 static void versions_come_and_go_while_the_device_is_lost(void **state)
 {
     (void)state;
@@ -488,6 +590,9 @@ int main(void)
         cmocka_unit_test(views_that_wait_for_pages_end),
         cmocka_unit_test(what_was_read_is_uploaded_without_rests),
         cmocka_unit_test(a_full_queue_refuses),
+        cmocka_unit_test(what_costs_the_device_twice_is_put_aside),
+        cmocka_unit_test(a_view_ends_within_its_tile_when_nobody_waits),
+        cmocka_unit_test(a_tile_behind_is_given_up),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
         cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
