@@ -44,8 +44,8 @@ static void match_from_every_side(void **state)
     }
 }
 
-/* Cells as large as half the image, the eye among them: windows, and panels that reach the near plane. Not of fill,
- * whose filter has tests of its own. */
+/* Cells as large as half the image, the eye among them: windows, and panels that reach the near plane; planes near and
+ * far go through the middle of some. Not of fill, whose filter has tests of its own. */
 static void around_the_eye_they_match(void **state)
 {
     const struct kind *kind = *state;
@@ -55,9 +55,25 @@ static void around_the_eye_they_match(void **state)
         struct spl_view view = looking(origin, 0.1 + uniform(), 400, 240);
         view.camera.cx += 31.7;
         view.camera.fy *= 1.2;
+        view.camera.near = seed % 2 ? view.camera.near : 0.4;
+        view.camera.far = seed % 2 ? 0.9 : view.camera.far;
         same_of_all(dataset, &view, "among them");
         done(dataset);
     }
+}
+
+/* Heights of several times their panel's width, each view of a part of them. */
+static void what_stands_out_is_found(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_panels(4, 0, origin, 0.01, 60);
+    for (int k = 0; k < 12; k++) {
+        struct spl_view view = looking(origin, 1, 64, 48);
+        look(&view, (double[]){0.2, -4, 0.3}, (double[]){2 * uniform() - 1, 0, 2 * uniform() - 1});
+        assert_int_equal(spl_camera_set_fov(&view.camera, 6, 64, 48, NULL), SPL_OK);
+        same_of(dataset, &view, SPL_METHOD_NEAREST, "a part of what stands out");
+    }
+    done(dataset);
 }
 
 /* The height over cell (x, y)'s middle, in doubles, and how the surface rises there: by the weights of its triangle's
@@ -326,6 +342,7 @@ int main(int argc, char **argv)
         OF_BOTH(cells_are_discs_on_the_surface),
         OF_BOTH(forged_words_match),
         OF_BOTH(tiles_leave_no_seams),
+        frames_test(what_stands_out_is_found),
         frames_test(flat_meshes_are_panels),
     };
     return frames_run(argc, argv, "panel-kinds", tests, sizeof tests / sizeof *tests);

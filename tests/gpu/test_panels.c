@@ -72,6 +72,14 @@ static void maps_colour_and_trim_panels(void **state)
     }
 }
 
+/* 15 mm more than the wall lies from the station, straight ahead. */
+static void look_behind(const struct make_map *map, const double d[3], double color[3], double *range)
+{
+    (void)map, (void)d;
+    color[0] = color[1] = color[2] = 100;
+    *range = 2.015;
+}
+
 /* A wall of whole panels on the plane of `normal` through the origin, `across` a side, cells of `cell` metres and one
  * colour; `hole` of its cells across and up from the middle are not there. */
 static struct spl_dataset *make_wall(const float normal[3], unsigned across, double cell, int hole)
@@ -170,6 +178,69 @@ static void a_wall_is_closed_and_its_hole_open(void **state)
             spl_frame_finish(&frame);
             done(dataset);
         }
+}
+
+/* What lies as little before a station's ranges as its cells are wide was not seen through. */
+static void a_station_sees_through_no_cell(void **state)
+{
+    (void)state;
+    struct spl_dataset *plain = make_wall((float[]){0, -1, 0}, 2, 0.05, 0);
+    struct make_map map = {.row = mapped_row((double[]){0, -2, 0}, 0.3, 64, 1, 64), .look = look_behind};
+    map.row.slack = 0.001f;
+    struct spl_dataset *dataset = make_mapped_alike(plain, &map, 1, true);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int method = 0; method < 2; method++) {
+        struct spl_view view = looking(origin, 1, 100, 75);
+        view.method = drawing[method];
+        look(&view, (double[]){0.1, -1, 0.05}, origin);
+        struct spl_frame with = render(dataset, &view), without = render(plain, &view);
+        struct tally t = compare(&with, &without);
+        assert_true(t.covered_differs == 0 && t.color_differs > 1000);
+        spl_frame_finish(&with);
+        spl_frame_finish(&without);
+    }
+    done(dataset);
+    done(plain);
+}
+
+/* Planes near and far cut a wall where they are, and leave all of it between them. */
+static void a_wall_is_whole_between_near_and_far(void **state)
+{
+    (void)state;
+    enum { across = 4, width = 100, height = 75 };
+    const float normal[3] = {0, -1, 0};
+    const double half = side * across / 2 - 0.1; /* cells */
+    struct spl_dataset *dataset = make_wall(normal, across, 0.05, 0);
+    uint64_t chunks;
+    struct spl_panel_frame plane;
+    spl_panels_get_frame(spl_dataset_get_chunks(dataset, &chunks), &plane);
+    size_t seen = 0, before = 0, beyond = 0;
+    for (int k = 0; k < 24; k++) {
+        struct spl_view view = looking(origin, 1, width, height);
+        view.method = drawing[k % 2];
+        view.lod = 0;
+        look(&view, (double[]){4 * uniform() - 2, -0.1 - uniform(), 4 * uniform() - 2}, origin);
+        view.camera.near = 0.3 + uniform();
+        view.camera.far = view.camera.near + 0.2 + uniform();
+        struct spl_frame frame = render(dataset, &view);
+        const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+        for (int i = 0; i < width * height; i++) {
+            double at[2], z = meet(&view.camera, &plane, i % width, i / width, at);
+            if (!(z > 0 && fabs(at[0]) < half && fabs(at[1]) < half))
+                continue;
+            bool is = !isnan(depth[i]), in = z > 1.001 * view.camera.near && z < 0.999 * view.camera.far;
+            bool out = z < 0.95 * view.camera.near || z > 1.05 * view.camera.far; /* cells of their own reach farther */
+            if ((in && !is) || (out && is))
+                fail_msg("%s, view %d: a sample %g m away is %s", spl_method_name(view.method), k, z,
+                         is ? "there" : "empty");
+            seen += in;
+            before += z < view.camera.near;
+            beyond += z > view.camera.far;
+        }
+        spl_frame_finish(&frame);
+    }
+    assert_true(seen > 10000 && before > 1000 && beyond > 1000);
+    done(dataset);
 }
 
 /* Far away on a floor, where a sample holds the depths of many panels, its depth is that at its middle, and not that of
@@ -412,6 +483,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         frames_test(maps_colour_and_trim_panels),
         frames_test(a_wall_is_closed_and_its_hole_open),
+        frames_test(a_station_sees_through_no_cell),
+        frames_test(a_wall_is_whole_between_near_and_far),
         frames_test(a_floor_at_a_slant_is_where_it_is),
         frames_test(planes_along_their_edge_are_lines),
         frames_test(a_cell_far_away_does_not_vanish),
