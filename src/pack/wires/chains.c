@@ -243,7 +243,7 @@ int spl_wires_find(struct spl_wires *wires, struct spl_points *points, const str
     if (!rc && options)
         rc = spl_wires_find_axes(g.points, (uint32_t)g.count, options->noise, &cutting, err);
     if (!rc && options)
-        rc = spl_wires_drop_thick(g.points, (uint32_t)g.count, &cutting, err);
+        rc = spl_wires_drop_thick(g.points, (uint32_t)g.count, points->up, &cutting, err);
     if (!rc && options)
         unmark(&g, points);
     if (!rc)

@@ -14,7 +14,7 @@
 #include "pack/planes/planes.h"
 #include "pack/wires/grid.h"
 
-static const double upright = 0.7;    /* share of a chain's length that it rises */
+static const double upright = 0.94;   /* cosine: what stands within 20 degrees of up; guys and stays lean more */
 static const double around = 1.5;     /* spacings within which others are looked for */
 static const double aside = 0.5;      /* spacings off the chain from which on they are beside it */
 enum { beside_least = 2, looks_most = 64, every = 4096 };
@@ -49,7 +49,7 @@ static bool is_accompanied(const struct spl_wires_grid *grid, const struct spl_w
     return beside >= beside_least;
 }
 
-int spl_wires_drop_thick(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work,
+int spl_wires_drop_thick(struct spl_wire_point *points, uint32_t count, const double up[3], struct spl_wires_work *work,
                          struct spl_error *err)
 {
     struct spl_wires_grid grid = {.edge = count ? around * median_spacing(points, count) : 1};
@@ -72,7 +72,7 @@ int spl_wires_drop_thick(struct spl_wire_point *points, uint32_t count, struct s
         }
         for (int c = 0; c < 3; c++)
             axis[c] /= sqrt(length);
-        bool stands = fabs(axis[2]) >= upright;
+        bool stands = fabs(axis[0] * up[0] + axis[1] * up[1] + axis[2] * up[2]) >= upright;
         for (uint32_t pass = 0; pass < 2; pass++)
             for (uint32_t before = SPL_WIRE_END, at = i; at != SPL_WIRE_END;) {
                 uint32_t next = points[at].next[before != SPL_WIRE_END && points[at].next[0] == before];

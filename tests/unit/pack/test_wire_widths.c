@@ -39,6 +39,7 @@ static void begin(struct cloud *c)
     p->normal = calloc(most, sizeof *p->normal);
     p->radius = calloc(most, sizeof *p->radius);
     p->linear = calloc(most, 1);
+    p->up[2] = 1;
 }
 
 static double uniform(struct cloud *c)
@@ -158,6 +159,29 @@ static void what_is_no_wire_is_no_line(void **state)
         }
         find(&c, 0.001, 0);
         assert_true(count_linear(&c) <= 12 && c.wires.piece_count <= 8); /* scraps */
+        finish(&c);
+    }
+}
+
+/* What leans 15 degrees from up, whichever axis that is, is a pole; a guy leans more. */
+static void a_guy_is_a_line_and_a_pole_is_none(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 6; kind++) {
+        const double lean = (const double[]){15, 25, 60}[kind % 3] * M_PI / 180;
+        const bool x_up = kind / 3;
+        struct cloud c;
+        begin(&c);
+        c.points.up[0] = x_up;
+        c.points.up[2] = !x_up;
+        for (int i = 0; i < 400; i++) {
+            double along = 0.05 * i + 0.02 * uniform(&c), rises = along * cos(lean), leans = along * sin(lean);
+            add(&c, x_up ? rises : leans, 0, x_up ? leans : rises, true);
+        }
+        find(&c, 0.001, 0);
+        size_t linear = count_linear(&c);
+        if (kind % 3 ? linear < 390 : linear > 12)
+            fail_msg("%g degrees from up, %s: %zu points of 400 on lines", lean * 180 / M_PI, x_up ? "x" : "z", linear);
         finish(&c);
     }
 }
@@ -295,6 +319,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(widths_are_those_of_the_wires),
         cmocka_unit_test(what_is_no_wire_is_no_line),
+        cmocka_unit_test(a_guy_is_a_line_and_a_pole_is_none),
         cmocka_unit_test(lines_stand_for_the_points_on_them),
         cmocka_unit_test(leaves_keep_to_the_bound),
         cmocka_unit_test(lines_come_by_their_widths),
