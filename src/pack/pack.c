@@ -3,6 +3,7 @@
  * Runs on the caller's thread. */
 #include <splatd/pack.h>
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,6 +88,21 @@ static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct s
     return rc;
 }
 
+/* The dataset is written by now. */
+static int write_drawing(const struct spl_pack_options *options, const struct spl_build_outputs *out,
+                         struct spl_error *err)
+{
+    struct spl_error why = {0};
+    const char *path = options->export_primitives;
+    int rc = spl_file_replace(path, out->drawing, out->drawing_length, &why);
+    if (!rc && spl_file_sync_folder(path))
+        rc = spl_fail_errno(&why, errno, "cannot bring '%s' to disk", path);
+    return rc ? spl_fail_field(err, rc, "export-primitives",
+                               "%s; the dataset '%s' is written, and a drawing there is an older one", why.message,
+                               options->output)
+              : SPL_OK;
+}
+
 static int pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
     if (options->points_only && options->photos)
@@ -134,7 +150,7 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                  ? pack_passes(&p, &inputs, &out, report, err)
                  : spl_build(&found, &inputs, NULL, &out, &stage, report, err);
     if (!rc && out.drawing)
-        rc = spl_file_replace(found.export_primitives, out.drawing, out.drawing_length, err);
+        rc = write_drawing(&found, &out, err);
     if (!rc && report)
         report->drawing = out.drawn;
     free(out.drawing);

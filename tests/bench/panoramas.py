@@ -84,7 +84,7 @@ def measure(title, scan, pictures, views, truth, o, folder):
     for name, options in PACKED:
         if ("PICTURES" in options and not pictures) or ("--no-panoramas" not in options and o.only not in name):
             continue
-        share, dataset = share_of(name), folder / (name.replace(", 1/", "-").replace(" ", "-") + ".spld")
+        share, dataset = share_of(name), folder / (name.replace(", 1/", "-").replace(", ", "-").replace(" ", "-") + ".spld")
         if not dataset.exists():
             words = {"PICTURES": pictures}
             if "SHARE" in options:

@@ -565,6 +565,13 @@ static int teardown(void **state)
     return rmdir(folder);
 }
 
+/* A folder, made once work has begun, where a file was to be. */
+static void take_the_place(void *context, const struct spl_progress *progress)
+{
+    (void)progress;
+    mkdir(context, 0700);
+}
+
 /* Planes are written beside the dataset; a place or a kind that cannot be is known before work begins. */
 static void test_primitives_are_exported(void **state)
 {
@@ -615,6 +622,14 @@ static void test_primitives_are_exported(void **state)
     fclose(in);
     assert_int_equal(faces, 1);
     unlink(options.export_primitives);
+    options.progress = take_the_place; /* the drawing comes last, and says that the dataset stands */
+    options.progress_context = (void *)options.export_primitives;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_IO);
+    assert_string_equal(err.field, "export-primitives");
+    assert_non_null(strstr(err.message, "flat.spld' is written"));
+    rmdir(options.export_primitives);
+    assert_int_equal(files_in_folder(), before + 1);
     unlink(input);
     unlink(output);
     free(input);
