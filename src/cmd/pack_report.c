@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/array.h"
 #include "cmd/output.h"
@@ -99,6 +100,9 @@ void spl_cmd_pack_print(const char *output, const char *drawing, const struct sp
         fprintf(stderr, "colours of %u of these stations are those of --maps\n", r->maps.edited);
     if (drawing)
         print_drawing(drawing, &r->drawing);
+    struct stat file;
+    if (!stat(output, &file))
+        fprintf(stderr, "%.2f MB in ", (double)file.st_size / 1e6);
     fprintf(stderr, "%.1f s, %.0f points/s\n", r->seconds, (double)r->points_read / r->seconds);
 }
 

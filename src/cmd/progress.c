@@ -11,6 +11,8 @@
 #include "base/clock.h"
 #include "base/text.h"
 
+static const double least_share = 0.01; /* of a stage, before which nothing is said of how long it takes */
+
 /* "950", "1.2 k", "34 M": two or three digits. */
 static const char *scaled(double value, char text[16])
 {
@@ -59,8 +61,12 @@ static void print_line(const struct spl_cmd_progress *state, const struct spl_pr
     fprintf(stderr, "%s", state->stage);
     if (p->total)
         fprintf(stderr, "  %3.0f %%", floor(100.0 * fmin((double)p->done / (double)p->total, 1)));
-    if (p->rate > 0 && p->unit)
+    if (p->rate >= 1 && p->unit)
         fprintf(stderr, "  %s %s/s", scaled(p->rate, text), p->unit);
+    else if (p->rate > 0 && p->unit)
+        fprintf(stderr, "  %s s a %.*s", scaled(1 / p->rate, text), (int)strlen(p->unit) - 1, p->unit);
+    if (p->total && (double)p->done < least_share * (double)p->total)
+        return; /* the rate of the first few says nothing of the rest */
     if (p->rate > 0 && p->total > p->done)
         fprintf(stderr, "  %s left", rough((double)(p->total - p->done) / p->rate, text));
     if (p->left_s > 0)

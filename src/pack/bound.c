@@ -64,12 +64,12 @@ const char *spl_bound_find_doubt(const struct spl_bound *bound, const struct spl
     if (bound->error > wide * planes->own_bound)
         snprintf(text, SPL_BOUND_TEXT_MAX,
                  "--error %s is how far points may lie off their plane, mesh or line, so things up to that thick are "
-                 "one: the scan's noise is %s, and without --error the bound were at most %s",
+                 "one: the scan's noise is %s, and without --error the bound would be at most %s",
                  chosen, noise, own);
     else if (bound->error < noise_sigmas * planes->noise)
         snprintf(text, SPL_BOUND_TEXT_MAX,
                  "--error %s is how far points may lie off their plane, mesh or line, and the scan's noise is %s "
-                 "(sigma): many points of walls lie farther off and stay splats; without --error the bound were at "
+                 "(sigma): many points of walls lie farther off and stay splats; without --error the bound would be at "
                  "most %s",
                  chosen, noise, own);
     else

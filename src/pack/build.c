@@ -164,6 +164,10 @@ static int export_primitives(struct spl_build *p, struct spl_build_outputs *out,
 {
     if (!p->options->export_primitives)
         return 0;
+    if (p->options->warn && p->planes.count && !p->sides_known)
+        p->options->warn(p->options->progress_context,
+                         "no scan says where it was taken from, so which side of a plane is its front is guessed: in the "
+                         "drawing the ceiling of a room can be a floor");
     return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
                                  p->stage, &out->drawing, &out->drawing_length, &out->drawn, err);
 }
@@ -234,6 +238,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_stage_check(stage, err);
     if (!rc && options->warn)
         spl_scans_compare(&p.scans, options->warn, options->progress_context);
+    p.sides_known = p.points.normal || p.points.station_count || p.points.eye_count;
     if (!rc)
         rc = spl_points_order(&p.points, stage, err);
     if (!rc)

@@ -22,6 +22,7 @@ struct spl_build {
     struct spl_system system;
     const char *up_from; /* static; NULL: z is up, because nobody says otherwise */
     struct spl_points points;
+    bool sides_known; /* scans say their stations or normals, or cameras stood somewhere; else sides are guessed */
     struct spl_planes planes; /* none unless options->primitives */
     struct spl_wires wires;
     struct spl_panel_maker panels;

@@ -12,6 +12,9 @@
 #include "pack/export/simplify.h"
 
 static const double noise_sigmas = 4, spacing_share = 0.2; /* that vertices may be off a line, as of planes */
+/* How much lower a wire hangs on both sides of a support: tolerances as above, and a share of its length. */
+static const double zigzag = 3, dip_share = 0.002;
+static const double text_share = 0.002; /* of the scan's diagonal */
 static const double stands = 0.5; /* level part of a chord, of the whole, below which a line stands */
 
 struct outlining {
@@ -140,12 +143,17 @@ static int outline_all(struct spl_shapes *shapes, const struct spl_points *point
     return rc;
 }
 
+static double distance(const double a[3], const double b[3])
+{
+    return hypot(hypot(b[0] - a[0], b[1] - a[1]), b[2] - a[2]);
+}
+
 static void measure_line(const struct spl_shapes *shapes, struct spl_shape_line *line, const double up[3])
 {
     const double(*v)[3] = (const double(*)[3])shapes->vertices + line->first;
     double chord[3], level[3], rise = 0, across = 0, whole = 0;
     for (size_t i = 1; i < line->count; i++)
-        line->length += hypot(hypot(v[i][0] - v[i - 1][0], v[i][1] - v[i - 1][1]), v[i][2] - v[i - 1][2]);
+        line->length += distance(v[i - 1], v[i]);
     for (int c = 0; c < 3; c++) {
         chord[c] = v[line->count - 1][c] - v[0][c];
         rise += chord[c] * up[c];
@@ -174,9 +182,64 @@ static double line_tolerance(const double (*v)[3], size_t count, const struct sp
 {
     double length = 0;
     for (size_t i = 1; i < count; i++)
-        length += hypot(hypot(v[i][0] - v[i - 1][0], v[i][1] - v[i - 1][1]), v[i][2] - v[i - 1][2]);
+        length += distance(v[i - 1], v[i]);
     double off = fmax(noise_sigmas * planes->noise, count > 1 ? spacing_share * length / (double)(count - 1) : 0);
     return planes->bound > 0 ? fmin(off, planes->bound) : off;
+}
+
+static int add_line(struct spl_shapes *shapes, size_t first, size_t last, const double up[3], struct spl_error *err)
+{
+    struct spl_shape_line line = {.first = first, .count = last - first + 1};
+    int rc = spl_array_reserve(shapes->lines, shapes->line_capacity, shapes->line_count + 1, err);
+    if (rc)
+        return rc;
+    measure_line(shapes, &line, up);
+    shapes->lines[shapes->line_count++] = line;
+    return SPL_OK;
+}
+
+static double height_of(const double at[3], const double up[3])
+{
+    return at[0] * up[0] + at[1] * up[1] + at[2] * up[2];
+}
+
+/* Lines from vertex `first` to the last: one for each span. A wire hangs, so it bends upwards nowhere but at supports:
+ * it is cut where it is highest above the way from its one end to the other, between places on both sides that lie
+ * lower by more than it may zigzag. */
+static int add_spans(struct spl_shapes *shapes, size_t first, double tolerance, const double up[3],
+                     struct spl_error *err)
+{
+    const double(*v)[3] = (const double(*)[3])shapes->vertices;
+    const size_t last = shapes->vertex_count - 1;
+    double length = 0, along = 0, most = -INFINITY, least = INFINITY;
+    size_t begin = first, highest = first;
+    bool hung = false; /* it has been lower, since the last support */
+    for (size_t i = first + 1; i <= last; i++)
+        length += distance(v[i - 1], v[i]);
+    const double dip = zigzag * tolerance + dip_share * length;
+    const double slope = length > 0 ? (height_of(v[last], up) - height_of(v[first], up)) / length : 0;
+    for (size_t i = first; i <= last; i++) {
+        along += i > first ? distance(v[i - 1], v[i]) : 0;
+        double height = height_of(v[i], up) - slope * along;
+        if (!hung && height > least + dip) {
+            hung = true;
+            most = -INFINITY;
+        }
+        if (hung && height < most - dip) {
+            int rc = add_line(shapes, begin, highest, up, err);
+            if (rc)
+                return rc;
+            begin = highest;
+            hung = false;
+            least = height;
+        }
+        least = fmin(least, height);
+        if (height > most) {
+            most = height;
+            highest = i;
+        }
+    }
+    return last > begin ? add_line(shapes, begin, last, up, err) : SPL_OK;
 }
 
 static int add_lines(struct spl_shapes *shapes, const struct spl_wires *wires, const struct spl_planes *planes,
@@ -192,20 +255,14 @@ static int add_lines(struct spl_shapes *shapes, const struct spl_wires *wires, c
         memcpy(all[i], wires->vertices[i].position, sizeof *all);
         if (wires->vertices[i].point != SPL_WIRE_END)
             continue;
-        struct spl_shape_line line = {.first = shapes->vertex_count};
-        const double(*own)[3] = (const double(*)[3])all + begin;
-        line.count = spl_simplify(own, i + 1 - begin, false, line_tolerance(own, i + 1 - begin, planes), kept, stack);
+        const double(*own)[3] = (const double(*)[3])all + begin, tolerance = line_tolerance(own, i + 1 - begin, planes);
+        size_t first = shapes->vertex_count;
+        spl_simplify(own, i + 1 - begin, false, tolerance, kept, stack);
         for (size_t k = 0; k <= i - begin; k++)
             if (kept[k])
                 memcpy(shapes->vertices[shapes->vertex_count++], all[begin + k], sizeof *all);
         begin = i + 1;
-        if (line.count < 2)
-            continue;
-        rc = spl_array_reserve(shapes->lines, shapes->line_capacity, shapes->line_count + 1, err);
-        if (rc)
-            break;
-        measure_line(shapes, &line, up);
-        shapes->lines[shapes->line_count++] = line;
+        rc = add_spans(shapes, first, tolerance, up, err);
     }
     free(all);
     free(kept);
@@ -220,6 +277,10 @@ int spl_shapes_init(struct spl_shapes *shapes, const struct spl_points *points, 
     double places = planes->bound > 0 ? ceil(-log10(fine * planes->bound)) : 6;
     *shapes = (struct spl_shapes){.decimals = (unsigned)fmin(12, fmax(3, places))};
     memcpy(shapes->up, points->up, sizeof shapes->up);
+    double diagonal = 0;
+    for (int c = 0; c < 3; c++)
+        diagonal = hypot(diagonal, points->bounds_max[c] - points->bounds_min[c]);
+    shapes->text_height = fmax(text_share * diagonal, pow(10, -(double)shapes->decimals));
     spl_stage_begin(stage, "outlines", "points", points->count);
     int rc = outline_all(shapes, points, planes, stage, err);
     if (!rc)

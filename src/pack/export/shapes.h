@@ -14,6 +14,7 @@ struct spl_shape_plane {
     struct spl_outline outline;
 };
 
+/* From an end of a wire, or a support, to the next. */
 struct spl_shape_line {
     size_t first, count; /* vertices, 2 at least */
     double length;
@@ -39,7 +40,8 @@ struct spl_shapes {
     double (*vertices)[3]; /* of lines, world */
     size_t vertex_count, vertex_capacity;
     double up[3];
-    unsigned decimals; /* of lengths, that say more than the points do */
+    double text_height; /* of all texts: 2 mm for each metre of the scan's diagonal */
+    unsigned decimals;  /* of lengths, that say more than the points do */
 };
 
 /* Planes of points->plane with the outlines of their members, simplified by no more than a plane's own points are off

@@ -39,13 +39,13 @@ static void end_polyline(const char *layer, FILE *out)
     put_pair(out, 8, layer);
 }
 
-static void put_text(const struct spl_shapes *s, const char *layer, const double at[3], double height, const char *text,
+static void put_text(const struct spl_shapes *s, const char *layer, const double at[3], const char *text,
                      FILE *out)
 {
     put_pair(out, 0, "TEXT");
     put_pair(out, 8, layer);
     put_place(s, at, out);
-    fprintf(out, " 40\n%.*f\n", (int)s->decimals, height);
+    fprintf(out, " 40\n%.*f\n", (int)s->decimals, s->text_height);
     put_pair(out, 1, text);
 }
 
@@ -83,7 +83,7 @@ static void put_plane(const struct spl_shapes *s, uint32_t k, FILE *out)
     }
     snprintf(text, sizeof text, "plane_%u area %.*f inclination %.4f error %.*f max %.*f", k, (int)s->decimals, p->area,
              p->inclination, (int)s->decimals, p->plane->error_rms, (int)s->decimals, p->plane->error_max);
-    put_text(s, "PLANES_TEXT", p->plane->origin, fmax(0.02 * sqrt(p->area), pow(10, -(double)s->decimals)), text, out);
+    put_text(s, "PLANES_TEXT", p->plane->origin, text, out);
 }
 
 static void put_line(const struct spl_shapes *s, size_t k, FILE *out)
@@ -97,8 +97,7 @@ static void put_line(const struct spl_shapes *s, size_t k, FILE *out)
     int length = snprintf(text, sizeof text, "line_%zu length %.*f", k, (int)s->decimals, line->length);
     if (line->sag >= 0)
         snprintf(text + length, sizeof text - (size_t)length, " sag %.*f", (int)s->decimals, line->sag);
-    put_text(s, "LINES_TEXT", s->vertices[line->first + line->count / 2],
-             fmax(0.01 * line->length, pow(10, -(double)s->decimals)), text, out);
+    put_text(s, "LINES_TEXT", s->vertices[line->first + line->count / 2], text, out);
 }
 
 static void put_mesh(const struct spl_shapes *s, uint32_t k, FILE *out)
@@ -115,7 +114,7 @@ static void put_mesh(const struct spl_shapes *s, uint32_t k, FILE *out)
     }
     snprintf(text, sizeof text, "mesh_%u area %.*f error %.*f max %.*f", k, (int)s->decimals, m->area, (int)s->decimals,
              m->plane->error_rms, (int)s->decimals, m->plane->error_max);
-    put_text(s, "MESHES_TEXT", m->plane->origin, fmax(0.02 * sqrt(m->area), pow(10, -(double)s->decimals)), text, out);
+    put_text(s, "MESHES_TEXT", m->plane->origin, text, out);
 }
 
 void spl_shapes_write_dxf(const struct spl_shapes *s, const char *unit, FILE *out)

@@ -572,6 +572,11 @@ static void take_the_place(void *context, const struct spl_progress *progress)
     mkdir(context, 0700);
 }
 
+static void count_guesses(void *context, const char *text)
+{
+    *(int *)context += !!strstr(text, "which side of a plane is its front is guessed");
+}
+
 /* Planes are written beside the dataset; a place or a kind that cannot be is known before work begins. */
 static void test_primitives_are_exported(void **state)
 {
@@ -613,7 +618,12 @@ static void test_primitives_are_exported(void **state)
     assert_int_equal(files_in_folder(), before);
     options.progress = NULL;
     options.cancel = NULL;
+    int guesses = 0; /* a PLY without normals says nothing of sides */
+    options.warn = count_guesses;
+    options.progress_context = &guesses;
     assert_int_equal(spl_pack(&options, NULL, &err), 0);
+    assert_int_equal(guesses, 1);
+    options.warn = NULL;
     assert_int_equal(files_in_folder(), before + 2);
     FILE *in = fopen(options.export_primitives, "r");
     assert_non_null(in);
