@@ -554,35 +554,6 @@ static void check_wires(const struct drawing *d, const double offset[3])
                 fabs(end[2] - offset[2] - 7) < 1e-6);
 }
 
-/* A wire over supports at x = 20, 41 and 60, each a little higher than the last, from the middle of a span on: a line a
- * span, each with its own sag. What only zigzags by as much as noise does is one line. */
-static void test_spans_are_lines(void **state)
-{
-    (void)state;
-    static const double ends[] = {10, 20, 41, 60}, sag = 0.5;
-    struct scan *s = calloc(1, sizeof *s);
-    struct spl_shapes shapes;
-    struct spl_stage stage = quiet_stage(1);
-    for (int i = 0; i <= 300; i++) {
-        int k = i < 300 ? i / 100 : 2;
-        double t = i / 100.0 - k, whole = k ? t : 0.5 + 0.5 * t; /* the first span is half of one */
-        add_vertex(s, ends[k] + (ends[k + 1] - ends[k]) * t, 0, 5 + k + whole - 4 * sag * whole * (1 - whole), i == 300);
-    }
-    for (int i = 0; i <= 400; i++)
-        add_vertex(s, 0.1 * i, 3, 0.02 * (i % 2), i == 400);
-    s->points.up[2] = 1;
-    assert_int_equal(spl_shapes_init(&shapes, &s->points, &s->planes, &s->wires, &stage, NULL), 0);
-    assert_int_equal(shapes.line_count, 4);
-    for (size_t k = 0; k < 4; k++) {
-        const struct spl_shape_line *line = &shapes.lines[k];
-        assert_true(k == 3 || fabs(shapes.vertices[line->first + line->count - 1][0] - ends[k + 1]) < 1e-9);
-        assert_true(k == 0 || k == 3 || line->first == line[-1].first + line[-1].count - 1);
-        assert_true(fabs(line->sag - (k == 0 ? sag / 4 : k == 3 ? 0 : sag)) < 0.03);
-    }
-    spl_shapes_finish(&shapes);
-    finish(s);
-}
-
 static size_t count_lines(const char *path, const char *begin)
 {
     char row[65536];
@@ -814,7 +785,6 @@ int main(void)
         cmocka_unit_test(test_outline_keeps_holes_and_islands),
         cmocka_unit_test(test_outline_of_many_holes),
         cmocka_unit_test(test_outline_of_next_to_nothing),
-        cmocka_unit_test(test_spans_are_lines),
         cmocka_unit_test(test_formats_agree),
         cmocka_unit_test(test_threads_agree),
         cmocka_unit_test(test_meshes),
