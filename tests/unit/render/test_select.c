@@ -9,6 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "cameras.h"
 #include "dataset/chunk.h"
 #include "render/select.h"
 #include "support/make_dataset.h"
@@ -85,27 +86,6 @@ static struct spl_dataset *make_clumps(double odd)
     struct spl_dataset *dataset = make_dataset_levels(all, splats, 2);
     free(all);
     return dataset;
-}
-
-/* Around the cube, within it, beside it, with lenses of every length. */
-static struct spl_camera random_camera(void)
-{
-    struct spl_camera camera = {.near = 0.01, .far = uniform() < 0.2 ? 1.5 : 1000};
-    double away = 0.1 + 10 * uniform() * uniform();
-    for (;;) {
-        double eye[3], target[3];
-        for (int c = 0; c < 3; c++) {
-            eye[c] = away * (2 * uniform() - 1);
-            target[c] = 1.5 * (2 * uniform() - 1);
-        }
-        const double up[3] = {0.1, 0.2, 1};
-        if (!spl_camera_look_at(&camera, eye, target, up, NULL))
-            break;
-    }
-    assert_int_equal(spl_camera_set_fov(&camera, 10 + 80 * uniform(), width, height, NULL), SPL_OK);
-    camera.cx += 60 * (uniform() - 0.5);
-    camera.fy *= 0.8 + 0.4 * uniform();
-    return camera;
 }
 
 /* A disc as a ball in view space. */
@@ -264,7 +244,7 @@ static void every_splat_that_is_seen_is_drawn_at_its_level(void **state)
     for (int odd = 1; odd < 30; odd += 14) {
         struct spl_dataset *dataset = make_clumps(odd);
         for (int view = 0; view < 200; view++) {
-            struct spl_camera camera = random_camera();
+            struct spl_camera camera = random_camera(uniform, width, height);
             coarse += check_view(dataset, &camera, lods[view % 5]);
         }
         spl_dataset_close(dataset);
@@ -321,7 +301,7 @@ static void nodes_are_listed_front_to_back(void **state)
     const struct spl_node *nodes = spl_dataset_get_nodes(dataset, &node_count);
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     for (int view = 0; view < 20; view++) {
-        struct spl_camera camera = random_camera();
+        struct spl_camera camera = random_camera(uniform, width, height);
         struct spl_draw_list list = {0};
         int left = 1 << 30;
         double last = -INFINITY;

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "cameras.h"
 #include "dataset/chunk.h"
 #include "render/select.h"
 #include "support/make_dataset.h"
@@ -80,27 +81,6 @@ static struct spl_dataset *make_planes(void)
             }
     }
     return make_dataset_panels(splats, 300, made, planes, 2);
-}
-
-/* Around the cube, within it, beside it, with lenses of every length. */
-static struct spl_camera random_camera(void)
-{
-    struct spl_camera camera = {.near = 0.01, .far = uniform() < 0.2 ? 1.5 : 1000};
-    double away = 0.1 + 10 * uniform() * uniform();
-    for (;;) {
-        double eye[3], target[3];
-        for (int c = 0; c < 3; c++) {
-            eye[c] = away * (2 * uniform() - 1);
-            target[c] = 1.5 * (2 * uniform() - 1);
-        }
-        const double up[3] = {0.1, 0.2, 1};
-        if (!spl_camera_look_at(&camera, eye, target, up, NULL))
-            break;
-    }
-    assert_int_equal(spl_camera_set_fov(&camera, 10 + 80 * uniform(), width, height, NULL), SPL_OK);
-    camera.cx += 60 * (uniform() - 0.5);
-    camera.fy *= 0.8 + 0.4 * uniform();
-    return camera;
 }
 
 /* The chunk as it is listed in the window that sample (x, y) lies in, or whole; NULL = it is not. */
@@ -205,7 +185,7 @@ static void every_cell_that_is_seen_is_drawn(void **state)
     random_state = 29;
     struct spl_dataset *dataset = make_planes();
     for (int view = 0; view < 100; view++) {
-        struct spl_camera camera = random_camera();
+        struct spl_camera camera = random_camera(uniform, width, height);
         check_view(dataset, &camera, lods[view % 5], view % 2, &seen, &windows);
     }
     assert_true(seen > 100000 && windows > 1000 && windows < seen / 2);
