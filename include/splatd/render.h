@@ -13,6 +13,7 @@
 #include <splatd/error.h>
 #include <splatd/image.h>
 #include <splatd/method.h>
+#include <splatd/soft.h>
 
 SPL_BEGIN_DECLARATIONS
 
@@ -34,6 +35,7 @@ struct spl_view {
     uint64_t deadline_ns;       /* of CLOCK_MONOTONIC; UINT64_MAX = as long as it takes */
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
     enum spl_shapes shapes;     /* the same */
+    struct spl_soft_params soft; /* what is soft, of every method */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

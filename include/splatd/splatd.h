@@ -10,6 +10,7 @@
 #include <splatd/image.h>
 #include <splatd/log.h>
 #include <splatd/method.h>
+#include <splatd/soft.h>
 #include <splatd/pack.h>
 #include <splatd/render.h>
 

@@ -22,6 +22,7 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         .supersample = 1,
         .background = {0, 0, 0, 255},
         .deadline_ns = UINT64_MAX,
+        .soft = {.model = SPL_SOFT_MODEL_EXPRESS, .opacity = 0.3},
     };
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         spl_view_set_param(&known, i, spl_method_param_get(i)->otherwise);
@@ -67,7 +68,7 @@ static int check(const struct spl_view *view, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
-    return rc;
+    return rc ? rc : spl_soft_check(&view->soft, err);
 }
 
 static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
