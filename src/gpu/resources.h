@@ -20,6 +20,8 @@ enum spl_resource {
     SPL_RESOURCE_OCCLUDERS, /* uint[], greatest depth word of every tile of SPL_OCCLUSION_TILE samples a side */
     SPL_RESOURCE_SUMMED,    /* uint[], sums of atoms, texels as in the dictionary */
     SPL_RESOURCE_SURFACE,   /* float[], view depth of the surface, one a sample */
+    SPL_RESOURCE_TESTS,     /* uint[], what marks are made of (src/render/marks.h) */
+    SPL_RESOURCE_MARKS,     /* uint[], a byte for each splat or cell of chunks of which some are soft */
     SPL_RESOURCE_OUTPUT,    /* uint[], requested layers one after the other, one word a pixel */
     SPL_RESOURCE_COUNT
 };
