@@ -47,13 +47,13 @@ static double modulated(double opacity, double delta, double soft)
 static double express(const struct soft_look *look, double delta)
 {
     float f[SPL_SOFT_FALLOFF];
-    double q = delta * delta, sum = 0;
+    double m = 1 - delta * delta, sum = 0;
     if (look->eq19)
         return look->opacity * (cos(M_PI * delta) + 1) / 2;
     spl_soft_falloff(look->opacity, f);
     for (int i = SPL_SOFT_FALLOFF - 1; i >= 0; i--)
-        sum = sum * q + (double)f[i];
-    return fmin(fmax((1 - q) * sum, 0), 1);
+        sum = sum * m + (double)f[i];
+    return fmin(fmax(m * sum, 0), 1);
 }
 
 static void blend(struct soft_seen *seen, double opacity, const double color[3])

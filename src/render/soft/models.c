@@ -41,16 +41,17 @@ uint32_t spl_soft_shells(double radius_samples)
     return (uint32_t)fmin(fmax(radius_samples / SPL_SOFT_SHELL_SAMPLES, 1), SPL_SOFT_SHELLS_MAX);
 }
 
-/* Least squares over rings of equal width, weighted by their area: four unknowns, since f[0] is given. */
+/* Least squares over rings of equal width, weighted by their area. That all of it adds up to `opacity` at m = 1 leaves
+ * four unknowns, of terms m^(i + 2) - m. */
 void spl_soft_falloff(double opacity, float f[SPL_SOFT_FALLOFF])
 {
     enum { RINGS = 256, N = SPL_SOFT_FALLOFF - 1 };
-    double depth = spl_soft_depth(opacity), rows[N][N + 1] = {{0}};
+    double depth = spl_soft_depth(opacity), rows[N][N + 1] = {{0}}, first = opacity;
     for (int ring = 0; ring < RINGS; ring++) {
-        double delta = (ring + 0.5) / RINGS, q = delta * delta, rest = 1 - q, terms[N];
-        double wanted = -expm1(-2 * depth * spl_soft_base_part(delta, sqrt(rest))) - rest * opacity;
+        double delta = (ring + 0.5) / RINGS, m = 1 - delta * delta, power = m, terms[N];
+        double wanted = -expm1(-2 * depth * spl_soft_base_part(delta, sqrt(m))) - m * opacity;
         for (int i = 0; i < N; i++)
-            terms[i] = rest *= q;
+            terms[i] = (power *= m) - m;
         for (int i = 0; i < N; i++) {
             for (int j = 0; j < N; j++)
                 rows[i][j] += delta * terms[i] * terms[j];
@@ -63,7 +64,9 @@ void spl_soft_falloff(double opacity, float f[SPL_SOFT_FALLOFF])
             for (int j = i; j <= N; j++)
                 rows[k][j] -= factor * rows[i][j];
         }
-    f[0] = (float)opacity;
-    for (int i = 0; i < N; i++)
+    for (int i = 0; i < N; i++) {
         f[i + 1] = (float)(rows[i][N] / rows[i][i]);
+        first -= (double)f[i + 1];
+    }
+    f[0] = (float)first;
 }

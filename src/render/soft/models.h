@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* Coefficients of a falloff: opacity (1 - q) (f[0] + f[1] q + ... + f[4] q^4), q = (d / r)^2 in 0..1. */
+/* Coefficients of a falloff: opacity m (f[0] + f[1] m + ... + f[4] m^4), m = 1 - (d / r)^2 in 0..1. */
 enum { SPL_SOFT_FALLOFF = 5 };
 
 /* The optical depth along the ray through a sphere's centre: -ln(1 - opacity); that of opacity 1 is taken for that of
@@ -24,8 +24,8 @@ double spl_soft_concentric_part(uint32_t shells, double delta, double zeta);
 /* One shell for every SPL_SOFT_SHELL_SAMPLES samples of the radius on the image. */
 uint32_t spl_soft_shells(double radius_samples);
 
-/* Falloff of express: the polynomial nearest to the opacity of base along the whole ray, weighted by area; f[0] =
- * opacity. Eq. 19, lambda (cos(pi d / r) + 1) / 2, is as near as that only where spheres are thin: off by rms 0.05 at
+/* Falloff of express: the polynomial nearest to the opacity of base along the whole ray, weighted by area; in the
+ * middle it is `opacity`. Eq. 19, lambda (cos(pi d / r) + 1) / 2, is as near as that only where spheres are thin: off by rms 0.05 at
  * opacity 0.5, 0.2 at 0.9, the polynomial by 0.001. It costs no more, and no driver has a cosine of its own. */
 void spl_soft_falloff(double opacity, float f[SPL_SOFT_FALLOFF]);
 
