@@ -170,6 +170,10 @@
     {0.636619697f, -0.21219691f, 0.127113627f, -0.0891477141f, 0.0628271488f, -0.037452184f, 0.0151391483f,            \
      -0.00290285373f}
 
+/* Soft spheres of model concentric have a shell for every so many samples of their radius, at most so many. */
+#define SPL_SOFT_SHELL_SAMPLES 4
+#define SPL_SOFT_SHELLS_MAX 16
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */
