@@ -84,6 +84,8 @@ static const struct spl_cmd_table table = {
         "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
         "Ten seconds between keyframes, slow at both ends, at another size:\n"
         "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
+        "A roof that fades away: keyframes with \"soft_opacity\" 1, then 0, over what lies above a plane:\n"
+        "  splatd tour courtyard.spld --path keys.json --seconds 8 --soft 'plane:0,0,2.5,0,0,1>0' -o roof.mp4\n"
         "Depth images of a recorded trajectory, one a pose, into a folder:\n"
         "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n",
     .options = options,
