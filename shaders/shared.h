@@ -296,6 +296,7 @@ struct spl_draw_chunk {
 #define SPL_TEST_TABLE 1u
 #define SPL_TEST_SHAPE 2u
 #define SPL_TEST_LAST_NONE 64u
+#define SPL_TEST_EXACT 0xffffffu /* numbers from an end up to which floats are exact; W is 1 beyond */
 #define SPL_TEST_TABLE_WORD 3
 #define SPL_SHAPE_AXIS 0u
 #define SPL_SHAPE_PLANE 1u

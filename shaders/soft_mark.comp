@@ -40,8 +40,8 @@ uint test_numbers(uint at, uint code, uint width, bool last_none)
 {
     uint past = code + test_word(at + 3u), span = test_word(at + 4u), shift = test_word(at + 5u);
     bool none = last_none && code == 0xffffffffu >> (32u - width);
-    precise float low = test_float(at + 6u) + float(past >> shift) * test_float(at + 7u);
-    precise float high = test_float(at + 8u) + float((span - past) >> shift) * test_float(at + 9u);
+    precise float low = test_float(at + 6u) + float(min(past >> shift, SPL_TEST_EXACT)) * test_float(at + 7u);
+    precise float high = test_float(at + 8u) + float(min((span - past) >> shift, SPL_TEST_EXACT)) * test_float(at + 9u);
     return none || past > span ? 0u : mark_of(min(low, high));
 }
 

@@ -23,8 +23,10 @@ static uint32_t word_of(float value)
 
 static float share_at(const struct spl_marks_term *term, uint32_t past)
 {
-    const float low = term->share_low + (float)(past >> term->shift) * term->share_step;
-    const float high = term->share_high + (float)((term->span - past) >> term->shift) * term->share_step_high;
+    const uint32_t above = past >> term->shift, below = (term->span - past) >> term->shift;
+    const float low = term->share_low + (float)(above < SPL_TEST_EXACT ? above : SPL_TEST_EXACT) * term->share_step;
+    const float high =
+        term->share_high + (float)(below < SPL_TEST_EXACT ? below : SPL_TEST_EXACT) * term->share_step_high;
     return fminf(fminf(low, high), 1);
 }
 

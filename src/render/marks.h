@@ -48,6 +48,9 @@ int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_datas
 int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, const struct spl_dataset *dataset,
                    struct spl_error *err);
 
+/* Part of it: what terms that were resolved take of the numbers of marks->streams. */
+void spl_marks_find_numbers(struct spl_marks *marks);
+
 /* Their shapes as a camera sees them, as words for its tests; 0 words where there is none. */
 enum { SPL_MARKS_SHAPE_WORDS = 20, SPL_MARKS_SHAPES_MAX = SPL_MARKS_SHAPE_WORDS * SPL_SOFT_TERMS_MAX };
 struct spl_marks_shape {

@@ -163,7 +163,9 @@ static void find_numbers(struct spl_marks_term *term, const struct spl_stream *s
     const double step = type == SPL_STREAM_STEPS ? 1 / stream->steps_a_unit : 1;
     term->low = low;
     term->span = high - low;
-    while (term->span >> term->shift >> 24)
+    const double longest = fmax(isfinite(term->least) ? term->blend_least : 0,
+                                isfinite(term->most) ? term->blend_most : 0) / step;
+    while (term->shift < 8 && ldexp(longest, -(int)term->shift) > SPL_TEST_EXACT)
         term->shift++;
     const double step_shifted = ldexp(step, (int)term->shift);
     share_of(term->least, term->blend_least, value_of(stream, type, low), step_shifted, &term->share_low,
@@ -181,15 +183,19 @@ int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, 
     if (rc)
         return rc;
     marks->count = soft->count;
+    spl_marks_find_numbers(marks);
+    return SPL_OK;
+}
+
+void spl_marks_find_numbers(struct spl_marks *marks)
+{
     for (uint32_t i = 0; i < marks->count; i++) {
         struct spl_marks_term *term = &marks->terms[i];
         if (term->stream < 0)
             continue;
-        spl_assert((uint32_t)term->stream < streams);
         const struct spl_stream *stream = &marks->streams[term->stream];
         enum spl_stream_type type = spl_stream_type_from_name(stream->type);
         if (type != SPL_STREAM_HALF_OCTAVES)
             find_numbers(term, stream, type);
     }
-    return SPL_OK;
 }
