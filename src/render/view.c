@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "geom/size.h"
+#include "render/marks.h"
 #include "render/soft_params.h"
 #include "shared.h"
 
@@ -94,7 +95,7 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
                               "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
-    return SPL_OK;
+    return spl_marks_resolve(&view->soft, info, NULL, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)
