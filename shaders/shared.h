@@ -188,6 +188,7 @@ struct spl_draw_chunk {
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
                                              width, metres */
+    SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -226,7 +227,7 @@ struct spl_draw_chunk {
 #define SPL_CLIP_OFFSET_BITS 3
 #define SPL_CLIP_BITS 8
 
-#define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
+#define SPL_CHUNK_WORDS 19 /* of a spl_draw_chunk */
 
 /* Panels: SPL_PANEL_SIDE x SPL_PANEL_SIDE cells of a plane, block by block of 4 x 4. A chunk of them begins with two
  * words a panel:
@@ -269,6 +270,15 @@ struct spl_draw_chunk {
 /* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of them. */
 #define SPL_MESH_LANES 32
 #define SPL_MESH_WINDOW 112
+
+/* Marks: a byte a splat, four a word from the low end: SPL_CHUNK_SPLATS of a chunk of discs, SPL_MARKS_PANEL words of
+ * each panel or mesh, a byte a cell, row by row. 0 = solid; else soft, 1 + SPL_MARK_MOST times the share W of eq. 22 of
+ * Soft-Transparency, which is 1 (SPL_MARK_WHOLE) beyond the range in which a splat is partly solid. */
+#define SPL_MARKS_DISCS (SPL_CHUNK_SPLATS / 4)
+#define SPL_MARKS_PANEL (SPL_PANEL_SIDE * SPL_PANEL_SIDE / 4)
+#define SPL_MARKS_NONE 32 /* words that the buffer begins with, so that no chunk's marks are at 0 */
+#define SPL_MARK_MOST 254
+#define SPL_MARK_WHOLE 255u
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
@@ -361,7 +371,7 @@ _Static_assert(SPL_WINDOW / SPL_SOFT_TILE + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW
 _Static_assert(SPL_RUN_PANELS << SPL_RUN_BITS == SPL_PANELS_MAX, "runs of panels");
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
-_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
+_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 76 bytes on both sides");
 _Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000,
                "an invocation ends within its rounds, of which a sample that may be trimmed takes two");
 _Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE * SPL_PANEL_SIDE / SPL_LANES < 60000,
