@@ -21,6 +21,8 @@ enum spl_resource {
     SPL_RESOURCE_SUMMED,    /* uint[], sums of atoms, texels as in the dictionary */
     SPL_RESOURCE_SURFACE,   /* float[], view depth of the surface, one a sample */
     SPL_RESOURCE_STEP,      /* struct spl_soft_step; the rest of soft transparency: src/render/soft/order.h */
+    SPL_RESOURCE_SLOTS,     /* uint[], SPL_SOFT_SLOT_WORDS of each that gathers; pairs of items and entries by bucket */
+    SPL_RESOURCE_STARTS,    /* uint[], the first item of each that gathers */
     SPL_RESOURCE_ITEMS,     /* uint[], soft spheres and their rectangles */
     SPL_RESOURCE_SORT_FROM, /* uint[], pairs of key and item; lists of items, tile by tile */
     SPL_RESOURCE_SORT_TO,   /* the same, written */
