@@ -72,6 +72,7 @@ enum spl_param_changes {
     SPL_CHANGES_TEXTURES,   /* colours alone, and those of datasets with textures */
     SPL_CHANGES_MAPS,       /* colours and silhouettes, and those of datasets with maps of stations */
     SPL_CHANGES_PRIMITIVES, /* what is seen where, and that of datasets with lines or panels */
+    SPL_CHANGES_SOFT,       /* what is seen where, and that of views with a term of what is soft (splatd/soft.h) */
 };
 
 /* Every parameter of a method, in the order of --help:
@@ -94,7 +95,17 @@ enum spl_param_changes {
     REAL(threshold, fill.threshold, 0, 1, 0.38, SPL_CHANGES_SHAPES,                                                    \
          "share of the sectors that is open where a point is visible")                                                 \
     COUNT(pyramid, fill.pyramid, 0, 8, 0, SPL_CHANGES_SHAPES,                                                          \
-          "levels that holes are filled from; 0: as the kernel needs")
+          "levels that holes are filled from; 0: as the kernel needs")                                                 \
+    CHOICE(soft_model, soft.model, soft_model, SPL_SOFT_MODEL_EXPRESS, SPL_CHANGES_SOFT,                               \
+           "how a soft sphere fades from its centre; express: a disc, fast; concentric: shells; base: exact, slow; "   \
+           "layer: the first sphere alone, for comparison")                                                            \
+    REAL(soft_opacity, soft.opacity, 0, 1, 0.3, SPL_CHANGES_SOFT,                                                      \
+         "of a soft sphere at its centre; 0: what is soft is not drawn")                                               \
+    REAL(soft_blend, soft.blend, 0, 1e9, 0, SPL_CHANGES_SOFT,                                                          \
+         "how far beyond the ends of a term spheres are still partly solid, in what it measures; 0: a sharp border")   \
+    CHOICE(soft_of, soft.of, soft_of, SPL_SOFT_OF_SOLID, SPL_CHANGES_SOFT,                                             \
+           "what layers other than color, and picks, speak of: what is solid, the first sphere too, or where half of " \
+           "the light is held back")
 
 enum spl_method_param {
 #define SPL_PARAM_VALUE(name, ...) SPL_PARAM_##name,
@@ -103,6 +114,9 @@ enum spl_method_param {
     SPL_PARAM_COUNT
 };
 #define SPL_PARAM_BIT(name) (1u << SPL_PARAM_##name)
+/* Those that every method takes: its row names them as well. */
+#define SPL_PARAMS_OF_ALL                                                                                              \
+    (SPL_PARAM_BIT(soft_model) | SPL_PARAM_BIT(soft_opacity) | SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(soft_of))
 
 enum spl_param_kind { SPL_PARAM_REAL, SPL_PARAM_WHOLE, SPL_PARAM_CHOICE };
 

@@ -23,6 +23,16 @@ enum spl_soft_model {
 SPL_API const char *spl_soft_model_name(enum spl_soft_model model);
 SPL_API int spl_soft_model_from_name(const char *name); /* -1 for an unknown name */
 
+/* What layers depth, range, normal, id, primitive and picks speak of. */
+enum spl_soft_of {
+    SPL_SOFT_OF_SOLID,  /* what is solid, as if nothing soft were there */
+    SPL_SOFT_OF_FIRST,  /* the nearest of that and any sphere whose opacity there is 1/255 or more */
+    SPL_SOFT_OF_MEDIAN, /* where half of the light is held back, else what is solid */
+    SPL_SOFT_OF_COUNT
+};
+SPL_API const char *spl_soft_of_name(enum spl_soft_of of);
+SPL_API int spl_soft_of_from_name(const char *name); /* -1 for an unknown name */
+
 /* What a term measures of a splat. */
 enum spl_soft_measure {
     SPL_SOFT_ATTRIBUTE, /* an optional attribute by name: of uncertainty its share of the dataset's 99th percentile, of
@@ -33,7 +43,7 @@ enum spl_soft_measure {
     SPL_SOFT_BOX,       /* distance to the box from shape[0..2] to shape[3..5], negative inside */
 };
 
-enum { SPL_SOFT_TERMS_MAX = 16, SPL_SOFT_NAME_MAX = 32, SPL_SOFT_TEXT_MAX = 2048 };
+enum { SPL_SOFT_TERMS_MAX = 16, SPL_SOFT_NAME_MAX = 32, SPL_SOFT_TEXT_MAX = 4096 };
 
 /* A splat is soft where least < measure < most, or where the measure is one of both ends that are included. Splats that
  * have no value of an attribute are solid. */
@@ -52,16 +62,19 @@ struct spl_soft_params {
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22; 0 = a
                        sharp border. Classes have none */
+    enum spl_soft_of of;
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:
- *   uncertainty>0.4   intensity<=300   gps_time:1.5-2   class:3-5,9   uncertainty>q0.9
- *   axis:x,y,z,dx,dy,dz<4   plane:x,y,z,nx,ny,nz>0   box:x0,y0,z0,x1,y1,z1   box:…<2
- * SPL_E_INPUT (field "soft") says what is wrong with which term; SPL_E_LIMIT above SPL_SOFT_TERMS_MAX. On failure `out`
- * is as it was. */
+ *   uncertainty>0.4   intensity<=300   gps_time:1.5..2   class:3-5,9   uncertainty>q0.9   0.2<uncertainty<=0.4
+ *   axis:x,y,z,dx,dy,dz<4   plane:x,y,z,nx,ny,nz>0   box:x0,y0,z0,x1,y1,z1   box:…<2   NAME:* (any value)
+ * Ends of ranges are included; 3-5 and 3..5 are the same, and the second reads better with signs: -5..-2. A box alone
+ * is its inside. At most SPL_SOFT_TEXT_MAX bytes. SPL_E_INPUT (field "soft") says what is wrong with which term, at
+ * which character; SPL_E_LIMIT above SPL_SOFT_TERMS_MAX. On failure `out` is as it was. */
 SPL_API int spl_soft_parse(const char *text, struct spl_soft_params *out, struct spl_error *err);
 
-/* Writes the terms so that spl_soft_parse() gives the same ones; returns the length, as snprintf(). */
+/* Writes the terms so that spl_soft_parse() gives the same ones; returns the length, as snprintf(). What has passed
+ * spl_soft_check() is never longer than SPL_SOFT_TEXT_MAX. */
 SPL_API int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes);
 
 /* Are terms, model, opacity and blend in range? SPL_E_USAGE names the field. */

@@ -68,11 +68,32 @@ int spl_path_fail(const struct spl_path_reader *reader, size_t index, int rc, co
     return spl_fail_field(err, rc, field, "%s[%zu]: %s", reader->list, index, why->message);
 }
 
+static int read_value(const struct spl_path_value *value, const json_t *json, double *out, struct spl_error *err)
+{
+    *out = json_is_number(json) ? json_number_value(json) : NAN;
+    if (!json || (*out >= value->least && *out <= value->most))
+        return 0;
+    if (!json_is_number(json))
+        return spl_fail_field(err, SPL_E_INPUT, value->name, "%s must be a number, not %s", value->name,
+                              spl_json_type_name(json));
+    return spl_fail_field(err, SPL_E_INPUT, value->name, "%s %g is not within %g and %g", value->name, *out,
+                          value->least, value->most);
+}
+
 static int read_own_key(struct spl_path_reader *reader, json_t *view, json_t *crs, struct spl_error *err)
 {
-    static const char *const others[] = {"camera", "time", NULL}, *const sides[] = {"width", "height"};
+    static const char *const sides[] = {"width", "height"};
+    const struct spl_path_value *known = reader->options->values;
+    const char *others[3 + SPL_PATH_VALUES] = {"camera", "time"};
+    double values[SPL_PATH_VALUES];
     json_t *time = json_object_get(view, "time"), *camera = json_object_get(view, "camera");
     struct spl_camera out;
+    for (int i = 0; known && i < SPL_PATH_VALUES; i++) {
+        others[2 + i] = known[i].name;
+        int wrong = read_value(&known[i], json_object_get(view, known[i].name), &values[i], err);
+        if (wrong)
+            return wrong;
+    }
     if (time && !json_is_number(time))
         return spl_fail_field(err, SPL_E_INPUT, "time", "time must be a number, not %s", spl_json_type_name(time));
     if (crs && !json_object_get(view, "crs") && !json_object_get(camera, "crs"))
@@ -83,7 +104,8 @@ static int read_own_key(struct spl_path_reader *reader, json_t *view, json_t *cr
     for (int i = 0; i < 2 && !sized; i++) // a field of view needs the shape of the outcome
         json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
     int rc = spl_camera_from_json(view, others, reader->options->defaults, reader->options->limits, &out, err);
-    return rc ? rc : spl_path_take(reader, &out, time ? json_number_value(time) : NAN, err);
+    rc = rc ? rc : spl_path_take(reader, &out, time ? json_number_value(time) : NAN, err);
+    return rc || !known ? rc : spl_camera_path_set_values(reader->path, values, err);
 }
 
 static int read_own(struct spl_path_reader *reader, const json_t *json, struct spl_error *err)

@@ -20,6 +20,7 @@ struct spl_path_options {
                              * follows from the other at the path's ratio */
     const struct spl_camera_defaults *defaults; /* may be NULL: fov 60, near 0.01, no far, and poses must be complete */
     const struct spl_camera_limits *limits;
+    const struct spl_path_value *values; /* SPL_PATH_VALUES that splatd's own keys may say; NULL = none */
 };
 
 /* Each fills a zeroed path, which spl_camera_path_finish() releases, on success and leaves it zeroed on failure. */

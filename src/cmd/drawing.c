@@ -54,9 +54,18 @@ int spl_cmd_take_method(void *drawing, const char *option, char *text, struct sp
     return rc;
 }
 
+static void replace(char *text, char from, char to)
+{
+    for (; (text = strchr(text, from)); text++)
+        *text = to;
+}
+
 int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err)
 {
-    enum spl_method_param param = (enum spl_method_param)spl_method_param_from_name(option + strspn(option, "-"));
+    char name[64];
+    snprintf(name, sizeof name, "%s", option + strspn(option, "-"));
+    replace(name, '-', '_');
+    enum spl_method_param param = (enum spl_method_param)spl_method_param_from_name(name);
     const struct spl_method_param_info *info = spl_method_param_get(param);
     int rc, choice = 0;
     double value = 0;
@@ -78,6 +87,13 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
     if (!rc)
         spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
     return rc;
+}
+
+int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_soft_parse(text, &((struct spl_cmd_drawing *)drawing)->view.soft, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
 }
 
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
@@ -113,7 +129,10 @@ static void print_param(FILE *out, enum spl_method_param param, size_t column)
         snprintf(text, sizeof text, "%s: %s (%s)", range, info->help, info->choice_name((int)info->otherwise));
     else
         snprintf(text, sizeof text, "%s; %s (%g)", info->help, range, info->otherwise);
-    used = fprintf(out, "        --%s %s", info->name,
+    char name[64];
+    snprintf(name, sizeof name, "%s", info->name);
+    replace(name, '_', '-');
+    used = fprintf(out, "        --%s %s", name,
                    info->kind == SPL_PARAM_CHOICE  ? "NAME"
                    : info->kind == SPL_PARAM_WHOLE ? "N"
                                                    : "X");
@@ -126,7 +145,18 @@ void spl_cmd_print_methods(FILE *out, size_t column)
         const struct spl_method_info *info = spl_method_get((enum spl_method)method);
         spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --method %s", info->name), column, info->help);
         for (int i = 0; i < SPL_PARAM_COUNT; i++)
-            if (info->params >> i & 1)
+            if ((info->params & ~SPL_PARAMS_OF_ALL) >> i & 1)
                 print_param(out, (enum spl_method_param)i, column);
     }
+}
+
+void spl_cmd_print_soft(FILE *out, size_t column)
+{
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
+                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', 'uncertainty>q0.9', "
+                          "'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+                          "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
+    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+        if (SPL_PARAMS_OF_ALL >> i & 1)
+            print_param(out, (enum spl_method_param)i, column);
 }

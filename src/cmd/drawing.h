@@ -33,6 +33,8 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_error *err);
+void spl_cmd_print_soft(FILE *out, size_t column);
 void spl_cmd_print_methods(FILE *out, size_t column);
 
 #define SPL_CMD_PARAM_ROW(param, ...) {.name = #param, .form = "X", .take = spl_cmd_take_param},
@@ -44,6 +46,12 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
          .take = spl_cmd_take_background},                                                                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
+        {.help = "Soft transparency, with any method:", .print = spl_cmd_print_soft},                                  \
+        {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
+        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \
+        {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
+        {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \
+        {"soft-of", "NAME", NULL, .take = spl_cmd_take_param},                                                         \
         SPL_METHOD_PARAMS(SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW)                                     \
         {"method", "NAME", NULL, .take = spl_cmd_take_method}
 #define SPL_CMD_ENCODING_ROWS                                                                                          \

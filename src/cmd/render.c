@@ -18,6 +18,7 @@
 #include "geom/camera_json.h"
 #include "geom/size.h"
 #include "service/place/places.h"
+#include "service/request/request.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
@@ -40,7 +41,7 @@ static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
-    {"crs", "EPSG:N", "what --eye and --target are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
+    {"crs", "EPSG:N", "what --eye, --target and shapes of --soft are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
     {"up", "X,Y,Z", "what is up in the image", SPL_CMD_VECTOR(struct arguments, up)},
     {"fov", "DEG", "vertical field of view; or a pinhole in pixels:", SPL_CMD_REAL(struct arguments, fov, 1e-6, 179)},
     {"fx", "F", "focal length", SPL_CMD_REAL(struct arguments, fx, 1e-6, 1e9)},
@@ -76,6 +77,10 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+        "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
+        "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
+        "Without what lies above a plane, a roof or a ceiling:\n"
+        "  splatd render courtyard.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
         "Cut out, four samples a pixel side, to another program:\n"
         "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
     .options = options,
@@ -117,6 +122,8 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
         rc = hook.hook.to_world(&hook.hook, a->crs, "--eye", a->eye, a->eye, err);
     if (!rc && !isnan(a->target[0]))
         rc = hook.hook.to_world(&hook.hook, a->crs, "--target", a->target, a->target, err);
+    if (!rc)
+        rc = spl_soft_to_world(&a->drawing.view.soft, a->crs, &hook.hook, err);
     spl_places_destroy(places);
     return rc;
 }

@@ -28,6 +28,7 @@
 #include "cmd/progress.h"
 #include "image/video.h"
 #include "service/place/places.h"
+#include "service/tour/fade.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
@@ -37,6 +38,7 @@ struct arguments {
     int positions, rotations, ease; /* enum */
     bool closed, video;
     struct spl_camera *cameras; // owned
+    double (*fades)[SPL_PATH_VALUES]; // owned; one a camera, NULL = nothing changes
     size_t count;
     uint64_t saturated;      /* pixels beyond what a depth PNG can hold, of all frames */
     size_t saturated_frames; /* those that have some */
@@ -84,6 +86,8 @@ static const struct spl_cmd_table table = {
         "  splatd tour courtyard.spld --path camera_path.json -o tour.mp4\n"
         "Ten seconds between keyframes, slow at both ends, at another size:\n"
         "  splatd tour courtyard.spld --path keys.json --seconds 10 --ease in-out --size 1920x1080 -o tour.mp4\n"
+        "A roof that fades away: keyframes with \"soft_opacity\" 1, then 0, over what lies above a plane:\n"
+        "  splatd tour courtyard.spld --path keys.json --seconds 8 --soft 'plane:0,0,2.5,0,0,1>0' -o roof.mp4\n"
         "Depth images of a recorded trajectory, one a pose, into a folder:\n"
         "  splatd tour courtyard.spld --path groundtruth.txt --layer depth --format png -o depth\n\n",
     .options = options,
@@ -117,12 +121,14 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const struct spl_camera_limits limits = {.side_px = 65535, .pixels = 64 << 20};
     struct spl_camera_defaults defaults = {.fov = info->default_fov};
-    struct spl_path_options path_options = {a->drawing.size[0], a->drawing.size[1], &defaults, &limits};
+    struct spl_path_value values[SPL_PATH_VALUES];
+    struct spl_path_options path_options = {a->drawing.size[0], a->drawing.size[1], &defaults, &limits, values};
     struct spl_path_motion motion = {a->positions, a->rotations, a->ease};
     struct spl_camera_path path = {0};
     struct spl_camera camera = {0};
     struct spl_places *places = NULL;
     struct spl_places_hook hook;
+    spl_fade_get_values(values);
     memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
     memcpy(defaults.target, info->default_target, sizeof defaults.target);
     memcpy(defaults.up, info->default_up, sizeof defaults.up);
@@ -143,7 +149,8 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
         goto done;
     if (!(a->cameras = spl_alloc_raw(a->count, sizeof *a->cameras, err)))
         rc = SPL_E_NOMEM;
-    else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) && a->video)
+    else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) &&
+             !(rc = spl_fade_sample(&path, &motion, a->count, &a->fades, err)) && a->video)
         rc = spl_video_check(a->cameras->width, a->cameras->height, err);
     if (!rc) {
         a->drawing.view.camera = a->cameras[0];
@@ -180,6 +187,8 @@ static int render_frames(struct arguments *a, const struct spl_dataset *dataset,
     for (size_t i = 0; !rc && i < a->count; i++) {
         struct spl_frame frame = {0};
         a->drawing.view.camera = a->cameras[i];
+        if (a->fades)
+            spl_fade_apply(a->fades[i], &a->drawing.view);
         rc = spl_renderer_render(renderer, dataset, &a->drawing.view, &frame, err);
         if (!rc)
             rc = video ? spl_video_add(video, &frame.images[a->drawing.layer], err)
@@ -239,6 +248,7 @@ static int run(struct arguments *a, struct spl_error *err)
     spl_renderer_destroy(renderer);
     spl_dataset_close(dataset);
     free(a->cameras);
+    free(a->fades);
     return rc;
 }
 

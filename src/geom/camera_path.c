@@ -21,6 +21,7 @@ void spl_camera_path_finish(struct spl_camera_path *path)
         return;
     free(path->cameras);
     free(path->times);
+    free(path->values);
     *path = (struct spl_camera_path){0};
 }
 

@@ -11,6 +11,13 @@
 
 enum { SPL_CAMERA_PATH_MAX = 100000 }; /* cameras */
 
+/* What may change along a path beside the camera: numbers that a key may say. */
+enum { SPL_PATH_VALUES = 2 };
+struct spl_path_value {
+    const char *name;
+    double least, most;
+};
+
 /* Zero before use. */
 struct spl_camera_path {
     struct spl_camera *cameras; /* all of one size */
@@ -19,6 +26,8 @@ struct spl_camera_path {
     bool whole;  /* the cameras are the frames; otherwise keyframes */
     bool closed; /* the last is followed by the first */
     double fps;  /* 0 = not said */
+    double (*values)[SPL_PATH_VALUES]; /* of the first cameras; NAN = the key says nothing; NULL = none does */
+    size_t value_count, value_capacity;
 };
 
 /* Takes NULL and zeroed paths. */
@@ -29,6 +38,10 @@ void spl_camera_path_finish(struct spl_camera_path *path);
  * (SPL_E_LIMIT, field "cameras"). */
 int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,
                         struct spl_error *err);
+
+/* What the camera that was added last says beside itself; NAN where it says nothing. */
+int spl_camera_path_set_values(struct spl_camera_path *path, const double values[SPL_PATH_VALUES],
+                               struct spl_error *err);
 
 /* How positions go from one key to the next. Time between two keys is their difference in `times` where the path has
  * them; otherwise it is proportional to the square root of their distance (centripetal: no cusps and no loops), equal
@@ -57,6 +70,19 @@ extern const char *const spl_path_positions_names[], *const spl_path_rotations_n
  * Refuses an empty path, and a camera that leaves what spl_camera_check() allows, naming the frame. */
 int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
                            struct spl_camera *out, struct spl_error *err);
+
+/* When each key is passed, in the time of the whole way, which is (*begin)[path->count], and of an open path is the last
+ * key's. The caller frees *begin. */
+int spl_camera_path_get_times(const struct spl_camera_path *path, const struct spl_path_motion *motion, double **begin,
+                              struct spl_error *err);
+/* The same of frame `frame` of `frames`. */
+double spl_camera_path_get_time(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
+                                size_t frame, double whole);
+
+/* The values at the same times as spl_camera_path_sample(): straight from one key that says one to the next that does,
+ * on an open path the same before the first and behind the last of them; NAN where no key says any. */
+int spl_camera_path_sample_values(const struct spl_camera_path *path, const struct spl_path_motion *motion,
+                                  size_t frames, double (*out)[SPL_PATH_VALUES], struct spl_error *err);
 
 /* Frames of a tour: `frames` (0 = not given) or `fps` times `seconds` (NAN = not given), which exclude each other. A
  * whole path without either has as many frames as cameras, but for one with times and an fps; those and keyframes

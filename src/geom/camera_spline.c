@@ -190,6 +190,27 @@ static double ease(enum spl_path_ease kind, double u)
     }
 }
 
+int spl_camera_path_get_times(const struct spl_camera_path *path, const struct spl_path_motion *motion, double **begin,
+                              struct spl_error *err)
+{
+    struct spline s = {.path = path, .motion = motion};
+    int rc = init(&s, err);
+    *begin = rc ? NULL : spl_alloc(path->count + 1, sizeof **begin, err);
+    if (!rc && !*begin)
+        rc = SPL_E_NOMEM;
+    for (size_t i = 0; !rc && i < path->count; i++)
+        (*begin)[i + 1] = (*begin)[i] + (i < s.segments ? s.keys[i].length : 0);
+    free(s.keys);
+    return rc;
+}
+
+double spl_camera_path_get_time(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
+                                size_t frame, double whole)
+{
+    size_t steps = path->closed ? frames : frames - 1;
+    return ease(motion->ease, steps ? (double)frame / (double)steps : 0) * whole;
+}
+
 int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
                            struct spl_camera *out, struct spl_error *err)
 {
@@ -201,10 +222,10 @@ int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_
         return 0;
     }
     int rc = init(&s, err);
-    size_t segment = 0, steps = path->closed ? frames : frames - 1;
+    size_t segment = 0;
     double begin = 0; /* of the segment */
     for (size_t f = 0; !rc && f < frames; f++) {
-        double u = steps ? (double)f / (double)steps : 0, at = ease(motion->ease, u) * s.total;
+        double at = spl_camera_path_get_time(path, motion, frames, f, s.total);
         if (!s.segments) {
             out[f] = path->cameras[0];
             continue;

@@ -1,8 +1,9 @@
 /* What a view says of soft transparency: names of models, and checks. Pure; any thread. */
-#include <math.h>
-#include <string.h>
+#include "render/soft_params.h"
 
-#include <splatd/soft.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "base/error.h"
 
@@ -26,54 +27,112 @@ int spl_soft_model_from_name(const char *name)
     return -1;
 }
 
-static bool is_shape(enum spl_soft_measure measure)
+static const char *const of_names[SPL_SOFT_OF_COUNT] = {
+    [SPL_SOFT_OF_SOLID] = "solid",
+    [SPL_SOFT_OF_FIRST] = "first",
+    [SPL_SOFT_OF_MEDIAN] = "median",
+};
+
+const char *spl_soft_of_name(enum spl_soft_of of)
 {
-    return measure == SPL_SOFT_AXIS || measure == SPL_SOFT_PLANE || measure == SPL_SOFT_BOX;
+    return (unsigned)of < SPL_SOFT_OF_COUNT ? of_names[of] : "unknown";
 }
 
-static int check_shape(const struct spl_soft_term *term, uint32_t number, struct spl_error *err)
+int spl_soft_of_from_name(const char *name)
+{
+    for (int i = 0; name && i < SPL_SOFT_OF_COUNT; i++)
+        if (!strcmp(name, of_names[i]))
+            return i;
+    return -1;
+}
+
+static bool check_shape(const struct spl_soft_term *term, char fault[SPL_SOFT_FAULT_MAX])
 {
     const double *s = term->shape, length = hypot(hypot(s[3], s[4]), s[5]);
+    const char *what = NULL;
     for (int i = 0; i < 6; i++)
         if (!isfinite(s[i]))
-            return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft has a number that is not finite", number);
-    if (term->measure != SPL_SOFT_BOX && !(length > 0 && isfinite(length)))
-        return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft has a direction without length", number);
-    for (int i = 0; i < 3 && term->measure == SPL_SOFT_BOX; i++)
-        if (s[i] > s[i + 3])
-            return spl_fail_field(err, SPL_E_USAGE, "soft",
-                                  "the box of term %u of soft ends at %g before it begins at %g", number, s[i + 3],
-                                  s[i]);
-    return SPL_OK;
+            what = "has a number that is not finite";
+    if (!what && term->measure != SPL_SOFT_BOX && !(length > 0 && isfinite(length)))
+        what = "has a direction without length";
+    snprintf(fault, SPL_SOFT_FAULT_MAX, "%s", what ? what : "");
+    for (int i = 0; i < 3 && !what && term->measure == SPL_SOFT_BOX; i++)
+        if (s[i] > s[i + 3]) {
+            snprintf(fault, SPL_SOFT_FAULT_MAX, "has a box that ends at %.9g before it begins at %.9g", s[i + 3], s[i]);
+            return false;
+        }
+    return !what;
 }
 
-static int check_term(const struct spl_soft_term *term, uint32_t number, struct spl_error *err)
+static bool is_share(double end)
 {
+    return isinf(end) || (end >= 0 && end <= 1);
+}
+
+bool spl_soft_check_term(const struct spl_soft_term *term, char fault[SPL_SOFT_FAULT_MAX])
+{
+    const char *what = NULL;
     if ((unsigned)term->measure > SPL_SOFT_BOX)
-        return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft measures nothing that exists", number);
-    if (isnan(term->least) || isnan(term->most) || term->least > term->most)
-        return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft is not between %g and %g", number,
-                              term->least, term->most);
-    if (is_shape(term->measure))
-        return check_shape(term, number, err);
-    if (!term->name[0] || !memchr(term->name, 0, sizeof term->name))
-        return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft names no attribute", number);
-    return SPL_OK;
+        what = "measures nothing that exists";
+    else if (isnan(term->least) || isnan(term->most) || term->least > term->most || term->least == INFINITY ||
+             term->most == -INFINITY) {
+        snprintf(fault, SPL_SOFT_FAULT_MAX, "ends at %.9g before it begins at %.9g", term->most, term->least);
+        return false;
+    } else if (term->measure >= SPL_SOFT_AXIS)
+        return check_shape(term, fault);
+    else if (!term->name[0] || !memchr(term->name, 0, sizeof term->name))
+        what = "names no attribute";
+    else if (term->measure == SPL_SOFT_QUANTILE && !(is_share(term->least) && is_share(term->most))) {
+        snprintf(fault, SPL_SOFT_FAULT_MAX, "has quantile %.9g, which is not within 0 and 1",
+                 is_share(term->least) ? term->most : term->least);
+        return false;
+    }
+    snprintf(fault, SPL_SOFT_FAULT_MAX, "%s", what ? what : "");
+    return !what;
 }
 
 int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
 {
-    int rc = SPL_OK;
+    char fault[SPL_SOFT_FAULT_MAX];
     if (soft->count > SPL_SOFT_TERMS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "soft", "%u terms are more than %d", soft->count, SPL_SOFT_TERMS_MAX);
     if ((unsigned)soft->model >= SPL_SOFT_MODEL_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "soft_model", "soft_model %d does not exist", (int)soft->model);
+    if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)
+        return spl_fail_field(err, SPL_E_USAGE, "soft_of", "soft_of %d does not exist", (int)soft->of);
     if (!(soft->opacity >= 0 && soft->opacity <= 1))
         return spl_fail_field(err, SPL_E_USAGE, "soft_opacity", "soft_opacity %g is not within 0 and 1",
                               soft->opacity);
     if (!(soft->blend >= 0 && isfinite(soft->blend)))
         return spl_fail_field(err, SPL_E_USAGE, "soft_blend", "soft_blend %g is not 0 or more", soft->blend);
-    for (uint32_t i = 0; i < soft->count && !rc; i++)
-        rc = check_term(&soft->terms[i], i + 1, err);
-    return rc;
+    for (uint32_t i = 0; i < soft->count; i++)
+        if (!spl_soft_check_term(&soft->terms[i], fault))
+            return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft %s", i + 1, fault);
+    return SPL_OK;
+}
+
+static bool has_attribute(const struct spl_dataset_info *info, const char *name)
+{
+    for (uint32_t i = 0; i < info->stream_count; i++)
+        if (!strcmp(info->streams[i].name, name))
+            return true;
+    return false;
+}
+
+int spl_soft_check_dataset(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
+                           struct spl_error *err)
+{
+    char known[256] = "no attributes";
+    size_t used = 0;
+    for (uint32_t i = 0; i < soft->count && i < SPL_SOFT_TERMS_MAX; i++) {
+        const struct spl_soft_term *term = &soft->terms[i];
+        if (term->measure >= SPL_SOFT_AXIS || has_attribute(info, term->name))
+            continue;
+        for (uint32_t s = 0; s < info->stream_count && used < sizeof known; s++)
+            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", s ? ", " : "", info->streams[s].name);
+        return spl_fail_field(err, SPL_E_INPUT, "soft",
+                              "dataset '%s' has no attribute '%s' that soft could ask for; it has %s", info->id,
+                              term->name, known);
+    }
+    return SPL_OK;
 }

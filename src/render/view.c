@@ -7,6 +7,8 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "geom/size.h"
+#include "render/marks.h"
+#include "render/soft_params.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
@@ -22,7 +24,6 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         .supersample = 1,
         .background = {0, 0, 0, 255},
         .deadline_ns = UINT64_MAX,
-        .soft = {.model = SPL_SOFT_MODEL_EXPRESS, .opacity = 0.3},
     };
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         spl_view_set_param(&known, i, spl_method_param_get(i)->otherwise);
@@ -86,12 +87,15 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
 {
     if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, err);
+    int rc = spl_soft_check_dataset(&view->soft, info, err);
+    if (rc)
+        return rc;
     if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
                               "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
-    return SPL_OK;
+    return spl_marks_resolve(&view->soft, info, NULL, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)

@@ -16,7 +16,7 @@ void spl_headers_open(struct spl_headers *headers)
 
 void spl_headers_add(struct spl_headers *headers, const char *name, const char *format, ...)
 {
-    char text[1024];
+    char text[SPL_SOFT_TEXT_MAX + 1024];
     if (!headers->stream)
         return;
     va_list args;
@@ -84,6 +84,23 @@ void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera
         camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
 }
 
+/* What is soft, as a body says it; its texts have nothing that JSON would escape. */
+static void add_soft(struct spl_headers *headers, const struct spl_soft_params *soft)
+{
+    char terms[SPL_SOFT_TEXT_MAX + 3 * SPL_SOFT_TERMS_MAX] = "";
+    struct spl_soft_params one = {.count = 1};
+    size_t used = 0;
+    for (uint32_t i = 0; i < soft->count && used < sizeof terms; i++) {
+        char text[SPL_SOFT_TEXT_MAX];
+        one.terms[0] = soft->terms[i];
+        spl_soft_print(&one, text, sizeof text);
+        used += (size_t)snprintf(terms + used, sizeof terms - used, "%s\"%s\"", i ? "," : "", text);
+    }
+    spl_headers_add(headers, "Splatd-Soft",
+                    "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%.17g,\"soft_blend\":%.17g,\"soft_of\":\"%s\"}",
+                    terms, spl_soft_model_name(soft->model), soft->opacity, soft->blend, spl_soft_of_name(soft->of));
+}
+
 void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_request *request,
                           const struct spl_encoded *encoded)
 {
@@ -95,4 +112,6 @@ void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_req
         spl_headers_add_layer(headers, request, request->layer, encoded);
     spl_headers_add(headers, "Splatd-Unit", "%s", request->encode.unit);
     spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
+    if (request->view.soft.count)
+        add_soft(headers, &request->view.soft);
 }

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "service/tour/fade.h"
 #include "service/tour/spec.h"
 
 #define require(condition) ((condition) ? (void)0 : (fprintf(stderr, "does not hold: %s\n", #condition), abort()))
@@ -28,6 +29,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     require(spec.frames >= 1 && spec.frames <= limits.frames && spec.fps > 0 && spec.fps <= 1000);
     require(spl_view_check(&spec.view.view, NULL) == 0 && !spec.view.planned);
     for (size_t i = 0; i < spec.frames; i++) {
+        struct spl_view view = spec.view.view;
+        if (spec.fades)
+            spl_fade_apply(spec.fades[i], &view);
+        require(spl_view_check(&view, NULL) == 0);
         const struct spl_camera *camera = &spec.cameras[i];
         require(spl_camera_check(camera, NULL) == 0);
         require(camera->width == spec.view.view.camera.width && camera->height == spec.view.view.camera.height);

@@ -69,6 +69,9 @@ def test_datasets_are_described():
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
 
+SOFT = ["soft_model", "soft_opacity", "soft_blend", "soft_of"]
+
+
 def test_methods_are_those_of_the_document():
     """Names, ranges and defaults, as OpenAPI has them of a view."""
     with Daemon(REAL) as d:
@@ -81,8 +84,8 @@ def test_methods_are_those_of_the_document():
         methods = {method["name"]: method for method in table["methods"]}
         assert methods["splat"]["textures"] and not methods["points"]["textures"]
         assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
-        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"]
-        assert methods["points"]["parameters"] == []
+        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"] + SOFT
+        assert methods["points"]["parameters"] == SOFT
         for parameter in table["parameters"]:
             name, schema = parameter["name"], document[parameter["name"]]
             assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \
@@ -99,6 +102,7 @@ def test_methods_are_those_of_the_document():
         assert [p["name"] for p in table["parameters"] if p["textures"]] == ["atoms"]
         assert [p["name"] for p in table["parameters"] if p["maps"]] == ["maps"]
         assert [p["name"] for p in table["parameters"] if p["primitives"]] == ["primitives"]
+        assert [p["name"] for p in table["parameters"] if p["soft"]] == SOFT
         assert d.ask("/v1/datasets/wall").json()["primitives"] is None
 
 

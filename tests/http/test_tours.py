@@ -196,6 +196,16 @@ def test_a_camera_path_becomes_frames_a_zip_a_stream_and_a_video():
         eventually(lambda: not list(folder.iterdir()))
 
 
+def test_what_is_soft_fades_between_keyframes():
+    """Each frame is the view with the strength that lies between its keys'."""
+    soft = {"soft": "plane:0,0,1,0,0,1>0", **SMALL}
+    with Folder() as folder, Daemon(REAL, "--tours", str(folder)) as d:
+        uri = begin(d, {"path": {"keyframes": [look(3, soft_opacity=1), look(3, soft_opacity=0)]}, "frames": 5,
+                        "settings": soft})["uri"]
+        for frame, opacity in zip(frames_of(d, ended(d, uri)), (1, 0.75, 0.5, 0.25, 0)):
+            assert d.post({**look(3), **soft, "soft_opacity": opacity}).body == frame, opacity
+
+
 def test_every_format_and_member_is_taken():
     extrinsic = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 2, 3, 1]
     intrinsic = {"width": 64, "height": 48, "intrinsic_matrix": [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1]}
@@ -246,6 +256,12 @@ def test_bad_tours_are_refused_by_field():
         ({**body(), "frames": 1.5}, "frames"), ({**body(), "frames": "2"}, "frames"), ({**body(), "fps": 0}, "fps"),
         ({**body(), "seconds": 2}, "seconds"), ({"path": body()["path"]}, "frames"),
         ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].camera.eye"),
+        ({"path": {"keyframes": [look(3), look(4, soft_opacity=1.5)]}}, "keyframes[1].soft_opacity"),
+        ({"path": {"keyframes": [look(3, soft_opacity="0.5")]}}, "keyframes[0].soft_opacity"),
+        ({"path": {"keyframes": [look(3, soft_blend=-1)]}}, "keyframes[0].soft_blend"),
+        ({"path": {"keyframes": [look(3, soft="uncertainty>1")]}}, "keyframes[0].soft"),
+        ({"path": {"keyframes": [look(3)]}, "settings": {"soft": "uncertainty"}}, "settings.soft"),
+        ({"path": {"keyframes": [look(3)]}, "settings": {"soft_model": "exact"}}, "settings.soft_model"),
         ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
         ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
         ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),

@@ -50,8 +50,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_fill = {
     .info = {.name = "fill",
              .help = "one pixel each, hidden ones removed and holes filled in screen space",
-             .params =
-                 SPL_PARAM_BIT(visibility) | SPL_PARAM_BIT(kernel) | SPL_PARAM_BIT(threshold) | SPL_PARAM_BIT(pyramid),
+             .params = SPL_PARAMS_OF_ALL | SPL_PARAM_BIT(visibility) | SPL_PARAM_BIT(kernel) |
+                       SPL_PARAM_BIT(threshold) | SPL_PARAM_BIT(pyramid),
              .finds_normals = true},
     .lines = true,
     .prepare = prepare,

@@ -54,7 +54,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_nearest = {
     .info = {.name = "nearest",
              .help = "oriented discs, the nearest alone, colours smoothed over the samples around",
-             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(maps) | SPL_PARAM_BIT(primitives),
+             .params = SPL_PARAMS_OF_ALL | SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(maps) | SPL_PARAM_BIT(primitives),
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},
     .discs = true,

@@ -9,7 +9,7 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 }
 
 const struct spl_method_row spl_method_points = {
-    .info = {.name = "points", .help = "one pixel each"},
+    .info = {.name = "points", .help = "one pixel each", .params = SPL_PARAMS_OF_ALL},
     .record = record,
     .resolve = SPL_RESOLVED_NEAREST,
     .guesses = {{4, 1, 4, 10, 14.8}, {2, 0.25, 4, 15, 17.2}, {1, 0.25, 4, 20, 20.2}},

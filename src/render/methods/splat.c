@@ -147,7 +147,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 const struct spl_method_row spl_method_splat = {
     .info = {.name = "splat",
              .help = "oriented discs, blended within a margin behind the first surface; specks closed",
-             .params = SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps) | SPL_PARAM_BIT(primitives),
+             .params = SPL_PARAMS_OF_ALL | SPL_PARAM_BIT(margin) | SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps) |
+                       SPL_PARAM_BIT(primitives),
              .textures = true,
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},

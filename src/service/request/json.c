@@ -60,6 +60,11 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
         if (param == PARAM_COUNT)
             return SPL_E_INPUT;
         int kind = spl_params[param].kind;
+        if (kind == SPL_KIND_SOFT) {
+            if ((rc = spl_values_add_soft_json(values, json, err)))
+                return rc;
+            continue;
+        }
         if ((rc = spl_value_claim(&values->v[param], name, err)) ||
             (rc = kind == SPL_KIND_FORM ? spl_camera_form_from_json(values->v, (enum spl_camera_param)param, json, err)
                                         : parse_value(&values->v[param], kind, json, name, err)))

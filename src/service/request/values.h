@@ -22,6 +22,7 @@ enum {
     SPL_KIND_CONTAINER,
     SPL_KIND_DURATION, /* ms */
     SPL_KIND_VERSION,  /* upper and lower 32 bits */
+    SPL_KIND_SOFT,     /* terms, which are kept beside the numbers */
 };
 
 enum param {
@@ -41,6 +42,7 @@ extern const struct param_info spl_params[PARAM_COUNT];
 
 struct values {
     struct spl_value v[PARAM_COUNT]; /* colours: R, G, B, A */
+    struct spl_soft_params soft;     /* terms alone, of PARAM_soft */
 };
 
 /* 0..15, -1 for anything else. */
@@ -65,6 +67,14 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
 /* A body's parameters, those of `place`; none for an empty one. */
 int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
                          struct spl_error *err);
+
+/* soft.c: more terms, as text, or as JSON: text, or an array of such, which may be empty and then says that nothing is
+ * soft. */
+int spl_values_add_soft(struct values *values, const char *text, struct spl_error *err);
+int spl_values_add_soft_json(struct values *values, const json_t *json, struct spl_error *err);
+/* The terms in the world; with crs shapes are given in that. */
+int spl_values_resolve_soft(const struct values *values, const struct spl_camera_defaults *defaults,
+                            struct spl_view *view, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,

@@ -19,6 +19,7 @@
 #include "service/datasets/library.h"
 #include "service/ops/counters.h"
 #include "service/state.h"
+#include "service/tour/fade.h"
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
@@ -52,6 +53,8 @@ static void end(struct spl_tour *tour, enum spl_tour_state state)
     tour->age_s = 0;
     free(tour->spec.cameras);
     tour->spec.cameras = NULL;
+    free(tour->spec.fades);
+    tour->spec.fades = NULL;
     free(tour->body); // may be large, and nothing is made of it any more
     tour->body = NULL;
     tour->body_length = 0;
@@ -214,6 +217,8 @@ static bool submit(struct spl_tour *tour, size_t frame)
     job->plan = entry->plan;
     job->request = tour->spec.view;
     job->request.view.camera = tour->spec.cameras[frame];
+    if (tour->spec.fades)
+        spl_fade_apply(tour->spec.fades[frame], &job->request.view);
     spl_view_set_unit(&job->request, entry->info);
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = SPL_NEVER; // views go first, however long that takes

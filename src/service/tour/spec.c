@@ -12,6 +12,7 @@
 #include "cloud/path.h"
 #include "image/video.h"
 #include "service/request/body.h"
+#include "service/tour/fade.h"
 
 static const char *const sides[] = {"width", "height"};
 
@@ -141,10 +142,13 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
     own.near = camera->near;
     own.far = camera->far;
     const json_t *settings = json_object_get(body, "settings");
+    struct spl_path_value values[SPL_PATH_VALUES];
     struct spl_path_options options = {.width = json_object_get(settings, sides[0]) ? camera->width : 0,
                                        .height = json_object_get(settings, sides[1]) ? camera->height : 0,
                                        .defaults = &own,
-                                       .limits = &limits->image};
+                                       .limits = &limits->image,
+                                       .values = values};
+    spl_fade_get_values(values);
     if (!json)
         return spl_fail_field(err, SPL_E_INPUT, "path",
                               "a tour needs a path; TourRequest in /v1/openapi.json has the formats");
@@ -212,7 +216,8 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))
         rc = SPL_E_NOMEM;
-    else if (!(rc = spl_camera_path_sample(&path, &motion, out->frames, out->cameras, err)))
+    else if (!(rc = spl_camera_path_sample(&path, &motion, out->frames, out->cameras, err)) &&
+             !(rc = spl_fade_sample(&path, &motion, out->frames, &out->fades, err)))
         rc = check_video(body, out, err);
     out->view.view.camera = rc ? out->view.view.camera : out->cameras[0];
 done:
@@ -235,5 +240,6 @@ int spl_tour_spec_from_text(const char *body, size_t length, const struct spl_ca
 void spl_tour_spec_finish(struct spl_tour_spec *spec)
 {
     free(spec->cameras);
+    free(spec->fades);
     *spec = (struct spl_tour_spec){0};
 }

@@ -5,6 +5,7 @@
 
 #include <jansson.h>
 
+#include "geom/camera_path.h"
 #include "service/request/request.h"
 
 struct spl_tour_limits {
@@ -13,8 +14,9 @@ struct spl_tour_limits {
 };
 
 struct spl_tour_spec {
-    struct spl_view_request view; /* of every frame, but for its camera's pose and lens */
+    struct spl_view_request view; /* of every frame, but for its camera's pose and lens, and fades */
     struct spl_camera *cameras;   /* one a frame */
+    double (*fades)[SPL_PATH_VALUES]; /* one a frame, for spl_fade_apply(); NULL = nothing changes */
     size_t frames;
     double fps;
     bool video; /* an MP4 is wanted as well */

@@ -71,6 +71,17 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
     add(form, (uint64_t)camera->width << 32 | camera->height);
 }
 
+/* Their one text stands for what is soft; another order of terms is another key. */
+static void add_terms(struct form *form, const struct spl_soft_params *soft)
+{
+    char text[SPL_SOFT_TEXT_MAX + 1];
+    XXH128_hash_t hash = {0};
+    if (soft->count)
+        hash = XXH3_128bits(text, (size_t)spl_soft_print(soft, text, sizeof text));
+    add(form, hash.high64);
+    add(form, hash.low64);
+}
+
 static void add_encoding(struct form *form, const struct spl_view_request *request, enum spl_layer layer)
 {
     struct spl_encode_options options = spl_view_get_encoding(request, layer), *encode = &options;
@@ -100,9 +111,11 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {
         const struct spl_method_param_info *param = spl_method_param_get(i);
         bool counts = params >> i & 1 && spl_method_param_counts(param, dataset) &&
-                      (colored || param->changes != SPL_CHANGES_TEXTURES);
+                      (colored || param->changes != SPL_CHANGES_TEXTURES) &&
+                      (view->soft.count || param->changes != SPL_CHANGES_SOFT);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
+    add_terms(&form, &view->soft);
     add(&form, colored ? background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {

@@ -165,9 +165,12 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
     const struct spl_view *view = &request->view;
     uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params;
     params &= ~(SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps)); /* which are settings */
+    if (view->soft.count)
+        return; /* what it took says nothing of the settings that were measured */
+    params &= ~SPL_PARAMS_OF_ALL;
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (params >> i & 1 && spl_view_get_param(view, i) != spl_method_param_get(i)->otherwise)
-            return; /* what it took says nothing of the settings that were measured */
+            return;
     struct spl_setting setting = {view->method, view->lod, view->supersample,
                                   plan->info->atoms ? view->disc.atoms : SPL_TEXTURE_ATOMS,
                                   !plan->info->maps           ? SPL_SETTING_NO_MAPS

@@ -1,0 +1,61 @@
+"""What is soft over HTTP: it comes back in a header, from every route that takes it, counts in ETags only where there is
+something soft, and is refused where the dataset has nothing of it."""
+import json
+
+from harness import FAKE, REAL, VIEW, Daemon, run
+
+PICK = VIEW.replace("/view", "/pick")
+AXIS = "axis:0,0,0,0,0,1<0.5"
+
+
+def soft(reply):
+    return json.loads(reply.headers["Splatd-Soft"])
+
+
+def test_what_is_soft_comes_back():
+    with Daemon(REAL) as d:
+        query = f"width=16&height=16&soft=0.25%3Cuncertainty&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
+        whole = {"soft": ["uncertainty>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0,
+                 "soft_of": "solid"}
+        first = d.ask(f"{VIEW}?{query}")
+        assert first.status == 200 and soft(first) == whole, first.headers
+        assert soft(d.ask(f"{VIEW}?{query}", "HEAD")) == whole
+        again = d.post({"width": 16, "height": 16, **soft(first)})
+        assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
+        pick = d.ask(f"{PICK}?x=8&y=8&{query}&soft_of=first")
+        assert pick.status == 200 and soft(pick) == {**whole, "soft_of": "first"}
+        for text in ["uncertainty>q0.9", "uncertainty:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
+            reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer", "soft_of": "median"})
+            assert reply.status == 200 and " or ".join(soft(reply)["soft"]) == text, reply.headers
+        assert d.ask(f"{VIEW}?width=16&height=16&soft_opacity=0.5").headers["Splatd-Soft"] is None
+        batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "soft": AXIS, "views": [{}, {"soft": []}]}))
+        assert batch.status == 200 and batch.body.count(b"Splatd-Soft: ") == 1, batch.body[:2000]
+
+
+def test_it_counts_where_something_is_soft():
+    with Daemon(REAL) as d:
+        def tag(query):
+            return d.ask(f"{VIEW}?width=16&height=16&{query}", "HEAD").headers["ETag"]
+        assert tag("soft_opacity=0.9&soft_of=first&soft_model=layer") == tag("")
+        tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_model=base",
+                                         f"soft={AXIS}&soft_of=first", f"soft={AXIS}&method=points", "soft=uncertainty>0.5")]
+        assert len(set(tags)) == len(tags), tags
+        assert tag("soft=uncertainty>0.50") == tags[-1] and tag("soft=.5<uncertainty") == tags[-1]
+
+
+def test_a_dataset_is_asked_for_what_it_has():
+    with Daemon(FAKE) as d:
+        had = [a["name"] for a in d.ask("/v1/datasets/wall").json()["attributes"]]
+        for query in ["soft=smell>1", "soft=uncertainty>1+or+smell>1", "soft=smell>1&budget=500ms"]:
+            reply = d.ask(f"{VIEW}?{query}")
+            assert reply.status == 400 and reply.json()["field"] == "soft", reply.body
+            assert "'smell'" in reply.json()["detail"] and all(name in reply.json()["detail"] for name in had), reply.body
+        assert d.ask(f"{PICK}?x=1&y=1&soft=smell>1").json()["field"] == "soft"
+        reply = d.ask(VIEW + "s", "POST", json.dumps({"views": [{"soft": "smell>1", "width": 8}]}))
+        assert b"smell" in reply.body
+        long = " or ".join(["axis:-1.2345678901234567,500000.12345678901,0.12345678901234,0,0,1<0.12345678901234"] * 16)
+        reply = d.ask(f"{VIEW}?width=8&height=8&soft={long.replace(' ', '+')}")
+        assert reply.status == 200 and len(soft(reply)["soft"]) == 16
+
+
+run(globals())
