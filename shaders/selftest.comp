@@ -97,6 +97,7 @@ void put_chunk(spl_draw_chunk c)
     put(c.count);
     put(c.texture);
     put(c.texture_scale);
+    put(c.marks);
 }
 
 void main()

@@ -170,6 +170,10 @@
     {0.636619697f, -0.21219691f, 0.127113627f, -0.0891477141f, 0.0628271488f, -0.037452184f, 0.0151391483f,            \
      -0.00290285373f}
 
+/* Soft spheres of model concentric have a shell for every so many samples of their radius, at most so many. */
+#define SPL_SOFT_SHELL_SAMPLES 4
+#define SPL_SOFT_SHELLS_MAX 16
+
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
 /* One visible chunk of one frame, made by the CPU from the chunk's header and the camera. */
@@ -188,6 +192,7 @@ struct spl_draw_chunk {
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
                                              width, metres */
+    SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -226,7 +231,7 @@ struct spl_draw_chunk {
 #define SPL_CLIP_OFFSET_BITS 3
 #define SPL_CLIP_BITS 8
 
-#define SPL_CHUNK_WORDS 18 /* of a spl_draw_chunk */
+#define SPL_CHUNK_WORDS 19 /* of a spl_draw_chunk */
 
 /* Panels: SPL_PANEL_SIDE x SPL_PANEL_SIDE cells of a plane, block by block of 4 x 4. A chunk of them begins with two
  * words a panel:
@@ -269,6 +274,15 @@ struct spl_draw_chunk {
 /* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of them. */
 #define SPL_MESH_LANES 32
 #define SPL_MESH_WINDOW 112
+
+/* Marks: a byte a splat, four a word from the low end: SPL_CHUNK_SPLATS of a chunk of discs, SPL_MARKS_PANEL words of
+ * each panel or mesh, a byte a cell, row by row. 0 = solid; else soft, 1 + SPL_MARK_MOST times the share W of eq. 22 of
+ * Soft-Transparency, which is 1 (SPL_MARK_WHOLE) beyond the range in which a splat is partly solid. */
+#define SPL_MARKS_DISCS (SPL_CHUNK_SPLATS / 4)
+#define SPL_MARKS_PANEL (SPL_PANEL_SIDE * SPL_PANEL_SIDE / 4)
+#define SPL_MARKS_NONE 32 /* words that the buffer begins with, so that no chunk's marks are at 0 */
+#define SPL_MARK_MOST 254
+#define SPL_MARK_WHOLE 255u
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
@@ -320,11 +334,48 @@ struct spl_frame_params {
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };
 
+/* Soft transparency: spheres as items in the order of their ids, which are sorted by depth and listed by the tiles of
+ * SPL_SOFT_TILE samples a side that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS words: x y z
+ * of the centre in view space, the radius, colour | mark << 24, id. Behind all items lie their rectangles, a word each:
+ * the first tile (row * columns + column) in 24 bits, columns less 1 and rows less 1 in 4 bits each. */
+#define SPL_SOFT_TILE 8
+#define SPL_SOFT_SAMPLES 8 /* of a column of a tile that an invocation blends */
+#define SPL_SOFT_ITEM_WORDS 6
+#define SPL_SOFT_RECT_COLUMNS 24
+#define SPL_SOFT_RECT_ROWS 28
+#define SPL_SOFT_SPAN_MAX 16 /* tiles of a rectangle's side */
+#define SPL_SOFT_WHOLLY 255u /* a mark: soft throughout; 1..254 are (mark - 1) / 254 soft, eq. 22 */
+/* What is in front lets this much through, in fixed point, and is not looked behind where it is less than the least. */
+#define SPL_SOFT_CLEAR 0xffffffu
+#define SPL_SOFT_CLEAR_LEAST 0x4000u
+#define SPL_SOFT_STATE_WORDS 4 /* a sample: sums of red, green, blue times share, share covered; 0 = nothing */
+#define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
+/* (cos(pi d / r) + 1) / 2 = m^2 (A + B m + C m^2), m = 1 - (d / r)^2, to 5e-5; 1 for m = 1. */
+#define SPL_SOFT_EXPRESS_A 0.62015722f
+#define SPL_SOFT_EXPRESS_B 0.29355069f
+#define SPL_SOFT_EXPRESS_C 0.08629209f
+
+/* Of one dispatch of it. */
+struct spl_soft_step {
+    SPL_U32 count;         /* items to sort or to list; tiles to blend */
+    SPL_U32 block, blocks; /* items an invocation walks; invocations */
+    SPL_U32 digits;        /* counters of an invocation: values of a digit, or tiles */
+    SPL_U32 low, shift;    /* a digit is (key - low) >> shift & (digits - 1) */
+    SPL_U32 columns;       /* tiles of a row */
+    SPL_U32 rects;         /* word of the items' rectangles */
+    SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
+    SPL_U32 first;         /* word of the lists where those of this dispatch start */
+    SPL_F32 opacity;       /* at a sphere's centre, of 65536 */
+};
+
 #ifndef SPL_GLSL
+_Static_assert(sizeof(struct spl_soft_step) <= 256, "spl_soft_step fits its slot");
+_Static_assert(SPL_WINDOW / SPL_SOFT_TILE + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW % SPL_SOFT_TILE == 0,
+               "a window is whole tiles, and any footprint that is not cut in windows fits a rectangle");
 _Static_assert(SPL_RUN_PANELS << SPL_RUN_BITS == SPL_PANELS_MAX, "runs of panels");
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
-_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 72 bytes on both sides");
+_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 76 bytes on both sides");
 _Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000,
                "an invocation ends within its rounds, of which a sample that may be trimmed takes two");
 _Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE * SPL_PANEL_SIDE / SPL_LANES < 60000,

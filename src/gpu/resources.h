@@ -20,6 +20,16 @@ enum spl_resource {
     SPL_RESOURCE_OCCLUDERS, /* uint[], greatest depth word of every tile of SPL_OCCLUSION_TILE samples a side */
     SPL_RESOURCE_SUMMED,    /* uint[], sums of atoms, texels as in the dictionary */
     SPL_RESOURCE_SURFACE,   /* float[], view depth of the surface, one a sample */
+    SPL_RESOURCE_TESTS,     /* uint[], what marks are made of (src/render/marks.h) */
+    SPL_RESOURCE_MARKS,     /* uint[], a byte for each splat or cell of chunks of which some are soft */
+    SPL_RESOURCE_STEP,      /* struct spl_soft_step; the rest of soft transparency: src/render/soft/order.h */
+    SPL_RESOURCE_ITEMS,     /* uint[], soft spheres and their rectangles */
+    SPL_RESOURCE_SORT_FROM, /* uint[], pairs of key and item; lists of items, tile by tile */
+    SPL_RESOURCE_SORT_TO,   /* the same, written */
+    SPL_RESOURCE_COUNTS,    /* uint[], counters, block by block of what is sorted */
+    SPL_RESOURCE_TOTALS,    /* uint[], of all blocks, a digit each; then where digits start */
+    SPL_RESOURCE_LISTS,     /* uint[], tiles to blend: column | row << 16, first and end of its items */
+    SPL_RESOURCE_SOFT,      /* uint[], SPL_SOFT_STATE_WORDS a sample */
     SPL_RESOURCE_OUTPUT,    /* uint[], requested layers one after the other, one word a pixel */
     SPL_RESOURCE_COUNT
 };

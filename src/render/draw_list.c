@@ -1,5 +1,6 @@
-/* The draw list; see draw_list.h. Chunks come roughly front to back; entries are laid out phase by phase and page by
- * page in that order. A key has one batch, or several where it is much work. */
+/* The draw list; see draw_list.h. Chunks come roughly front to back, in whatever roles; laid out, solid ones keep that
+ * order and soft ones follow by their ids. Entries are laid out phase by phase and page by page in that order. A key
+ * has one batch, or several where it is much work. */
 #include "render/draw_list.h"
 
 #include <stdlib.h>
@@ -50,18 +51,24 @@ static struct spl_draw_key key_of(const struct spl_draw_origin *origin, const st
                                  .trims = origin->trims,
                                  .planes = (uint8_t)(chunk->texture >> SPL_CHUNK_TEXTURE_PLANES),
                                  .smooth = chunk->texture >> SPL_CHUNK_TEXTURE_SMOOTH & 1,
-                                 .apart = chunk->color_bits >> SPL_COLOR_CLIP || origin->lined};
+                                 .apart = chunk->color_bits >> SPL_COLOR_CLIP || origin->lined,
+                                 .marked = chunk->marks != 0,
+                                 .cells = origin->cells,
+                                 .role = origin->role};
 }
 
 static uint64_t word_of(const struct spl_draw_key *key)
 {
-    return (uint64_t)key->page << 32 | (uint32_t)key->trims << 16 | (uint32_t)key->kind << 8 |
+    uint32_t kind = key->kind | (uint32_t)key->role << 3 | (uint32_t)key->marked << 5 | (uint32_t)key->cells << 6;
+    return (uint64_t)key->page << 32 | (uint32_t)key->trims << 16 | kind << 8 |
            (uint32_t)key->planes << 3 | (uint32_t)key->smooth << 2 | (uint32_t)key->apart << 1 | key->back;
 }
 
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
+    list->first_soft_chunk = list->first_mark_chunk = list->test_count = 0;
+    list->mark_words = SPL_MARKS_NONE;
     memset(list->drawn, 0, sizeof list->drawn);
     list->listed_splats = list->sample_splats = list->sample_panels = 0;
     list->nodes = 0;
@@ -98,7 +105,20 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
     list->work_of_chunk[list->chunk_count] = splats(chunk) * (base_work + (looks < UINT32_MAX ? looks : UINT32_MAX));
     list->key_of_chunk[list->chunk_count++] = key_of(origin, chunk);
     list->entry_count += entries;
-    list->listed_splats += worth(origin->kind, chunk);
+    if (origin->role == SPL_ROLE_SOLID)
+        list->listed_splats += worth(origin->kind, chunk);
+    return SPL_OK;
+}
+
+int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, uint32_t count, uint32_t *first,
+                            struct spl_error *err)
+{
+    int rc = grow((void **)&list->tests, &list->test_capacity, list->test_count + count, sizeof *words, err);
+    if (rc)
+        return rc;
+    memcpy(list->tests + list->test_count, words, count * sizeof *words);
+    *first = (uint32_t)list->test_count;
+    list->test_count += count;
     return SPL_OK;
 }
 
@@ -159,13 +179,13 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, s
     struct table table = {0};
     uint64_t before = 0;
     int rc = SPL_OK;
-    list->first_back_chunk = list->chunk_count;
+    list->first_back_chunk = list->first_soft_chunk;
     for (size_t i = 0; i < list->chunk_count && !rc; i++) {
         struct spl_draw_key *key = &list->key_of_chunk[i];
-        if (2 * before >= list->listed_splats && list->first_back_chunk == list->chunk_count)
-            list->first_back_chunk = i;
+        if (2 * before >= list->listed_splats && list->first_back_chunk == list->first_soft_chunk)
+            list->first_back_chunk = i < list->first_soft_chunk ? i : list->first_soft_chunk;
         before += worth(key->kind, &list->chunks[i]);
-        key->back = i >= list->first_back_chunk;
+        key->back = i >= list->first_back_chunk && key->role == SPL_ROLE_SOLID;
         const uint64_t work = list->work_of_chunk[i];
         if (i && word_of(key) == word_of(key - 1) && has_room(&list->batches[batch_of_chunk[i - 1]], work))
             batch_of_chunk[i] = batch_of_chunk[i - 1]; /* most are */
@@ -180,8 +200,63 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, s
     return rc;
 }
 
+/* A chunk's place among those of other roles. */
+struct place {
+    uint32_t role, first_id, at;
+};
+
+static int by_place(const void *one, const void *other)
+{
+    const struct place *a = one, *b = other;
+    if (a->role != b->role)
+        return a->role < b->role ? -1 : 1;
+    if (a->role == SPL_ROLE_SOFT && a->first_id != b->first_id)
+        return a->first_id < b->first_id ? -1 : 1;
+    return a->at < b->at ? -1 : a->at > b->at;
+}
+
+/* Puts what `array` has of each chunk where `places` says, through `copy`. */
+static void move(void *array, size_t size, const struct place *places, size_t count, void *copy)
+{
+    for (size_t i = 0; i < count; i++)
+        memcpy((char *)copy + i * size, (const char *)array + places[i].at * size, size);
+    memcpy(array, copy, count * size);
+}
+
+/* Solid chunks first, then soft ones, then those to mark. Nothing is moved where all are solid. */
+static int sort_roles(struct spl_draw_list *list, struct spl_error *err)
+{
+    const size_t count = list->chunk_count;
+    size_t roles[SPL_ROLE_MARK + 1] = {0};
+    for (size_t i = 0; i < count; i++)
+        roles[list->key_of_chunk[i].role]++;
+    list->first_soft_chunk = roles[SPL_ROLE_SOLID];
+    list->first_mark_chunk = roles[SPL_ROLE_SOLID] + roles[SPL_ROLE_SOFT];
+    if (roles[SPL_ROLE_SOLID] == count)
+        return SPL_OK;
+    struct place *places = spl_alloc_raw(count, sizeof *places, err);
+    void *copy = places ? spl_alloc_raw(count, sizeof *list->chunks, err) : NULL; /* the largest of the four */
+    if (!copy) {
+        free(places);
+        return SPL_E_NOMEM;
+    }
+    for (size_t i = 0; i < count; i++)
+        places[i] = (struct place){list->key_of_chunk[i].role, list->chunks[i].first_id, (uint32_t)i};
+    qsort(places, count, sizeof *places, by_place);
+    move(list->chunks, sizeof *list->chunks, places, count, copy);
+    move(list->bounds, sizeof *list->bounds, places, count, copy);
+    move(list->key_of_chunk, sizeof *list->key_of_chunk, places, count, copy);
+    move(list->work_of_chunk, sizeof *list->work_of_chunk, places, count, copy);
+    free(places);
+    free(copy);
+    return SPL_OK;
+}
+
 int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
 {
+    int sorted = sort_roles(list, err);
+    if (sorted)
+        return sorted;
     uint32_t *batch_of_chunk = spl_alloc_raw(list->chunk_count + 1, sizeof *batch_of_chunk, err);
     int rc = batch_of_chunk
                  ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)
@@ -236,18 +311,10 @@ uint64_t spl_draw_list_count_rounds(struct spl_draw_list *list, const struct spl
     return rounds;
 }
 
-bool spl_draw_list_has(const struct spl_draw_list *list, uint32_t kind)
+bool spl_draw_list_has(const struct spl_draw_list *list, uint32_t kind, uint32_t role)
 {
     for (size_t i = 0; i < list->batch_count; i++)
-        if (list->batches[i].key.kind == kind)
-            return true;
-    return false;
-}
-
-bool spl_draw_list_trims(const struct spl_draw_list *list, uint32_t kind)
-{
-    for (size_t i = 0; i < list->batch_count; i++)
-        if (list->batches[i].key.kind == kind && list->batches[i].key.trims)
+        if (list->batches[i].key.kind == kind && list->batches[i].key.role == role)
             return true;
     return false;
 }
@@ -261,5 +328,6 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->maps);
     free(list->key_of_chunk);
     free(list->work_of_chunk);
+    free(list->tests);
     *list = (struct spl_draw_list){0};
 }

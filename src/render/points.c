@@ -13,10 +13,11 @@ int spl_points_record(struct spl_tile *tile, uint32_t group, bool filled, struct
     for (uint32_t pass = 0; pass < (wide ? 1u : 2u); pass++) {
         struct spl_disc_kernels kernel = {0};
         struct spl_kernel_key key = {"points", true, {group, pass, filled}};
-        int rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernel.of[0], err);
+        const struct spl_dispatch discs = {.phases = SPL_PHASE_BOTH};
+        int rc = spl_tile_get_plain_kernels(tile, key, &discs, &kernel, err);
         if (rc)
             return rc;
-        rc = spl_tile_dispatch_splats(tile, &kernel, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
+        rc = spl_tile_dispatch_splats(tile, &kernel, &discs, err);
         if (rc)
             return rc;
         rc = spl_tile_dispatch_panels(

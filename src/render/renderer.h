@@ -27,6 +27,8 @@ struct spl_scratch {
     struct spl_gpu_buffer *chunks;   /* struct spl_draw_chunk[], grown on demand */
     struct spl_gpu_buffer *bounds;   /* struct spl_chunk_bounds[], grown on demand */
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
+    struct spl_gpu_buffer *tests;    /* uint[], grown on demand */
+    struct spl_gpu_buffer *marks;    /* bytes, grown on demand; what is in use is written in every tile */
 };
 
 /* What the two blocks of scratch memory hold in turns. An area is begun, which asserts that its block is free, and
@@ -76,7 +78,7 @@ enum spl_stage { SPL_STAGE_BEGIN, SPL_STAGE_CLEAR, SPL_STAGE_DEPTH, SPL_STAGE_SH
 int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
                      const struct spl_renderer_options *options, struct spl_error *err);
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
-/* Copies the draw list into the mapped buffers, growing them where it does not fit, at the cost of pages that the frame
+/* Copies the draw list into the mapped buffers, growing them, and that of its marks, where it does not fit, at the cost of pages that the frame
  * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err);
@@ -98,9 +100,11 @@ int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *er
  * SPL_E_LIMIT. */
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 
-/* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), or both; NULL = as
- * those that have neither. */
-enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_COUNT = 4 };
+/* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), of which some splats
+ * are soft (common/marks.glsl), or several of these; NULL = as those that have none, but for marks. */
+enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_COUNT = 8 };
+/* The constant that says whether a kernel looks at marks. */
+enum { SPL_CONSTANT_MARKED = 3 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
 };
@@ -108,6 +112,11 @@ struct spl_disc_kernels {
 /* Those of `key` that the tile's chunks need, and the first. */
 int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
                               struct spl_error *err);
+
+/* The same of the tile's solid chunks of `what`, whose kernels know no clip lines. */
+struct spl_dispatch;
+int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key, const struct spl_dispatch *what,
+                               struct spl_disc_kernels *out, struct spl_error *err);
 
 enum spl_phase { SPL_PHASE_FRONT = 1, SPL_PHASE_BACK = 2, SPL_PHASE_BOTH = 3 };
 /* Records the kernel of each chunk once per page of the draw list (and per the device's largest dispatch), for the
@@ -119,6 +128,9 @@ struct spl_dispatch {
     bool by_texture; /* only chunks drawn with `planes` planes of atoms, interpolated or not */
     uint32_t planes;
     bool smooth;
+    uint32_t role;   /* enum spl_draw_role */
+    bool by_cells;   /* only panels or meshes whose cells are drawn in any case, or only the others */
+    bool cells;
     struct spl_gpu_kernel *sum; /* runs before, to sum textures into SPL_AREA_SUMMED; NULL = none */
 };
 int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,
@@ -137,9 +149,10 @@ struct spl_panel_kernels {
 };
 int spl_tile_dispatch_panels(struct spl_tile *tile, const struct spl_panel_kernels *names, struct spl_kernel_key key,
                              enum spl_phase phases, struct spl_error *err);
-/* Records the dropping of chunks from `first_chunk` on that the depth drawn so far hides; `wide`: of words of 64 bits.
- */
-int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err);
+/* Records the dropping of those of the chunks [first_chunk, end_chunk) that the depth drawn so far hides; `wide`: of
+ * words of 64 bits. */
+int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, size_t end_chunk, bool wide,
+                                struct spl_error *err);
 /* Records a kernel, one invocation for each of `items`, and a barrier. */
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,
                             const struct spl_frame_params *params, uint32_t items, struct spl_error *err);

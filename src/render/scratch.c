@@ -7,6 +7,8 @@
 
 enum {
     chunks_at_start = 16384,
+    tests_at_start = 4096, // bytes
+    marks_at_start = 4096,
     chunk_entries_at_start = 16, // 128 splats in runs of 32 are 4; near ones are listed once a window
     run_texels = SPL_RUN_SPLATS * SPL_SUMMED_WORDS(SPL_TEXTURE_SIZE_MAX)
 };
@@ -47,6 +49,8 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_ENTRIES].buffer = scratch->entries;
     bindings[SPL_RESOURCE_CHUNKS].buffer = scratch->chunks;
     bindings[SPL_RESOURCE_BOUNDS].buffer = scratch->bounds;
+    bindings[SPL_RESOURCE_TESTS].buffer = scratch->tests;
+    bindings[SPL_RESOURCE_MARKS].buffer = scratch->marks;
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_MAP].buffer = tile->map;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
@@ -100,6 +104,8 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->chunks, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_draw_chunk)},
         {&scratch->bounds, SPL_GPU_UPLOAD, chunks * sizeof(struct spl_chunk_bounds)},
         {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
+        {&scratch->tests, SPL_GPU_UPLOAD, tests_at_start},
+        {&scratch->marks, SPL_GPU_DEVICE, marks_at_start},
     };
     uint64_t working = 0, mib = 1 << 20;
     uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
@@ -127,7 +133,7 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
     struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->large,  scratch->small,  scratch->output,
                                     scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
-                                    scratch->entries};
+                                    scratch->entries,  scratch->tests,  scratch->marks};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     *scratch = (struct spl_scratch){0};
@@ -141,16 +147,21 @@ static uint64_t room(const struct spl_scratch *scratch, const struct spl_residen
     return limit > kept ? limit - kept : 0;
 }
 
-static int upload(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
-                  const void *from, uint64_t bytes, struct spl_error *err)
+/* Has a buffer hold so many bytes; what it held is lost where it grows. */
+static int make_room(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
+                     enum spl_gpu_buffer_kind kind, uint64_t bytes, struct spl_error *err)
 {
     struct spl_gpu *gpu = residency->gpu;
     if (spl_gpu_buffer_get_bytes(*buffer) < bytes) {
         uint64_t have = spl_gpu_buffer_get_bytes(*buffer), larger = have, left = room(scratch, residency);
         uint64_t most = spl_gpu_get_limits(gpu)->binding_bytes;
+        if (bytes > most)
+            return spl_fail_field(err, SPL_E_LIMIT, "lod",
+                                  "a draw list of %" PRIu64 " bytes is more than the device binds at once, %" PRIu64
+                                  "; raise lod", bytes, most);
         while (larger < bytes)
             larger *= 2;
-        if (larger > most && bytes <= most)
+        if (larger > most)
             larger = most;
         larger = taken(larger <= left ? larger : bytes);
         if (larger > left) // both are there for a moment
@@ -159,16 +170,23 @@ static int upload(struct spl_scratch *scratch, struct spl_residency *residency, 
                             "dataset's first page; raise lod, or memory-limit above %" PRIu64, bytes,
                             spl_gpu_get_limits(gpu)->memory_bytes);
         struct spl_gpu_buffer *replacement;
-        int rc = spl_residency_make_buffer(residency, SPL_GPU_UPLOAD, larger, &replacement, err);
+        int rc = spl_residency_make_buffer(residency, kind, larger, &replacement, err);
         if (rc)
             return rc;
         spl_gpu_buffer_destroy(gpu, *buffer);
         *buffer = replacement;
         scratch->taken_bytes += larger - taken(have);
     }
-    if (bytes)
-        memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
     return SPL_OK;
+}
+
+static int upload(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
+                  const void *from, uint64_t bytes, struct spl_error *err)
+{
+    int rc = make_room(scratch, residency, buffer, SPL_GPU_UPLOAD, bytes, err);
+    if (!rc && bytes)
+        memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
+    return rc;
 }
 
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
@@ -182,8 +200,9 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
         {&scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks},
         {&scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds},
         {&scratch->entries, list->entries, list->entry_count * sizeof *list->entries},
+        {&scratch->tests, list->tests, list->test_count * sizeof *list->tests},
     };
-    int rc = SPL_OK;
+    int rc = make_room(scratch, residency, &scratch->marks, SPL_GPU_DEVICE, list->mark_words * sizeof(uint32_t), err);
     for (size_t i = 0; i < sizeof all / sizeof *all && !rc; i++)
         rc = upload(scratch, residency, all[i].buffer, all[i].from, all[i].bytes, err);
     return rc;

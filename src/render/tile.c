@@ -9,7 +9,15 @@
 
 static uint32_t ends_of(const struct spl_draw_key *key)
 {
-    return (key->apart ? SPL_ENDS_CLIPPED : 0) | (key->trims ? SPL_ENDS_TRIMMED : 0);
+    return (key->apart ? SPL_ENDS_CLIPPED : 0) | (key->trims ? SPL_ENDS_TRIMMED : 0) |
+           (key->marked ? SPL_ENDS_MARKED : 0);
+}
+
+/* Is a batch what is asked for? */
+static bool is_of(const struct spl_dispatch *what, const struct spl_draw_key *key)
+{
+    return what->kind == key->kind && what->role == key->role && (!what->by_cells || what->cells == key->cells) &&
+           (!what->by_texture || (what->planes == key->planes && what->smooth == key->smooth));
 }
 
 int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
@@ -20,15 +28,47 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
     uint32_t needed = 1;
     int rc = SPL_OK;
     for (size_t i = 0; i < r->list.batch_count; i++)
-        needed |= 1u << ends_of(&r->list.batches[i].key);
+        if (r->list.batches[i].key.role == SPL_ROLE_SOLID)
+            needed |= 1u << ends_of(&r->list.batches[i].key);
     *out = (struct spl_disc_kernels){0};
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
+        key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
         key.trims = ends & SPL_ENDS_TRIMMED;
         if (needed >> ends & 1)
             rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
     }
     return rc;
+}
+
+int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key, const struct spl_dispatch *what,
+                               struct spl_disc_kernels *out, struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    uint32_t needed = 0;
+    int rc = SPL_OK;
+    for (size_t i = 0; i < r->list.batch_count; i++)
+        if (is_of(what, &r->list.batches[i].key))
+            needed |= 1u << (ends_of(&r->list.batches[i].key) & ~(uint32_t)SPL_ENDS_CLIPPED);
+    *out = (struct spl_disc_kernels){0};
+    for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
+        key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
+        key.trims = ends & SPL_ENDS_TRIMMED;
+        if (needed >> ends & 1)
+            rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
+    }
+    return rc;
+}
+
+/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks. */
+static struct spl_gpu_kernel *kernel_of(const struct spl_disc_kernels *kernels, uint32_t ends)
+{
+    if (!kernels->of[ends])
+        ends &= ~(uint32_t)SPL_ENDS_CLIPPED;
+    if (!kernels->of[ends])
+        ends &= SPL_ENDS_MARKED;
+    spl_assert(kernels->of[ends]);
+    return kernels->of[ends];
 }
 
 static int too_many(struct spl_error *err)
@@ -122,8 +162,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
     spl_tile_bind(tile, bindings);
     for (size_t i = 0; i < list->batch_count && !rc; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
-        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || what->kind != batch->key.kind ||
-            (what->by_texture && (what->planes != batch->key.planes || what->smooth != batch->key.smooth)))
+        if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || !is_of(what, &batch->key))
             continue;
         bindings[SPL_RESOURCE_PAGE].buffer = resident->pages[batch->key.page].buffer;
         if (what->planes) {
@@ -135,7 +174,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             spl_tile_set_map(tile, batch->key.trims - 1u);
             bindings[SPL_RESOURCE_MAP].buffer = tile->map;
         }
-        struct spl_gpu_kernel *kernel = kernels->of[ends_of(&batch->key)];
+        struct spl_gpu_kernel *kernel = kernel_of(kernels, ends_of(&batch->key));
         uint32_t round = batch->first_round;
         rc = spl_tile_add_work(tile, batch->work, err);
         for (uint32_t done = 0; done < batch->entries && !rc; done += batch->round_entries) {
@@ -148,7 +187,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
                 break;
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);
-            spl_gpu_dispatch(tile->renderer->gpu, kernel ? kernel : kernels->of[0], bindings,
+            spl_gpu_dispatch(tile->renderer->gpu, kernel, bindings,
                              (uint32_t)(((uint64_t)params.entries * lanes + SPL_WORKGROUP - 1) / SPL_WORKGROUP));
         }
     }
@@ -159,7 +198,7 @@ int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, en
                             struct spl_error *err)
 {
     struct spl_disc_kernels kernel = {0};
-    if (!spl_draw_list_has(&tile->renderer->list, SPL_CHUNK_LINES))
+    if (!spl_draw_list_has(&tile->renderer->list, SPL_CHUNK_LINES, SPL_ROLE_SOLID))
         return SPL_OK;
     int rc = spl_kernels_get(&tile->renderer->kernels, tile->renderer->gpu, &key, &kernel.of[0], err);
     if (!rc)
@@ -208,14 +247,14 @@ static uint64_t occlusion_work(const struct spl_chunk_bounds *bounds)
     return bounds->near > 0 ? tile_work * columns * rows : 1;
 }
 
-/* Chunks from `first` on, as many at a time as are not too much work. */
-static int dispatch_chunks(struct spl_tile *tile, size_t first, struct spl_error *err)
+/* Chunks [first, last), as many at a time as are not too much work. */
+static int dispatch_chunks(struct spl_tile *tile, size_t first, size_t last, struct spl_error *err)
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     int rc = SPL_OK;
-    for (size_t end = first; first < list->chunk_count && !rc; first = end) {
+    for (size_t end = first; first < last && !rc; first = end) {
         uint64_t work = 0;
-        while (end < list->chunk_count && work < SPL_BATCH_WORK)
+        while (end < last && work < SPL_BATCH_WORK)
             work += occlusion_work(&list->bounds[end++]);
         rc = spl_tile_add_work(tile, work, err);
         rc = rc ? rc : dispatch_range(tile, &(struct spl_kernel_key){.name = "occlusion_chunks"}, first, end, err);
@@ -223,13 +262,14 @@ static int dispatch_chunks(struct spl_tile *tile, size_t first, struct spl_error
     return rc;
 }
 
-int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, bool wide, struct spl_error *err)
+int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, size_t end_chunk, bool wide,
+                                struct spl_error *err)
 {
     enum { side = SPL_OCCLUSION_TILE };
     size_t tiles = (size_t)((tile->camera.width + side - 1) / side) * ((tile->camera.height + side - 1) / side);
     spl_tile_begin_area(tile, SPL_AREA_OCCLUDERS);
     int rc = dispatch_range(tile, &(struct spl_kernel_key){"occlusion_tiles", false, {wide}}, 0, tiles, err);
-    rc = rc ? rc : dispatch_chunks(tile, first_chunk, err);
+    rc = rc ? rc : dispatch_chunks(tile, first_chunk, end_chunk, err);
     spl_tile_end_area(tile, SPL_AREA_OCCLUDERS);
     return rc;
 }

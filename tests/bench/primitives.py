@@ -13,7 +13,8 @@ optional attributes, and panels stand by themselves, since their bytes are both.
 that are panels, along the axis against the truth's; pixels where the truth has nothing, or something else (beyond 0.5 m)
 behind an edge, are not in median and 99 %, but count as outside of the bound. --keep: where scans and datasets go, and
 are found again. --levels prints other tables instead, of what is packed with all: how many of each kind each level has,
-with bytes by the mean of their kind, and accuracy by lod (0, 1, 2, 4, 8, 16) of it and of splats alone, method splat.
+with bytes by the mean of their kind, and accuracy by lod (0, 1, 2, 4, 8, 16) of it and of splats alone, method splat,
+with how many of each kind all views draw of it and their share of those of the finest.
 
 environment: SPLATD_BINARY (splatd)
 """
@@ -22,13 +23,16 @@ import array
 import ast
 import json
 import pathlib
+import re
+import subprocess
 import tempfile
 
-from datasets import bench, make_reference, make_scene, place_of, run
+from datasets import SPLATD, bench, make_reference, make_scene, place_of, run
 
 PACKED = (("splats", ["--primitives", "off"]), ("all", ["--primitives", "all"]),
           ("all, 10 mm", ["--primitives", "all", "--error", "10mm"]))
 METHODS = ("splat", "nearest")
+DRAWN = ("splats", "panels", "meshes", "lines")  # as render counts them
 GEOMETRY = ("position", "radius", "normal", "linear", "clip", "lines", "chunk")
 PANEL = 3   # of layer primitive
 EDGE = 0.5  # metres: what is farther off is another surface
@@ -155,6 +159,18 @@ def level_rows(info):
         print("| " + " | ".join([str(i), str(level["nodes"]), f"{1000 * level['spacing']:.0f}", *cells]) + " |", flush=True)
 
 
+def drawn(dataset, views, lod):
+    """How many of each kind all views draw together."""
+    counts = dict.fromkeys(DRAWN, 0)
+    with tempfile.TemporaryDirectory() as folder:
+        for view in json.loads(views.read_text(encoding="utf-8"))["views"]:
+            said = subprocess.run([SPLATD, "render", dataset, *map(str, place_of(view)), "--lod", str(lod), "-o",
+                                   f"{folder}/view.png"], check=True, capture_output=True, text=True).stderr
+            for count, kind in re.findall(r"(\d+) (" + "|".join(DRAWN) + r")\b", said):
+                counts[kind] += int(count)
+    return counts
+
+
 def measure_levels(title, scan, views, truth, o, folder):
     """What each level has, and what coarser ones lose."""
     packed = {}
@@ -167,13 +183,15 @@ def measure_levels(title, scan, views, truth, o, folder):
     print(f"\n{title}")
     table(["level", "nodes", "spacing mm"] + [f"{k}, MB, of the most" for k in ("splats", "panels", "meshes", "pieces")])
     level_rows(json.loads(run("info", packed["all"], "--json")))
-    table(["lod", "splats alone, dB", "off the finest", "all, dB", "off the finest"])
+    table(["lod", "splats alone, dB", "off the finest", "all, dB", "off the finest"] + [f"{k} drawn" for k in DRAWN])
     found = {name: {p["lod"]: p["psnr_overall"] for p in bench(dataset, views, truth, o.lods, o.repeats)["points"]}
              for name, dataset in packed.items()}
+    seen = {lod: drawn(packed["all"], views, lod) for lod in found["all"]}
     for lod in sorted(found["all"]):
         cells = [f"{lod:g}"]
         for name in ("splats", "all"):
             cells += [f"{found[name][lod]:.2f}", f"{found[name][lod] - found[name][min(found[name])]:+.2f}"]
+        cells += [f"{seen[lod][k]:,}, {100 * seen[lod][k] / max(seen[min(seen)][k], 1):.0f} %" for k in DRAWN]
         print("| " + " | ".join(cells) + " |", flush=True)
 
 

@@ -33,11 +33,11 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     spl_gpu_barrier(r->gpu);
     spl_tile_stamp(tile, SPL_STAGE_CLEAR);
     int rc = draw(tile, group, 0, SPL_PHASE_FRONT, err);
-    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, wide, err);
+    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, r->list.first_soft_chunk, wide, err);
     rc = rc ? rc : draw(tile, group, 0, SPL_PHASE_BACK, err);
     spl_tile_stamp(tile, SPL_STAGE_DEPTH);
     if (!rc && !wide) {
-        rc = spl_tile_dispatch_occlusion(tile, 0, wide, err);
+        rc = spl_tile_dispatch_occlusion(tile, 0, r->list.first_soft_chunk, wide, err);
         spl_gpu_fill(r->gpu, spl_tile_begin_area(tile, SPL_AREA_IDS), 0, tile->samples * 4, SPL_NOTHING);
         spl_gpu_barrier(r->gpu);
         rc = rc ? rc : draw(tile, group, 1, SPL_PHASE_BOTH, err);

@@ -25,9 +25,9 @@ static int record_depth(struct spl_tile *tile, struct spl_error *err)
     struct spl_disc_kernels depth;
     int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){.name = "splat_depth"}, &depth, err);
     rc = rc ? rc : draw_depth(tile, &depth, SPL_PHASE_FRONT, err);
-    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, false, err);
+    rc = rc ? rc : spl_tile_dispatch_occlusion(tile, r->list.first_back_chunk, r->list.first_soft_chunk, false, err);
     rc = rc ? rc : draw_depth(tile, &depth, SPL_PHASE_BACK, err);
-    return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, false, err);
+    return rc ? rc : spl_tile_dispatch_occlusion(tile, 0, r->list.first_soft_chunk, false, err);
 }
 
 static int shade_panels(struct spl_tile *tile, uint32_t group, struct spl_error *err)

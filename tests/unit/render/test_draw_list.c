@@ -70,6 +70,76 @@ static void batches_are_of_one_key(void **state)
     spl_draw_list_finish(&list);
 }
 
+/* Soft chunks and those to mark lie behind the solid ones, in batches of their own; soft ones by their ids whatever
+ * order they were added in, windows of one in theirs. They count for no half. */
+static void roles_are_told_apart(void **state)
+{
+    enum { chunks = 90 };
+    static const uint8_t roles[6] = {SPL_ROLE_SOFT, SPL_ROLE_SOLID, SPL_ROLE_MARK,
+                                     SPL_ROLE_SOLID, SPL_ROLE_SOFT, SPL_ROLE_SOLID};
+    struct spl_draw_list list = {0};
+    uint32_t entries[3] = {0}, words[3] = {5, 6, 7}, first;
+    (void)state;
+    spl_draw_list_clear(&list);
+    assert_int_equal(list.mark_words, SPL_MARKS_NONE);
+    for (uint32_t i = 0; i < chunks; i++) { /* ids fall, in pairs; `count` has the window, `texture_scale` the order */
+        const struct spl_draw_chunk chunk = {.count = 40 | (i + 1) << SPL_COUNT_BITS,
+                                             .first_id = 1000 - i / 12 * 10,
+                                             .marks = i % 12 < 6 ? 0 : 64 * i,
+                                             .texture_scale = (float)i};
+        const struct spl_chunk_bounds bounds = {.near = (float)i};
+        const struct spl_draw_origin origin = {.page = i % 2, .kind = SPL_CHUNK_DISCS, .role = roles[i % 6]};
+        assert_int_equal(spl_draw_list_add(&list, &origin, &chunk, &bounds, i, NULL), SPL_OK);
+        assert_int_equal(spl_draw_list_add_tests(&list, words, 3, &first, NULL), SPL_OK);
+        assert_int_equal(first, 3 * i);
+    }
+    assert_int_equal(list.test_count, 3 * chunks);
+    assert_int_equal(list.listed_splats, 40 * chunks / 2);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    assert_int_equal(list.first_soft_chunk, chunks / 2);
+    assert_int_equal(list.first_mark_chunk, chunks / 2 + chunks / 3);
+    assert_true(list.first_back_chunk > chunks / 4 - 2 && list.first_back_chunk < chunks / 4 + 2);
+    for (size_t i = 0; i < chunks; i++) {
+        const struct spl_draw_chunk *chunk = &list.chunks[i];
+        const uint32_t added = (uint32_t)chunk->texture_scale;
+        const uint8_t role = i < list.first_soft_chunk ? SPL_ROLE_SOLID
+                             : i < list.first_mark_chunk ? SPL_ROLE_SOFT
+                                                         : SPL_ROLE_MARK;
+        assert_int_equal(roles[added % 6], role);
+        assert_true(list.bounds[i].near == chunk->texture_scale); /* what is parallel stays so */
+        assert_int_equal(list.key_of_chunk[i].page, added % 2);
+        if (i == 0 || i == list.first_soft_chunk || i == list.first_mark_chunk)
+            continue;
+        const struct spl_draw_chunk *before = chunk - 1;
+        if (role == SPL_ROLE_SOFT)
+            assert_true(before->first_id < chunk->first_id ||
+                        (before->first_id == chunk->first_id && before->count < chunk->count));
+        else
+            assert_true(before->texture_scale < chunk->texture_scale);
+    }
+    for (size_t b = 0; b < list.batch_count; b++) {
+        const struct spl_draw_batch *batch = &list.batches[b];
+        for (uint32_t e = 0; e < batch->entries; e++) {
+            uint32_t i = list.entries[batch->first_entry + e] >> SPL_RUN_BITS;
+            assert_int_equal(batch->key.role, roles[(uint32_t)list.chunks[i].texture_scale % 6]);
+            assert_int_equal(batch->key.marked, list.chunks[i].marks != 0);
+            assert_int_equal(batch->key.back, batch->key.role == SPL_ROLE_SOLID && i >= list.first_back_chunk);
+            entries[batch->key.role]++;
+        }
+    }
+    assert_int_equal(entries[SPL_ROLE_SOLID], chunks);
+    assert_int_equal(entries[SPL_ROLE_SOFT], 2 * chunks / 3);
+    assert_int_equal(entries[SPL_ROLE_MARK], chunks / 3);
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_DISCS, SPL_ROLE_SOFT));
+    assert_false(spl_draw_list_has(&list, SPL_CHUNK_PANELS, SPL_ROLE_SOFT));
+    spl_draw_list_clear(&list);
+    assert_int_equal(list.test_count, 0);
+    add(&list, 0, 40, 0, false);
+    assert_int_equal(spl_draw_list_lay_out(&list, NULL), SPL_OK);
+    assert_int_equal(list.first_soft_chunk, 1);
+    spl_draw_list_finish(&list);
+}
+
 /* Chunks of a page that different stations trim, or none, are drawn apart; cells of maps lie behind all entries, in the
  * order of their stations. */
 static void stations_are_told_apart(void **state)
@@ -210,9 +280,9 @@ static void panels_count_as_much_work(void **state)
     assert_int_equal(list.first_back_chunk, 2);
     assert_int_equal(list.batches[1].key.kind, SPL_CHUNK_MESHES);
     assert_int_equal(list.batches[1].entries, 2);
-    assert_true(spl_draw_list_has(&list, SPL_CHUNK_PANELS) && spl_draw_list_has(&list, SPL_CHUNK_DISCS));
-    assert_true(spl_draw_list_has(&list, SPL_CHUNK_MESHES));
-    assert_false(spl_draw_list_has(&list, SPL_CHUNK_LINES));
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_PANELS, SPL_ROLE_SOLID) && spl_draw_list_has(&list, SPL_CHUNK_DISCS, SPL_ROLE_SOLID));
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_MESHES, SPL_ROLE_SOLID));
+    assert_false(spl_draw_list_has(&list, SPL_CHUNK_LINES, SPL_ROLE_SOLID));
     spl_draw_list_finish(&list);
 }
 
@@ -259,6 +329,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_are_of_one_key),
         cmocka_unit_test(stations_are_told_apart),
+        cmocka_unit_test(roles_are_told_apart),
         cmocka_unit_test(pages_take_two_rounds),
         cmocka_unit_test(rounds_cover_the_entries),
         cmocka_unit_test(runs_hold_every_splat),

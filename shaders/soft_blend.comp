@@ -1,0 +1,109 @@
+/* Blends the lists of tiles front to back, model express: a disc that faces the eye, whose opacity falls as (cos(pi d /
+ * r) + 1) / 2 (eq. 19) with the distance d of the sample's ray to the centre. All invocations of a tile walk the same
+ * list, each for SPL_SOFT_SAMPLES of a column. In fixed point, so that every driver gives the same. Constants: 0: some
+ * items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "common/frame.glsl"
+#include "common/soft_step.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint BORDER = 0;
+layout(constant_id = 1) const uint FIRST = 0;
+layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* as common/samples.glsl has it */
+
+uint solid_word(uint at)
+{
+#ifdef SPL_ATOMICS_64
+    return imageLoad(depth_texels, int(2u * at + 1u)).x;
+#else
+    return imageLoad(depth_texels, int(at)).x;
+#endif
+}
+
+void main()
+{
+    load_frame();
+    load_step();
+    const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE / SPL_SOFT_SAMPLES;
+    uint slot = gl_GlobalInvocationID.x / lanes, lane = gl_GlobalInvocationID.x % lanes;
+    bool has = slot < job.count;
+    int list = int(job.first + 3u * (has ? slot : 0u));
+    uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
+    uint end = has ? imageLoad(list_texels, list + 2).x : i;
+    ivec2 corner = ivec2(place & 65535u, place >> 16) * SPL_SOFT_TILE;
+    corner += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE * SPL_SOFT_SAMPLES);
+    uint clear[SPL_SOFT_SAMPLES], solid[SPL_SOFT_SAMPLES], last = 0u;
+    uvec3 sum[SPL_SOFT_SAMPLES];
+    float ry[SPL_SOFT_SAMPLES], inverse[SPL_SOFT_SAMPLES];
+    precise float rx = (float(corner.x + int(frame.tile_x)) + (0.5 - frame.cx)) * frame.inverse_fx;
+    for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
+        ivec2 at = corner + ivec2(0, k);
+        bool inside = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
+        uint index = sample_index(inside ? at : ivec2(0));
+        precise float y = (float(at.y + int(frame.tile_y)) + (0.5 - frame.cy)) * frame.inverse_fy;
+        precise float over = 1.0 / (1.0 + rx * rx + y * y);
+        ry[k] = y;
+        inverse[k] = over;
+        sum[k] = uvec3(0u);
+        clear[k] = SPL_SOFT_CLEAR;
+        if (FIRST == 0u) {
+            uint word = SPL_SOFT_STATE_WORDS * index;
+            sum[k] = uvec3(state[word], state[word + 1u], state[word + 2u]);
+            clear[k] -= state[word + 3u];
+        }
+        solid[k] = inside && clear[k] >= SPL_SOFT_CLEAR_LEAST ? solid_word(index) : 0u;
+        last = max(last, solid[k]);
+    }
+    for (;;) {
+        int item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
+        float x = uintBitsToFloat(imageLoad(item_texels, item).x);
+        float y = uintBitsToFloat(imageLoad(item_texels, item + 1).x);
+        uint key = imageLoad(item_texels, item + 2).x;
+        float z = uintBitsToFloat(key), radius = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
+        uint paint = imageLoad(item_texels, item + 4).x;
+        uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
+        precise float closer = 1.0 / (radius * radius);
+        precise float ox = x - rx * z;
+        precise float ox_squared = ox * ox, ox_along = ox * rx;
+        precise float soft = (float(paint >> 24) - 1.0) * (1.0 / 254.0);
+        key = i < end ? key : SPL_NOTHING;
+        uint left = 0u;
+        for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
+            precise float oy = y - ry[k] * z;
+            precise float along = ox_along + oy * ry[k];
+            precise float share = (ox_squared + oy * oy - along * along * inverse[k]) * closer;
+            precise float m = max(1.0 - share, 0.0);
+            precise float fall = m * m * (SPL_SOFT_EXPRESS_A + m * (SPL_SOFT_EXPRESS_B + m * SPL_SOFT_EXPRESS_C));
+            if (BORDER != 0u) {
+                precise float linear = 1.0 - sqrt(1.0 - m);
+                precise float mixed = linear * (1.0 - soft) + fall * soft;
+                fall = mixed;
+            }
+            precise float scaled = fall * job.opacity + 0.5;
+            uint opacity = key <= solid[k] ? min(uint(int(scaled)), 65536u) : 0u;
+            uint weight = ((clear[k] >> 8) * opacity) >> 8;
+            clear[k] -= weight;
+            sum[k] += weight * color;
+            solid[k] = clear[k] >= SPL_SOFT_CLEAR_LEAST ? solid[k] : 0u;
+            left = max(left, solid[k]);
+        }
+        last = left;
+        if (++i >= end || key > last)
+            break;
+    }
+    for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
+        ivec2 at = corner + ivec2(0, k);
+        if (has && uint(at.x) < frame.width && uint(at.y) < frame.height) {
+            uint word = SPL_SOFT_STATE_WORDS * sample_index(at);
+            state[word] = sum[k].x;
+            state[word + 1u] = sum[k].y;
+            state[word + 2u] = sum[k].z;
+            state[word + 3u] = SPL_SOFT_CLEAR - clear[k];
+        }
+    }
+}

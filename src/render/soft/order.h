@@ -1,0 +1,92 @@
+/* The order of soft spheres: items that a kernel gathered in the order of their ids are sorted by view depth (stable, so
+ * that ties fall to the lower id), listed by the tiles of SPL_SOFT_TILE samples that they reach, and blended front to
+ * back over what is solid. A counting sort throughout: integers, no barrier within a workgroup, the same bytes on every
+ * driver. Everything belongs to the renderer's thread.
+ *
+ *   items (ids) ── sort_count, sort_scan, sort_move, a digit of the depth at a time ──► pairs (depth, item) in order
+ *         ── soft_list ──► count by tile ── the host: where lists start ──► lists of items ── soft_blend ──► samples
+ */
+#ifndef SPL_RENDER_SOFT_ORDER_H
+#define SPL_RENDER_SOFT_ORDER_H
+
+#include "gpu/gpu.h"
+#include "render/kernels.h"
+#include "shared.h"
+
+enum { SPL_SOFT_STEP_STRIDE = 256, SPL_SOFT_STEPS = 256 };
+
+/* Device memory, of so much that any window of depth that is planned for it fits. */
+struct spl_soft_sizes {
+    uint32_t items;   /* at once */
+    uint32_t entries; /* of lists */
+    uint32_t tiles;
+    uint64_t samples;
+};
+
+enum spl_soft_buffer {
+    SPL_SOFT_ITEMS,   /* and rectangles */
+    SPL_SOFT_PAIRS,   /* of key and item, which sorting moves to and fro; then lists */
+    SPL_SOFT_OTHERS,
+    SPL_SOFT_COUNTS,
+    SPL_SOFT_DIGITS,  /* totals of a sort */
+    SPL_SOFT_TOTALS,  /* of tiles, for the host */
+    SPL_SOFT_STARTS,  /* of tiles, from the host */
+    SPL_SOFT_LISTS,   /* tiles to blend, from the host */
+    SPL_SOFT_STEPS_OF,/* struct spl_soft_step[], from the host */
+    SPL_SOFT_STATE,
+    SPL_SOFT_BUFFERS
+};
+
+struct spl_soft_memory {
+    struct spl_soft_sizes sizes;
+    uint32_t counters; /* words of SPL_SOFT_COUNTS */
+    uint32_t threads;  /* invocations that walk blocks at most: each has counters of its own */
+    struct spl_gpu_buffer *buffers[SPL_SOFT_BUFFERS];
+};
+
+/* Makes a buffer, as spl_gpu_buffer_create(), of `context`. */
+typedef int spl_soft_make(void *context, enum spl_gpu_buffer_kind kind, uint64_t bytes, struct spl_gpu_buffer **out,
+                          struct spl_error *err);
+
+/* What the buffers of such sizes take. */
+uint64_t spl_soft_memory_bytes(const struct spl_soft_sizes *sizes, bool software);
+/* SPL_E_LIMIT, SPL_E_NOMEM, SPL_E_DEVICE_LOST: nothing is kept. */
+int spl_soft_memory_init(struct spl_soft_memory *memory, const struct spl_soft_sizes *sizes, bool software,
+                         spl_soft_make *make, void *context, struct spl_gpu *gpu, struct spl_error *err);
+void spl_soft_memory_finish(struct spl_soft_memory *memory, struct spl_gpu *gpu);
+
+/* Being recorded, for one window of depth of one tile of a frame. */
+struct spl_soft_order {
+    struct spl_gpu *gpu;
+    struct spl_kernels *kernels;
+    struct spl_soft_memory *memory;
+    struct spl_gpu_binding frame;  /* parameters of the tile of the frame */
+    struct spl_gpu_buffer *depth;  /* of what is solid; words of 64 bits where `wide` */
+    bool wide;
+    uint32_t columns, rows;        /* tiles */
+    /* Called before work is recorded, in samples that are looked at: runs what was recorded where that is too much; an
+     * error ends the frame. NULL = never. */
+    int (*add_work)(void *context, uint64_t work, struct spl_error *err);
+    void *context;
+    uint32_t steps;                /* of SPL_SOFT_STEPS_OF, used since it last ran */
+    enum spl_soft_buffer sorted;   /* PAIRS or OTHERS: where the last sort ended */
+    uint32_t entries;              /* of the lists */
+};
+
+/* Sorts `items` pairs in SPL_SOFT_PAIRS whose keys are in [low, high]. */
+int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, uint32_t high, struct spl_error *err);
+
+/* Lists the sorted items, none of which has more than `most` entries. Runs what was recorded. SPL_SOFT_CROWDED: they
+ * are more than fit, and nothing is listed. */
+enum { SPL_SOFT_CROWDED = 1 };
+int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, struct spl_error *err);
+
+struct spl_soft_blend {
+    double opacity; /* at a sphere's centre, 0 to 1 */
+    bool border;    /* some items are partly solid */
+    bool first;     /* nothing of this tile was blended before: the state is zero */
+};
+/* Blends what was listed. */
+int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
+
+#endif
