@@ -6,7 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
-#include "common/splat.glsl"
+#include "common/marks.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 2) const uint FILL = 0;
@@ -45,7 +45,7 @@ void main()
     splat_run run = load_splat_run();
     uint i = run.first;
     for (;;) {
-        if (has_splat(run, i))
+        if (has_splat(run, i) && !is_soft(run.chunk, mark_byte(i)))
             draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
         i += SPL_RUN_STEP;
         if (i >= run.end)

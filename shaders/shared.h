@@ -284,6 +284,26 @@ struct spl_draw_chunk {
 #define SPL_MARK_MOST 254
 #define SPL_MARK_WHOLE 255u
 
+/* Tests that marks are made of: words, see src/render/marks.c. A chunk's begin with how many there are, of each
+ * SPL_TEST_WORDS:
+ *   SPL_TEST_NUMBERS  word of the page where its codes begin; their width, and SPL_TEST_LAST_NONE where the last code is
+ *                     no value; start; span; shift; floats: W at the lower end and of a number more, at the upper one
+ *   SPL_TEST_TABLE    the same two; from SPL_TEST_TABLE_WORD on a mark for each of up to 32 codes, four a word
+ *   SPL_TEST_SHAPE    word of the tests where it lies: three rows of view space -> shape (x, y, z, 1); half a box; least;
+ *                     most; one over what W rises in behind each, 0 = at once; SPL_SHAPE_* */
+#define SPL_TEST_WORDS 12
+#define SPL_TEST_NUMBERS 0u
+#define SPL_TEST_TABLE 1u
+#define SPL_TEST_SHAPE 2u
+#define SPL_TEST_LAST_NONE 64u
+#define SPL_TEST_EXACT 0xffffffu /* numbers from an end up to which floats are exact; W is 1 beyond */
+#define SPL_TEST_TABLE_WORD 3
+#define SPL_SHAPE_AXIS 0u
+#define SPL_SHAPE_PLANE 1u
+#define SPL_SHAPE_BOX 2u
+#define SPL_SHAPE_WITH_LEAST 4u
+#define SPL_SHAPE_WITH_MOST 8u
+
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
 #define SPL_OCCLUSION_TILE 8

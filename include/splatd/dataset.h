@@ -44,6 +44,21 @@ struct spl_stream_info {
     uint64_t bits;                  /* of its codes, over all splats */
 };
 
+/* How the values of an optional attribute are distributed over the leaf splats that have one, and over the points that
+ * panels and meshes of leaves stand for, each of which has its panel's. */
+enum { SPL_VALUES_QUANTILES = 64, SPL_VALUES_KINDS_MAX = 64 };
+struct spl_stream_values {
+    uint64_t count;                              /* that have one; 0 = the file does not say */
+    double quantiles[SPL_VALUES_QUANTILES + 1];  /* the i-th: a share i / SPL_VALUES_QUANTILES have less; least … most */
+    double p99;                                  /* the 99th percentile */
+    uint32_t kind_count;                         /* different values, where there are so few, each with how many have
+                                                    it, rising; 0 = there are more */
+    struct spl_value_count {
+        double value;
+        uint64_t count;
+    } kinds[SPL_VALUES_KINDS_MAX];
+};
+
 struct spl_dataset_info {
     char id[128];              /* the file's stem */
     uint64_t version;          /* XXH3 over the section table: changes whenever any content does */
@@ -77,7 +92,18 @@ struct spl_dataset_info {
     uint64_t meshes, mesh_points;   /* the same of panels with relief, which are not counted as panels */
     bool has_sides; /* the scan said where it was taken from: normals show there, and discs that turn their back to an
                        eye lie behind those that face it */
+    const struct spl_stream_values *stream_values; /* of each stream, borrowed until close; NULL = the file says nothing
+                                                      of any */
 };
+
+/* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */
+static inline const struct spl_stream_values *spl_dataset_info_get_values(const struct spl_dataset_info *info,
+                                                                          uint32_t stream)
+{
+    return stream < info->stream_count && info->stream_values && info->stream_values[stream].count
+               ? &info->stream_values[stream]
+               : NULL;
+}
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the

@@ -32,6 +32,11 @@ uint item_of(uint index)
     return index & ((1u << SPL_CELL) - 1u);
 }
 
+uint mark_byte(uint index)
+{
+    return item_of(index) * SPL_CELLS + (index >> SPL_CELL);
+}
+
 splat_run load_splat_run()
 {
     uint id = gl_GlobalInvocationID.x;

@@ -5,6 +5,7 @@
 #define SPL_CLIP_GLSL
 
 #include "common/disc.glsl"
+#include "common/marks.glsl"
 #include "common/tangent.glsl"
 
 layout(constant_id = 2) const uint CLIPPED = 0;
@@ -41,10 +42,10 @@ clip_line load_clip(spl_draw_chunk chunk, splat s)
     return line;
 }
 
-/* Is disc `index` drawn? The others' chunk is the only one whose linear discs are marked. */
+/* Is disc `index` drawn? The others' chunk is the only one whose linear discs are marked; soft ones are others'. */
 bool is_drawn(spl_draw_chunk chunk, uint index)
 {
-    return CLIPPED == 0u || !is_linear(chunk, index);
+    return (CLIPPED == 0u || !is_linear(chunk, index)) && !is_soft(chunk, mark_byte(index));
 }
 
 /* The squared distance of a sample that lies `offset` off the centre: 1 and more beyond the line. No comparison: see

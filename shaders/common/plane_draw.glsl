@@ -11,6 +11,7 @@
 #ifndef SPL_PLANE_DRAW_GLSL
 #define SPL_PLANE_DRAW_GLSL
 
+#include "common/marks.glsl"
 #include "common/panel.glsl"
 
 #define SPL_PANEL_HAIR 0.015625
@@ -55,6 +56,8 @@ panel_draw begin_panel(splat_run run, uint index)
     panel_plane plane = load_plane(run.chunk);
     d.plane = plane;
     d.own = load_panel(run.chunk, index);
+    if (is_soft(run.chunk, index * 4u * SPL_MARKS_PANEL)) /* all of its cells are, or none */
+        d.own.known = false;
     d.id = run.chunk.first_id + index;
     vec3 o = plane.origin, u = plane.u, v = plane.v;
     precise float inverse_cell = 1.0 / plane.cell;

@@ -72,6 +72,7 @@ spl_draw_chunk load_chunk(uint index)
     c.count = chunk_word(index, 15);
     c.texture = chunk_word(index, 16);
     c.texture_scale = uintBitsToFloat(chunk_word(index, 17));
+    c.marks = chunk_word(index, 18);
     return c;
 }
 
@@ -241,6 +242,12 @@ bool has_splat(splat_run r, uint i)
 
 /* Its id within the chunk. */
 uint item_of(uint index)
+{
+    return index;
+}
+
+/* Its place among the chunk's marks. */
+uint mark_byte(uint index)
 {
     return index;
 }

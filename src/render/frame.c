@@ -99,6 +99,8 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .textured = ask_textures,
         .maps = maps,
         .mapped = ask_map,
+        .marks = job->marks.count ? &job->marks : NULL,
+        .draws_soft = job->view->soft.opacity > 0,
         .context = job,
     };
 }
@@ -194,6 +196,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
     bool first = true;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
     int rc = spl_tile_take_rounds(tile, err);
+    rc = rc ? rc : spl_tile_dispatch_marks(tile, err);
     for (uint32_t group = 0; group < SPL_SUMS_COUNT && !rc; group++) {
         uint32_t layers = 0;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT; layer++)

@@ -149,6 +149,8 @@ struct spl_panel_kernels {
 };
 int spl_tile_dispatch_panels(struct spl_tile *tile, const struct spl_panel_kernels *names, struct spl_kernel_key key,
                              enum spl_phase phases, struct spl_error *err);
+/* tile_marks.c: records the marks of the tile's chunks of which some splats are soft. Before anything else of them. */
+int spl_tile_dispatch_marks(struct spl_tile *tile, struct spl_error *err);
 /* Records the dropping of those of the chunks [first_chunk, end_chunk) that the depth drawn so far hides; `wide`: of
  * words of 64 bits. */
 int spl_tile_dispatch_occlusion(struct spl_tile *tile, size_t first_chunk, size_t end_chunk, bool wide,

@@ -137,7 +137,11 @@ int spl_select_spacing(const struct spl_select_params *params, double *spacing, 
     struct spl_draw_list counts = {.complete = true}; // its numbers only
     struct spl_walk w = {.params = params, .list = &counts, .focal = focal_of(params), .covered = covered};
     struct spl_error why = {0};
-    int rc = walk_tree(&w, &why), class = SPACING_CLASSES;
+    int rc = spl_walk_begin_marks(&w, &why), class = SPACING_CLASSES;
+    if (!rc)
+        rc = walk_tree(&w, &why);
+    const bool complete_walk = counts.complete;
+    spl_draw_list_finish(&counts);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
     for (int i = 0; i < SPACING_CLASSES; i++)
@@ -145,7 +149,7 @@ int spl_select_spacing(const struct spl_select_params *params, double *spacing, 
     while (class > 1 && sparser + covered[class - 1] <= 0.01 * sum)
         sparser += covered[--class];
     *spacing = sum > 0 ? exp2(class / 4.0) : 1;
-    *complete &= counts.complete;
+    *complete &= complete_walk;
     return SPL_OK;
 }
 
@@ -157,6 +161,8 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
     if (rc)
         return rc;
     rc = spl_map_cells_init(&w.cells, params, err);
+    if (!rc)
+        rc = spl_walk_begin_marks(&w, err);
     if (!rc)
         rc = walk_tree(&w, err);
     if (!rc)

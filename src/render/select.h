@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "dataset/dataset.h"
 #include "render/draw_list.h"
+#include "render/marks.h"
 
 /* Whether a page can be drawn. LATER: not yet, so a coarser node stands in, and what else the finer ones need is asked
  * for. */
@@ -43,6 +44,8 @@ struct spl_select_params {
     uint32_t corner[2]; /* samples: where the camera's image begins in the whole, of which cells are counted */
     enum spl_select_answer (*mapped)(void *context, uint32_t station); /* may its map be drawn? may ask for it; may be
                                                                           NULL where maps is 0 */
+    const struct spl_marks *marks; /* what is soft; NULL = nothing */
+    bool draws_soft;               /* it is listed, too */
     void *context;
 };
 enum { SPL_MAP_TRIMS = 1, SPL_MAP_COLORS = 2 };

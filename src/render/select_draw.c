@@ -60,9 +60,8 @@ double spl_walk_largest_radius(const struct spl_chunk *chunk)
     return chunk->radius_min + chunk->radius_step * codes;
 }
 
-/* The box of the chunk's positions, in view space, and where its origin lies from the eye. */
-static struct spl_view_box chunk_box(const struct spl_walk *w, const double node_to_eye[3],
-                                     const struct spl_chunk *chunk, double origin[3])
+struct spl_view_box spl_walk_chunk_box(const struct spl_walk *w, const double node_to_eye[3],
+                                       const struct spl_chunk *chunk, double origin[3])
 {
     double size[3];
     static const unsigned shifts[3] = {SPL_GEOMETRY_X, SPL_GEOMETRY_Y, SPL_GEOMETRY_Z};
@@ -82,7 +81,7 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     if (w->lined && linear == SPL_LINEAR_ALL)
         return SPL_OK;
     double origin[3], radius_share = found->node->child_count ? cluster_radius_share : 1;
-    struct spl_view_box box = chunk_box(w, node_to_eye, chunk, origin);
+    struct spl_view_box box = spl_walk_chunk_box(w, node_to_eye, chunk, origin), centers = box;
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
@@ -90,12 +89,15 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     box = spl_view_box_grown(box, radius);
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
+    spl_walk_judge(w, chunk, &centers);
+    if (!w->judged.solid && (w->covered || !w->params->draws_soft))
+        return SPL_OK;
     if (w->covered) {
         add_spacing(w, spacing * scale, count);
         return SPL_OK;
     }
 
-    struct spl_walk_reach reach = spl_walk_project(w, &w->splats, &box, count);
+    struct spl_walk_reach reach = spl_walk_project(w, w->judged.solid ? &w->splats : NULL, &box, count);
     uint32_t clip = spl_clip_count(chunk) && w->params->discs
                         ? spl_chunk_clip_word(chunk) - spl_chunk_color_word(chunk) + 1
                         : 0; // at most 109
@@ -106,9 +108,15 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
         out.geometry_bits &= ~(3u << SPL_GEOMETRY_LINEAR);
     out.color_bits |= clip << SPL_COLOR_CLIP;
     out.count = count;
-    out.texture = drawn_texture(w, chunk, page, reach.near);
     out.texture_scale = (float)scale;
     w->list->drawn[SPL_CHUNK_DISCS] += count;
+    int rc = spl_walk_list_marks(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &out, err);
+    if (!rc)
+        rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &out, &box,
+                                radius, err);
+    if (rc || !w->judged.solid)
+        return rc;
+    out.texture = drawn_texture(w, chunk, page, reach.near);
     int trims = spl_walk_add_map_cells(w, chunk, &box, whole, err);
     if (trims < 0)
         return trims;
@@ -139,9 +147,9 @@ static int draw_lines(struct spl_walk *w, const double node_to_eye[3], const str
     const struct spl_camera *camera = w->params->camera;
     const struct spl_draw_origin from = {.page = page, .kind = SPL_CHUNK_LINES};
     double origin[3], half = w->params->discs ? spl_chunk_line_width(chunk) / 2 : 0;
-    struct spl_view_box box = chunk_box(w, node_to_eye, chunk, origin);
+    struct spl_view_box box = spl_walk_chunk_box(w, node_to_eye, chunk, origin);
     box = spl_view_box_grown(box, half);
-    if (w->covered || !w->params->lines || (w->params->discs && half == 0) ||
+    if (w->covered || !w->params->lines || w->unlined || (w->params->discs && half == 0) ||
         !spl_view_box_visible(camera, &box, w->params->low_pass))
         return SPL_OK;
     struct spl_draw_chunk out = spl_walk_begin(w, chunk, origin);
@@ -211,13 +219,18 @@ static int draw_panels(struct spl_walk *w, const double node_to_eye[3], const st
     enum { cells = SPL_PANEL_SIDE * SPL_PANEL_SIDE };
     const struct spl_camera *camera = w->params->camera;
     const uint32_t kind = spl_chunk_kind(chunk);
-    const bool mesh = kind == SPL_CHUNK_MESHES, whole = mesh ? w->params->meshes : w->params->panels;
+    const bool mesh = kind == SPL_CHUNK_MESHES, as_such = mesh ? w->params->meshes : w->params->panels;
     const double disc = spl_walk_largest_radius(chunk);
     const double half = hypot(sqrt(0.5) * SPL_PANEL_SIDE * (double)chunk->step, (double)spl_panels_get_reach(chunk));
     double origin[3];
     struct spl_view_box box = panels_box(w, node_to_eye, chunk, origin);
-    box = spl_view_box_grown(box, whole ? 0 : disc);
+    const struct spl_view_box cells_box = spl_view_box_grown(box, disc);
+    spl_walk_judge(w, chunk, &box);
+    const bool whole = as_such && !(w->judged.by_cells && w->judged.solid);
+    box = whole && !w->judged.soft ? box : cells_box;
     if (!spl_view_box_visible(camera, &box, w->params->low_pass))
+        return SPL_OK;
+    if (!w->judged.solid && (w->covered || !w->params->draws_soft))
         return SPL_OK;
     if (w->covered) { // as if every cell were there: headers do not say
         add_spacing(w, (double)chunk->step * w->focal / fmax(box.center[2], camera->near), chunk->count * cells);
@@ -226,9 +239,10 @@ static int draw_panels(struct spl_walk *w, const double node_to_eye[3], const st
     int rc = w->panels.cells ? SPL_OK : spl_occupancy_init(&w->panels, camera->width, camera->height, err);
     if (rc)
         return rc;
-    struct spl_walk_reach reach = whole ? spl_walk_project(w, &w->panels, &box, chunk->count)
-                                        : spl_walk_project(w, &w->splats, &box, chunk->count * cells);
-    if (whole && mesh) // a panel may add one fragment, one with relief more
+    struct spl_walk_reach reach = !w->judged.solid ? spl_walk_project(w, NULL, &box, 0)
+                                  : whole          ? spl_walk_project(w, &w->panels, &box, chunk->count)
+                                                   : spl_walk_project(w, &w->splats, &box, chunk->count * cells);
+    if (w->judged.solid && whole && mesh) // a panel may add one fragment, one with relief more
         reach = spl_walk_project(w, &w->splats, &box, chunk->count * count_layers(chunk));
     struct spl_draw_chunk out = spl_walk_begin(w, chunk, origin);
     if (!whole)
@@ -239,10 +253,16 @@ static int draw_panels(struct spl_walk *w, const double node_to_eye[3], const st
     out.color_bits = spl_panels_get_level(chunk);
     out.color_base = 0;
     w->list->drawn[kind] += chunk->count;
+    rc = spl_walk_list_marks(w, &(struct spl_draw_origin){.page = page, .kind = kind}, &out, err);
+    if (!rc)
+        rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = kind}, &out, &cells_box, disc, err);
+    if (rc || !w->judged.solid)
+        return rc;
     int trims = spl_walk_add_map_cells(w, chunk, &box, node_box, err);
     if (trims < 0)
         return trims;
-    const struct spl_draw_origin from = {.page = page, .kind = kind, .trims = (uint16_t)trims};
+    const struct spl_draw_origin from = {
+        .page = page, .kind = kind, .trims = (uint16_t)trims, .cells = as_such && !whole};
     if (!whole)
         return spl_walk_list(w, &from, &out, &(struct spl_walk_pieces){cells, disc, 0}, &reach, disc, SPL_WINDOW, err);
     const unsigned level = spl_panels_get_level(chunk);
@@ -262,9 +282,16 @@ int spl_walk_draw(struct spl_walk *w, const struct spl_found_node *found, struct
         node_to_eye[i] = node->origin[i] - w->params->camera->eye[i];
     struct spl_view_box whole = w->cells.count ? spl_walk_drawn_box(w, found) : (struct spl_view_box){0};
     w->list->nodes++;
-    w->lined = false;
-    for (uint32_t i = 0; i < node->chunk_count && !w->lined; i++)
+    w->lined = w->unlined = false;
+    bool lines = false;
+    for (uint32_t i = 0; i < node->chunk_count && !w->lined; i++) {
+        lines |= spl_chunk_kind(&chunks[i]) == SPL_CHUNK_LINES;
         w->lined = stands_for_splats(w, &chunks[i]);
+    }
+    if (lines && spl_walk_has_soft_lines(w, node, node_to_eye)) {
+        w->lined = false;
+        w->unlined = true;
+    }
     for (uint32_t i = 0; i < node->chunk_count; i++) {
         const struct spl_chunk *chunk = &chunks[i];
         uint32_t kind = spl_chunk_kind(chunk);

@@ -97,8 +97,9 @@ struct spl_walk_reach spl_walk_project(const struct spl_walk *w, struct spl_occu
     struct spl_walk_reach r = {{-INFINITY, -INFINITY}, {INFINITY, INFINITY}, 0};
     if (spl_view_box_project(w->params->camera, box, r.low, r.high)) {
         r.near = box->center[2] - box->half[2];
-        spl_occupancy_add(counted, r.low, r.high, count);
-    } else {
+        if (counted)
+            spl_occupancy_add(counted, r.low, r.high, count);
+    } else if (counted) {
         spl_occupancy_add_everywhere(counted, count);
     }
     return r;
@@ -109,10 +110,10 @@ int spl_walk_list(struct spl_walk *w, const struct spl_draw_origin *from, const 
                   struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    if (w->params->discs && spl_footprint_side(camera, radius, reach->near) > side)
+    const bool discs = w->params->discs || from->role == SPL_ROLE_SOFT;
+    if (discs && spl_footprint_side(camera, radius, reach->near) > side)
         return spl_walk_list_windows(w, from, chunk, pieces, reach->low, reach->high, reach->near, err);
     struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, reach->low, reach->high, reach->near);
-    uint64_t looks =
-        w->params->discs ? spl_walk_count_looks(w, pieces, reach->low, reach->high, reach->near) : pieces->count;
+    uint64_t looks = discs ? spl_walk_count_looks(w, pieces, reach->low, reach->high, reach->near) : pieces->count;
     return spl_draw_list_add(w->list, from, chunk, &bounds, looks, err);
 }

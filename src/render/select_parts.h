@@ -16,7 +16,10 @@ struct spl_walk {
     double focal;                        /* larger of fx, fy */
     struct spl_occupancy splats, panels; /* the latter once there are any */
     struct spl_map_cells cells;
+    struct spl_marks_view shapes;  /* of params->marks */
+    struct spl_marks_chunk judged; /* of the chunk being listed */
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
+    bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
 };
 
@@ -55,15 +58,33 @@ static inline double spl_walk_typical(const struct spl_node *node)
 struct spl_view_box spl_walk_node_box(const struct spl_walk *w, const struct spl_node *node);
 struct spl_view_box spl_walk_drawn_box(const struct spl_walk *w, const struct spl_found_node *found);
 
+/* What is soft (select_soft.c). Shapes become tests, before anything is listed. */
+int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);
+/* Fills in `judged`: of a chunk whose positions lie in `box`, view space. */
+void spl_walk_judge(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
+/* May any linear splat of the node be soft? */
+bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3]);
+/* Where `judged` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is listed
+ * otherwise. */
+int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,
+                        struct spl_error *err);
+/* Where it has soft splats and these are drawn: lists them, of panels their cells, each a sphere of `radius` at most;
+ * `box` holds these. */
+int spl_walk_list_soft(struct spl_walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,
+                       const struct spl_view_box *box, double radius, struct spl_error *err);
+
 /* Lists what the node draws (select_draw.c). */
 int spl_walk_draw(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err);
 
+/* The box of a chunk's positions, in view space, and where its origin lies from the eye. */
+struct spl_view_box spl_walk_chunk_box(const struct spl_walk *w, const double node_to_eye[3],
+                                       const struct spl_chunk *chunk, double origin[3]);
 /* Of discs, or of those that the cells of panels and meshes stand for. */
 double spl_walk_largest_radius(const struct spl_chunk *chunk);
 
 /* How a chunk is listed (select_list.c). What any kind of chunk is drawn by, radii as they are: */
 struct spl_draw_chunk spl_walk_begin(const struct spl_walk *w, const struct spl_chunk *chunk, const double origin[3]);
-/* Where its box lies; its splats or panels are counted for all samples that they may reach. */
+/* Where its box lies; its splats or panels are counted for all samples that they may reach (`counted` NULL: nowhere). */
 struct spl_walk_reach spl_walk_project(const struct spl_walk *w, struct spl_occupancy *counted,
                                        const struct spl_view_box *box, uint32_t count);
 /* Marks the cells that the stations of a chunk, whose box is `box`, give colours to; returns the station that trims it,

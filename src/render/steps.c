@@ -162,6 +162,8 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
         rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
                             steps->wanted.layers & ~steps->borrowed);
     if (!rc)
+        rc = spl_marks_init(&steps->job.marks, &view->soft, dataset, err);
+    if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);

@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "geom/size.h"
-#include "render/soft_params.h"
+#include "render/marks.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
@@ -86,15 +86,12 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
 {
     if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, err);
-    int rc = spl_soft_check_dataset(&view->soft, info, err);
-    if (rc)
-        return rc;
     if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
                               "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
-    return SPL_OK;
+    return spl_marks_resolve(&view->soft, info, NULL, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)

@@ -1,0 +1,121 @@
+/* Marks of splats, or with SPL_CELL_LANES of the cells of panels: which of them are soft, by the tests that the host made
+ * of a chunk (src/render/marks.c), which begin where its `texture` says. An invocation makes a word of four, so that none
+ * is written twice: SPL_LANES make those of a run of splats, SPL_CELL_LANES two words each of a panel. Whole numbers, and
+ * floats by rounded products and sums alone, so that every driver marks the same. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "common/splat.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+
+layout(std430, binding = SPL_STORAGE_MARKS) writeonly buffer mark_buffer { uint marks[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_TESTS) test_texels;
+
+uint test_word(uint at)
+{
+    return imageLoad(test_texels, int(at)).x;
+}
+
+float test_float(uint at)
+{
+    return uintBitsToFloat(test_word(at));
+}
+
+/* Of W of eq. 22. */
+uint mark_of(float share)
+{
+    precise float scaled = min(share, 1.0) * float(SPL_MARK_MOST) + 0.5;
+    return 1u + uint(scaled);
+}
+
+/* Code `index` of those that begin at `word`. */
+uint load_code(uint word, uint width, uint index)
+{
+    uint bit = index * width, at = word + (bit >> 5);
+    uint code = funnel(page_word(at), page_word(at + 1u), bit & 31u);
+    return width == 0u ? 0u : code & (0xffffffffu >> (32u - width));
+}
+
+uint test_numbers(uint at, uint code, uint width, bool last_none)
+{
+    uint past = code + test_word(at + 3u), span = test_word(at + 4u), shift = test_word(at + 5u);
+    bool none = last_none && code == 0xffffffffu >> (32u - width);
+    precise float low = test_float(at + 6u) + float(min(past >> shift, SPL_TEST_EXACT)) * test_float(at + 7u);
+    precise float high = test_float(at + 8u) + float(min((span - past) >> shift, SPL_TEST_EXACT)) * test_float(at + 9u);
+    return none || past > span ? 0u : mark_of(min(low, high));
+}
+
+uint test_shape(uint at, vec3 p)
+{
+    precise vec3 q;
+    for (uint i = 0u; i < 3u; i++) /* of fixed length: it is unrolled */
+        q[i] = test_float(at + 4u * i) * p.x + test_float(at + 4u * i + 1u) * p.y + test_float(at + 4u * i + 2u) * p.z +
+               test_float(at + 4u * i + 3u);
+    uint flags = test_word(at + 19u), kind = flags & 3u;
+    precise vec3 beyond = abs(q) - vec3(test_float(at + 12u), test_float(at + 13u), test_float(at + 14u));
+    precise vec3 outside = max(beyond, 0.0);
+    precise float axis = sqrt(q.x * q.x + q.y * q.y);
+    precise float box = sqrt(outside.x * outside.x + outside.y * outside.y + outside.z * outside.z) +
+                        min(max(max(beyond.x, beyond.y), beyond.z), 0.0);
+    float distance = kind == SPL_SHAPE_AXIS ? axis : kind == SPL_SHAPE_PLANE ? q.z : box;
+    float least = test_float(at + 15u), most = test_float(at + 16u);
+    bool above = distance > least || ((flags & SPL_SHAPE_WITH_LEAST) != 0u && distance == least);
+    bool below = distance < most || ((flags & SPL_SHAPE_WITH_MOST) != 0u && distance == most);
+    float rise = test_float(at + 17u), fall = test_float(at + 18u);
+    precise float low = (distance - least) * rise, high = (most - distance) * fall;
+    return above && below ? mark_of(min(rise > 0.0 ? low : 1.0, fall > 0.0 ? high : 1.0)) : 0u;
+}
+
+/* Item `index`, splat or panel, whose splat or cell lies at `p`: the largest mark of all tests, of which any makes it
+ * soft. */
+uint make_mark(spl_draw_chunk chunk, uint index, vec3 p)
+{
+    uint first = chunk.texture, count = test_word(first), mark = 0u;
+    for (uint t = 0u; t < count; t++) {
+        uint at = first + 1u + t * SPL_TEST_WORDS, kind = test_word(at), word = test_word(at + 1u);
+        uint packed_width = test_word(at + 2u), width = packed_width & (SPL_TEST_LAST_NONE - 1u);
+        uint own;
+        if (kind == SPL_TEST_SHAPE) {
+            own = test_shape(word, p);
+        } else {
+            uint code = load_code(word, width, index);
+            if (kind == SPL_TEST_TABLE)
+                own = test_word(at + SPL_TEST_TABLE_WORD + (code & 31u) / 4u) >> 8u * (code & 3u) & 255u;
+            else
+                own = test_numbers(at, code, width, (packed_width & SPL_TEST_LAST_NONE) != 0u);
+        }
+        mark = max(mark, own);
+    }
+    return mark;
+}
+
+#ifdef SPL_CELL_LANES
+void main()
+{
+    load_frame();
+    splat_run run = load_splat_run();
+    uint index = item_of(run.first), lane = run.first >> SPL_CELL;
+    for (uint word = run.end > 0u ? lane : SPL_MARKS_PANEL; word < SPL_MARKS_PANEL; word += SPL_CELL_LANES) {
+        uint four = 0u;
+        for (uint i = 0u; i < 4u; i++) {
+            splat s = load_splat(run.chunk, index | (4u * word + i) << SPL_CELL, true);
+            four |= make_mark(run.chunk, index, s.position) << 8u * i;
+        }
+        marks[run.chunk.marks + index * SPL_MARKS_PANEL + word] = four;
+    }
+}
+#else
+void main()
+{
+    load_frame();
+    splat_run run = load_run_of(gl_GlobalInvocationID.x / SPL_LANES);
+    uint word = run.first / 4u + gl_GlobalInvocationID.x % SPL_LANES, four = 0u;
+    if (4u * word >= run.end)
+        return;
+    for (uint i = 0u; i < 4u; i++) {
+        uint index = min(4u * word + i, run.end - 1u);
+        four |= make_mark(run.chunk, index, load_splat(run.chunk, index, true).position) << 8u * i;
+    }
+    marks[run.chunk.marks + word] = four;
+}
+#endif

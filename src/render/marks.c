@@ -1,0 +1,240 @@
+/* Chunks against terms; see marks.h. A chunk's header has the base and the width of its codes, so the numbers that it
+ * may have are a range, modulo 2^32 as codes decode; its box bounds distances to shapes. What that leaves open becomes a
+ * test. W of eq. 22 is computed here and in common/marks.glsl by the same products of floats.
+ *
+ * A test (SPL_TEST_*): of numbers a code is soft where code + start, modulo 2^32, is at most the span; of few codes there
+ * is a table of marks; of a shape its words say where it lies. Pure functions; any thread. */
+#include "render/marks.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "dataset/chunk.h"
+
+enum verdict { VERDICT_NONE, VERDICT_SOME, VERDICT_BLENDED, VERDICT_ALL }; // blended: all are soft, of different W
+
+static uint32_t word_of(float value)
+{
+    uint32_t word;
+    memcpy(&word, &value, sizeof word);
+    return word;
+}
+
+static float share_at(const struct spl_marks_term *term, uint32_t past)
+{
+    const uint32_t above = past >> term->shift, below = (term->span - past) >> term->shift;
+    const float low = term->share_low + (float)(above < SPL_TEST_EXACT ? above : SPL_TEST_EXACT) * term->share_step;
+    const float high =
+        term->share_high + (float)(below < SPL_TEST_EXACT ? below : SPL_TEST_EXACT) * term->share_step_high;
+    return fminf(fminf(low, high), 1);
+}
+
+static uint32_t mark_of(float share)
+{
+    return 1 + (uint32_t)(share * SPL_MARK_MOST + 0.5f);
+}
+
+/* The codes 0..last of a chunk as numbers, against those that the term takes. */
+static enum verdict judge_numbers(const struct spl_marks_term *term, enum spl_stream_type type,
+                                  struct spl_stream_code code, uint32_t *test)
+{
+    const uint64_t last = (1ull << code.width) - 1; /* of values that there may be */
+    const bool none = type == SPL_STREAM_STEPS && code.width;
+    const uint32_t start = code.base - term->low;
+    if (!term->any)
+        return VERDICT_NONE;
+    const uint64_t most = none ? last - 1 : last;
+    /* code c is soft where (start + c) mod 2^32 <= span: the first such code, if any, is 0 or that where it wraps */
+    if (start > term->span && most < (1ull << 32) - start)
+        return VERDICT_NONE;
+    test[0] = SPL_TEST_NUMBERS;
+    test[2] = code.width | (none ? SPL_TEST_LAST_NONE : 0);
+    test[3] = start;
+    test[4] = term->span;
+    test[5] = term->shift;
+    test[6] = word_of(term->share_low);
+    test[7] = word_of(term->share_step);
+    test[8] = word_of(term->share_high);
+    test[9] = word_of(term->share_step_high);
+    if (start > term->span || most > term->span - start || none)
+        return VERDICT_SOME;
+    return share_at(term, start) >= 1 && share_at(term, start + (uint32_t)most) >= 1 ? VERDICT_ALL : VERDICT_BLENDED;
+}
+
+/* Each of a chunk's few codes has its mark. */
+static enum verdict judge_table(const struct spl_marks_term *term, const struct spl_stream *stream,
+                                struct spl_stream_code code, uint32_t *test)
+{
+    enum { codes_max = 32 };
+    const uint32_t codes = 1u << (code.width < 5 ? code.width : 5);
+    uint32_t soft = 0, whole = 0;
+    memset(test, 0, SPL_TEST_WORDS * sizeof *test);
+    test[0] = SPL_TEST_TABLE;
+    test[2] = code.width;
+    for (uint32_t c = 0; c < codes && c < codes_max; c++) {
+        const double value = spl_stream_decode(stream, code, (const uint32_t[2]){c, 0}, 0);
+        if (!(value > term->least || (term->with_least && value == term->least)) ||
+            !(value < term->most || (term->with_most && value == term->most)))
+            continue;
+        double share = 1;
+        if (isfinite(term->least) && term->blend_least > 0)
+            share = fmin(share, (value - term->least) / term->blend_least);
+        if (isfinite(term->most) && term->blend_most > 0)
+            share = fmin(share, (term->most - value) / term->blend_most);
+        const uint32_t mark = mark_of((float)share);
+        test[SPL_TEST_TABLE_WORD + c / 4] |= mark << 8 * (c % 4);
+        soft++;
+        whole += mark == SPL_MARK_WHOLE;
+    }
+    return !soft ? VERDICT_NONE : soft < codes ? VERDICT_SOME : whole < codes ? VERDICT_BLENDED : VERDICT_ALL;
+}
+
+static double distance_to(const struct spl_marks_term *term, const struct spl_marks_shape *shape, const double p[3])
+{
+    double q[3];
+    for (int i = 0; i < 3; i++) {
+        const double *row = shape->rows + 4 * i;
+        q[i] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3];
+    }
+    if (term->measure == SPL_SOFT_AXIS)
+        return hypot(q[0], q[1]);
+    if (term->measure == SPL_SOFT_PLANE)
+        return q[2];
+    double outside[3], inside = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        double beyond = fabs(q[i]) - shape->half[i];
+        outside[i] = fmax(beyond, 0);
+        inside = fmax(inside, beyond);
+    }
+    return hypot(hypot(outside[0], outside[1]), outside[2]) + fmin(inside, 0);
+}
+
+/* Distances change by no more than one goes, of planes along their normal; and kernels round in floats. */
+static enum verdict judge_shape(const struct spl_marks_term *term, const struct spl_marks_shape *shape,
+                                const struct spl_view_box *box, uint32_t *test)
+{
+    const double *h = box->half, *c = box->center, *n = shape->rows + 8;
+    double reach = hypot(hypot(h[0], h[1]), h[2]), middle = distance_to(term, shape, c), largest = 0;
+    for (int i = 0; i < 3; i++)
+        largest += fabs(shape->rows[4 * i + 3]) + fabs(c[i]) + h[i] + shape->half[i];
+    if (term->measure == SPL_SOFT_PLANE)
+        reach = fabs(n[0]) * h[0] + fabs(n[1]) * h[1] + fabs(n[2]) * h[2];
+    reach += 4e-6 * largest;
+    test[0] = SPL_TEST_SHAPE;
+    test[1] = shape->word;
+    const double low = middle - reach, high = middle + reach;
+    if (high < term->least || low > term->most)
+        return VERDICT_NONE;
+    if (!(low > term->least && high < term->most))
+        return VERDICT_SOME;
+    return low - term->least > term->blend_least && term->most - high > term->blend_most ? VERDICT_ALL
+                                                                                         : VERDICT_BLENDED;
+}
+
+void spl_marks_judge(const struct spl_marks *marks, const struct spl_marks_view *view, const struct spl_tables *tables,
+                     uint32_t index, const struct spl_view_box *box, struct spl_marks_chunk *out)
+{
+    const struct spl_chunk *chunk = &tables->chunks[index];
+    enum verdict whole = VERDICT_NONE;
+    uint32_t count = 0;
+    out->by_cells = false;
+    for (uint32_t i = 0; i < marks->count && whole < VERDICT_ALL; i++) {
+        const struct spl_marks_term *term = &marks->terms[i];
+        uint32_t *test = out->tests + 1 + SPL_TEST_WORDS * count;
+        enum verdict verdict;
+        if (term->stream < 0) {
+            verdict = judge_shape(term, &view->shapes[i], box, test);
+            out->by_cells |= verdict == VERDICT_SOME || verdict == VERDICT_BLENDED;
+        } else {
+            const uint32_t s = (uint32_t)term->stream;
+            const struct spl_stream_code code = {tables->base[s][index], tables->width[s][index]};
+            enum spl_stream_type type = spl_stream_type_from_name(marks->streams[s].type);
+            verdict = spl_chunk_kind(chunk) == SPL_CHUNK_LINES ? VERDICT_NONE
+                      : type == SPL_STREAM_HALF_OCTAVES        ? judge_table(term, &marks->streams[s], code, test)
+                                                               : judge_numbers(term, type, code, test);
+            test[1] = chunk->geometry_word + spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, s, index);
+        }
+        count += verdict == VERDICT_SOME || verdict == VERDICT_BLENDED;
+        whole = verdict > whole ? verdict : whole;
+    }
+    out->solid = whole < VERDICT_BLENDED;
+    out->soft = whole > VERDICT_NONE;
+    out->test_words = whole == VERDICT_SOME || whole == VERDICT_BLENDED ? 1 + SPL_TEST_WORDS * count : 0;
+    out->by_cells &= out->test_words > 0;
+    out->tests[0] = count;
+}
+
+/* Two unit vectors across `n`, a unit one. */
+static void across(const double n[3], double u[3], double v[3])
+{
+    int least = fabs(n[0]) < fabs(n[1]) ? (fabs(n[0]) < fabs(n[2]) ? 0 : 2) : fabs(n[1]) < fabs(n[2]) ? 1 : 2;
+    double axis[3] = {least == 0, least == 1, least == 2}, dot = n[least], length = sqrt(1 - dot * dot);
+    for (int i = 0; i < 3; i++)
+        u[i] = (axis[i] - dot * n[i]) / length;
+    for (int i = 0; i < 3; i++)
+        v[i] = n[(i + 1) % 3] * u[(i + 2) % 3] - n[(i + 2) % 3] * u[(i + 1) % 3];
+}
+
+/* The shape's axes and its middle, world; of a box how far it reaches from there. */
+static void place_shape(const struct spl_marks_term *term, double axes[9], double middle[3], double half[3])
+{
+    const double *s = term->shape;
+    for (int i = 0; i < 9; i++)
+        axes[i] = i % 4 == 0;
+    for (int i = 0; i < 3; i++) {
+        middle[i] = term->measure == SPL_SOFT_BOX ? s[i] + (s[i + 3] - s[i]) / 2 : s[i];
+        half[i] = term->measure == SPL_SOFT_BOX ? (s[i + 3] - s[i]) / 2 : 0;
+    }
+    if (term->measure == SPL_SOFT_BOX)
+        return;
+    const double length = hypot(hypot(s[3], s[4]), s[5]);
+    for (int i = 0; i < 3; i++)
+        axes[6 + i] = s[3 + i] / length;
+    across(axes + 6, axes, axes + 3);
+}
+
+static uint32_t float_word(double value)
+{
+    return word_of((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
+}
+
+uint32_t spl_marks_see(const struct spl_marks *marks, const struct spl_camera *camera, uint32_t first_word,
+                       struct spl_marks_view *view, uint32_t words[SPL_MARKS_SHAPES_MAX])
+{
+    uint32_t used = 0;
+    for (uint32_t t = 0; t < marks->count; t++) {
+        const struct spl_marks_term *term = &marks->terms[t];
+        struct spl_marks_shape *shape = &view->shapes[t];
+        double axes[9], middle[3];
+        if (term->stream >= 0)
+            continue;
+        *shape = (struct spl_marks_shape){.word = first_word + used};
+        place_shape(term, axes, middle, shape->half);
+        for (int i = 0; i < 3; i++) {
+            const double *a = axes + 3 * i;
+            for (int c = 0; c < 3; c++) { /* the axis, turned as the camera is; from the eye to the middle */
+                const double *r = camera->rotation + 3 * c;
+                shape->rows[4 * i + c] = a[0] * r[0] + a[1] * r[1] + a[2] * r[2];
+                shape->rows[4 * i + 3] += a[c] * (camera->eye[c] - middle[c]);
+            }
+        }
+        uint32_t *out = words + used;
+        for (int i = 0; i < 12; i++)
+            out[i] = float_word(shape->rows[i]);
+        for (int i = 0; i < 3; i++)
+            out[12 + i] = float_word(shape->half[i]);
+        const bool blends[2] = {term->blend_least > 0 && isfinite(term->least),
+                                term->blend_most > 0 && isfinite(term->most)};
+        out[15] = float_word(term->least);
+        out[16] = float_word(term->most);
+        out[17] = float_word(blends[0] ? 1 / term->blend_least : 0);
+        out[18] = float_word(blends[1] ? 1 / term->blend_most : 0);
+        out[19] = (uint32_t)(term->measure == SPL_SOFT_AXIS    ? SPL_SHAPE_AXIS
+                             : term->measure == SPL_SOFT_PLANE ? SPL_SHAPE_PLANE
+                                                               : SPL_SHAPE_BOX) |
+                  (term->with_least ? SPL_SHAPE_WITH_LEAST : 0) | (term->with_most ? SPL_SHAPE_WITH_MOST : 0);
+        used += SPL_MARKS_SHAPE_WORDS;
+    }
+    return used;
+}

@@ -1,0 +1,82 @@
+/* Which splats of a dataset are soft, as a view's terms say: of the whole chunk where its header and its box tell, else
+ * as tests that a kernel makes of each splat (shaders/soft_mark.comp). Of what is done with soft splats nothing is known
+ * here: who draws none of them has a filter. Pure functions; any thread. */
+#ifndef SPL_RENDER_MARKS_H
+#define SPL_RENDER_MARKS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <splatd/camera.h>
+#include <splatd/dataset.h>
+#include <splatd/soft.h>
+
+#include "base/error.h"
+#include "dataset/dataset.h"
+#include "render/frustum.h"
+#include "shared.h"
+
+/* A term whose ends are values of its dataset. */
+struct spl_marks_term {
+    enum spl_soft_measure measure;
+    int stream; /* of attributes; -1 = a shape */
+    double least, most;
+    bool with_least, with_most;
+    double blend_least, blend_most; /* values behind the ends on which W of eq. 22 rises to 1; 0 = there is none */
+    double shape[6];
+    /* Of streams of whole numbers and steps: the numbers (base + code) that are soft. */
+    bool any;
+    uint32_t low, span;
+    float share_low, share_high, share_step; /* W at `low` and at low + span; of a number more; see marks.c */
+    float share_step_high;
+    uint32_t shift;
+};
+
+struct spl_marks {
+    uint32_t count;
+    struct spl_marks_term terms[SPL_SOFT_TERMS_MAX];
+    const struct spl_stream *streams; /* the dataset's */
+};
+
+/* Ends of a view's terms as values of a dataset: quantiles, and shares of the 99th percentile, are looked up. SPL_E_INPUT
+ * (field "soft") where the dataset has no such attribute, or was packed before quantiles were kept. `ends` has room for
+ * SPL_SOFT_TERMS_MAX; may be NULL, to check only. */
+int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
+                      struct spl_marks_term *ends, struct spl_error *err);
+
+/* The terms of a view of a dataset, which is borrowed. Errors as of resolve. */
+int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, const struct spl_dataset *dataset,
+                   struct spl_error *err);
+
+/* Part of it: what terms that were resolved take of the numbers of marks->streams. */
+void spl_marks_find_numbers(struct spl_marks *marks);
+
+/* Their shapes as a camera sees them, as words for its tests; 0 words where there is none. */
+enum { SPL_MARKS_SHAPE_WORDS = 20, SPL_MARKS_SHAPES_MAX = SPL_MARKS_SHAPE_WORDS * SPL_SOFT_TERMS_MAX };
+struct spl_marks_shape {
+    double rows[12]; /* view space -> of the shape: three rows of (x, y, z, 1) */
+    double half[3];  /* of a box */
+    uint32_t word;   /* where its words are among the tests */
+};
+struct spl_marks_view {
+    struct spl_marks_shape shapes[SPL_SOFT_TERMS_MAX]; /* by term */
+};
+uint32_t spl_marks_see(const struct spl_marks *marks, const struct spl_camera *camera, uint32_t first_word,
+                       struct spl_marks_view *view, uint32_t words[SPL_MARKS_SHAPES_MAX]);
+
+/* What of a chunk is soft. Its tests are words: how many there are, and SPL_TEST_WORDS of each (shared.h); 0 where no
+ * marks are needed. */
+enum { SPL_MARKS_TESTS_MAX = 1 + SPL_TEST_WORDS * SPL_SOFT_TERMS_MAX };
+struct spl_marks_chunk {
+    bool solid, soft; /* some may be */
+    bool by_cells;    /* of panels: their cells differ */
+    uint32_t test_words;
+    uint32_t tests[SPL_MARKS_TESTS_MAX];
+};
+
+/* Of chunk `index` of `tables`, whose splats lie within `box`, view space. Vertices of lines have no attributes: they
+ * are solid. */
+void spl_marks_judge(const struct spl_marks *marks, const struct spl_marks_view *view, const struct spl_tables *tables,
+                     uint32_t index, const struct spl_view_box *box, struct spl_marks_chunk *out);
+
+#endif
