@@ -364,16 +364,15 @@ struct spl_frame_params {
 #define SPL_SOFT_RECT_COLUMNS 24
 #define SPL_SOFT_RECT_ROWS 28
 #define SPL_SOFT_SPAN_MAX 16 /* tiles of a rectangle's side */
-#define SPL_SOFT_WHOLLY 255u /* a mark: soft throughout; 1..254 are (mark - 1) / 254 soft, eq. 22 */
 /* What is in front lets this much through, in fixed point, and is not looked behind where it is less than the least. */
 #define SPL_SOFT_CLEAR 0xffffffu
 #define SPL_SOFT_CLEAR_LEAST 0x4000u
 #define SPL_SOFT_STATE_WORDS 4 /* a sample: sums of red, green, blue times share, share covered; 0 = nothing */
+/* What an invocation counts: items | most entries of one << 4 | entries << 16, least and greatest depth (float bits). */
+#define SPL_SOFT_SLOT_WORDS 3
+#define SPL_SOFT_SLOT_SPLATS 4 /* discs of a slot; SPL_SOFT_SLOT_CELLS cells */
+#define SPL_SOFT_SLOT_CELLS 8
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
-/* (cos(pi d / r) + 1) / 2 = m^2 (A + B m + C m^2), m = 1 - (d / r)^2, to 5e-5; 1 for m = 1. */
-#define SPL_SOFT_EXPRESS_A 0.62015722f
-#define SPL_SOFT_EXPRESS_B 0.29355069f
-#define SPL_SOFT_EXPRESS_C 0.08629209f
 
 /* Of one dispatch of it. */
 struct spl_soft_step {
@@ -386,6 +385,9 @@ struct spl_soft_step {
     SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
     SPL_U32 first;         /* word of the lists where those of this dispatch start */
     SPL_F32 opacity;       /* at a sphere's centre, of 65536 */
+    SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
+    SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
+    SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
 };
 
 #ifndef SPL_GLSL

@@ -9,6 +9,7 @@ import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
 import {toWorld} from "./place.js";
 import {askJson, setPass, setToken} from "./service.js";
+import {softOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
 
 const id = decodeURIComponent(location.pathname.split("/").pop());
@@ -31,7 +32,7 @@ async function open() {
     const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
     document.title = id;
     stage.element.ariaLabel = `View of ${id}`;
-    stage.settings = budget ? {layer, budget} : {layer, ...setting};
+    stage.settings = budget ? {layer, budget, ...softOf(setting)} : {layer, ...setting};
     stage.report(null);
     stage.open(dataset, Object.fromEntries(given));
   } catch (problem) {

@@ -3,7 +3,7 @@
 import {findParameter} from "./methods.js";
 
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "layer", "method", "budget", "crs"],
+  TEXTS = ["dataset", "layer", "method", "budget", "crs", "soft"],
   NUMBERS = ["fov", "lod", "supersample"];
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 
@@ -17,6 +17,7 @@ export function parse(fragment) {
     const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
     if (VECTORS.includes(name) && numbers.length === 3 && numbers.every(Number.isFinite)) found[name] = numbers;
     else if (isNumber(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
+    else if (name === "soft") found.soft = found.soft ? `${found.soft} or ${text}` : text;
     else if (isText(name)) found[name] = text;
   }
   return found;

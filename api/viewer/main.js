@@ -3,11 +3,13 @@
 import {Chart} from "./chart.js";
 import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
-import {Controls, choose, counts, findMethod, loadTable, offered, table} from "./methods.js";
+import {Controls, choose, counts, findMethod, listed, loadTable, offered} from "./methods.js";
 import {notices} from "./notice.js";
 import {toWorld} from "./place.js";
 import {Points, coordinates, lengthText, withUnit} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
+import {Soft} from "./soft.js";
+import {opacityOf, softOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
@@ -36,6 +38,7 @@ const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
 let dataset = null; // that the controls are set for
 let parameters = null; // their Controls, once there is a table of them
+let soft = null; // the part of the panel for what is soft, as long
 
 /** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
  * refuses stands what `before` has. */
@@ -45,7 +48,7 @@ function readSettings(before) {
   const read = (name) => (before && !control(name).checkValidity() ? before[name] : control(name).value) ?? "";
   const settings = Object.fromEntries(all.map((name) => [name, read(name)]));
   for (const name of all) control(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
-  for (const parameter of table.parameters) {
+  for (const parameter of listed()) {
     const {name} = parameter,
       shown = counts(parameter, settings.method, dataset);
     parameters.offer(name, shown);
@@ -53,7 +56,7 @@ function readSettings(before) {
   }
   $("method-help").textContent = findMethod(settings.method).description;
   stage.coarse = $("moving").value;
-  return settings;
+  return {...settings, ...soft.read()};
 }
 
 function writeLink() {
@@ -69,7 +72,7 @@ function writeLink() {
       up,
       fov,
       layer: setting.layer,
-      ...(budget ? {budget} : setting),
+      ...(budget ? {budget, ...softOf(setting)} : setting),
     })}`,
   );
 }
@@ -99,13 +102,19 @@ async function open() {
     if (turn !== opening) return;
     dataset = found;
     parameters ??= new Controls($("method-help"));
+    if (!soft) {
+      soft = new Soft();
+      soft.addEventListener("change", () => stage.dataset && stage.set(readSettings(stage.settings)));
+    }
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
     choices($("method"), dataset.methods, offered(wanted.method, dataset));
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
-    for (const parameter of table.parameters) parameters.set(parameter, wanted[parameter.name]);
+    for (const parameter of listed()) parameters.set(parameter, wanted[parameter.name]);
+    soft.open(dataset, wanted);
+    $("soft").open ||= Boolean(wanted.soft);
     choose($("budget"), wanted.budget ?? "");
     stage.settings = readSettings();
     const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
@@ -239,6 +248,7 @@ stage.addEventListener("state", ({detail: problem}) => {
   $("token").hidden = problem?.kind !== "token";
   if (!$("token").hidden) fold($("toggle"), $("panel"), true); // the field lies there
 });
+tour.addEventListener("fade", () => soft?.showOpacity(opacityOf(stage.settings)));
 editTour(tour, say);
 renderTours(tour, say);
 

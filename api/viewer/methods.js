@@ -21,6 +21,9 @@ export async function loadTable() {
 export const findMethod = (name) => table.methods.find((method) => method.name === name);
 export const findParameter = (name) => table.parameters.find((parameter) => parameter.name === name);
 
+/** Those that have a control beside their method; what is about soft spheres has its own part of the panel. */
+export const listed = () => table.parameters.filter(({soft}) => !soft);
+
 /** Does the parameter change what `method` draws of `dataset`? */
 export const counts = ({name, textures, maps, primitives}, method, dataset) =>
   Boolean(
@@ -33,7 +36,7 @@ export const counts = ({name, textures, maps, primitives}, method, dataset) =>
 /** What of a view's setting picks take, so that they find what the picture shows: its method, and what changes what is
  * seen where. */
 export function pickable(setting) {
-  const names = ["method", ...table.parameters.filter(({textures}) => !textures).map(({name}) => name)];
+  const names = ["method", "soft", ...table.parameters.filter(({textures}) => !textures).map(({name}) => name)];
   return Object.fromEntries(names.filter((name) => name in setting).map((name) => [name, setting[name]]));
 }
 
@@ -50,7 +53,7 @@ export function choose(select, value) {
 }
 
 /** A control of a parameter, empty where the value is the default. */
-function makeControl({type, minimum, maximum, default: usual, enum: names}) {
+export function makeControl({type, minimum, maximum, default: usual, enum: names}) {
   if (names) {
     const select = document.createElement("select");
     select.append(...names.map((name) => new Option(name, name === usual ? "" : name)));
@@ -70,7 +73,7 @@ function makeControl({type, minimum, maximum, default: usual, enum: names}) {
 export class Controls {
   constructor(element) {
     this.rows = new Map(); // name → [label, control, help]
-    for (const parameter of table.parameters) {
+    for (const parameter of listed()) {
       const {name, description} = parameter;
       const [label, help] = [document.createElement("label"), document.createElement("small")];
       const control = makeControl(parameter);

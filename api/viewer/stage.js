@@ -7,6 +7,7 @@
 
 import {rounded, same, warp} from "./camera.js";
 import {Problem, ask, query} from "./service.js";
+import {softOf} from "./soft_setting.js";
 
 const REST_MS = 160;
 const COARSE = {auto: {budget: "60ms"}, half: {supersample: 0.5}, quarter: {supersample: 0.25}, full: {}};
@@ -95,6 +96,11 @@ export class Stage extends EventTarget {
     this.refresh();
   }
 
+  /** Changes them as part of a motion: setCamera() follows. */
+  drift(settings) {
+    this.settings = settings;
+  }
+
   /** Asks for a full frame of what is there now. */
   refresh() {
     this.version++;
@@ -130,7 +136,7 @@ export class Stage extends EventTarget {
     // A budget chooses the rest, but in motion not the method nor how it fills: what changes from frame to frame flickers.
     const {lod, supersample, atoms, ...kept} = setting;
     let quality = {...setting, ...(full ? {} : coarse)};
-    if (full && budget) quality = {budget};
+    if (full && budget) quality = {budget, ...softOf(setting)};
     else if (!full && coarse.budget) quality = {...kept, ...coarse};
     return {
       ...rounded(this.camera),
@@ -165,15 +171,16 @@ export class Stage extends EventTarget {
     if (!this.dataset || this.flight || this.blocked || document.hidden) return;
     const full = !this.moving;
     if (!full) this.later(this.restAt - performance.now() + 1);
-    if (this.shown && same(this.shown.camera, rounded(this.camera)) && (this.shown.full || !full)) return;
+    const still = this.shown?.settings === this.settings && same(this.shown.camera, rounded(this.camera));
+    if (still && (this.shown.full || !full)) return;
     const flight = (this.flight = {abort: new AbortController(), full, version: this.version});
-    const [dataset, camera, size] = [this.dataset, rounded(this.camera), this.size];
+    const [dataset, camera, size, settings] = [this.dataset, rounded(this.camera), this.size, this.settings];
     try {
       const reply = await ask(this.url(full), {signal: flight.abort.signal});
       const bitmap = await createImageBitmap(await reply.blob());
       const current = full && flight.version === this.version;
       if (dataset === this.dataset) {
-        this.show(bitmap, {camera, size, full: current, ...readHeaders(reply.headers)});
+        this.show(bitmap, {camera, size, settings, full: current, ...readHeaders(reply.headers)});
         this.failures = 0;
         this.report(null);
       }

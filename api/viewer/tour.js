@@ -3,13 +3,14 @@
 // The curve is a Catmull-Rom spline over those times through eyes, targets, ups and fields of view.
 
 import {rounded} from "./camera.js";
+import {opacityOf} from "./soft_setting.js";
 
 export class Tour extends EventTarget {
   /** Fires "change" when the keyframes have changed, "play" when it begins or ends to play. */
   constructor(stage) {
     super();
     this.stage = stage;
-    this.keyframes = []; // {eye, target, up, fov, seconds}
+    this.keyframes = []; // {eye, target, up, fov, seconds}, and soft_opacity where something was soft
     this.closed = false;
     this.playing = 0; // the animation frame, 0 = still
   }
@@ -41,7 +42,12 @@ export class Tour extends EventTarget {
   }
 
   add() {
-    this.keyframes.push({...rounded(this.stage.camera), seconds: 3});
+    const opacity = opacityOf(this.stage.settings);
+    this.keyframes.push({
+      ...rounded(this.stage.camera),
+      seconds: 3,
+      ...(opacity === null ? {} : {soft_opacity: opacity}),
+    });
     this.changed();
   }
 
@@ -70,8 +76,30 @@ export class Tour extends EventTarget {
   /** Shows a keyframe. */
   go(i) {
     this.stop();
-    const {eye, target, up, fov} = this.keyframes[i];
+    const {eye, target, up, fov, soft_opacity: opacity} = this.keyframes[i];
+    this.fade(opacity);
     this.stage.setCamera({eye, target, up, fov});
+  }
+
+  /** Shows what is soft at another strength, where something is. Fires "fade". */
+  fade(opacity) {
+    const {settings} = this.stage;
+    if (opacity === undefined || [null, opacity].includes(opacityOf(settings))) return;
+    this.stage.drift({...settings, soft_opacity: String(opacity)});
+    this.dispatchEvent(new Event("fade"));
+  }
+
+  /** The strength `time` seconds into the tour: straight between the keyframes that say one, as the service has it. */
+  opacityAt(time) {
+    let at = 0;
+    const legs = this.legs,
+      said = [...this.keyframes, ...(this.closed ? this.keyframes.slice(0, 1) : [])]
+        .map(({soft_opacity: value}, i) => [(at += i ? legs[i - 1] : 0), value])
+        .filter(([, value]) => value !== undefined);
+    const after = said.findIndex(([begin]) => begin > time);
+    if (!said.length || after <= 0) return said.at(after)?.[1];
+    const [[a, from], [b, to]] = said.slice(after - 1, after + 1);
+    return Number((from + ((to - from) * (time - a)) / (b - a)).toFixed(3));
   }
 
   /** The camera `time` seconds into the tour. */
@@ -102,7 +130,7 @@ export class Tour extends EventTarget {
   /** As POST /v1/datasets/{id}/tours takes it for a path. */
   document() {
     const starts = this.keyframes.map((_, i) => this.keyframes.slice(0, i).reduce((sum, key) => sum + key.seconds, 0));
-    const keyframes = this.keyframes.map(({seconds, ...camera}, i) => ({camera, time: starts[i]}));
+    const keyframes = this.keyframes.map(({seconds, soft_opacity, ...camera}, i) => ({camera, time: starts[i], soft_opacity}));
     return {keyframes, closed: this.closed};
   }
 
@@ -110,6 +138,7 @@ export class Tour extends EventTarget {
     const began = performance.now();
     const step = (now) => {
       const time = (now - began) / 1000;
+      this.fade(this.opacityAt(Math.min(time, this.seconds)));
       this.stage.setCamera(this.at(Math.min(time, this.seconds)));
       if (time >= this.seconds) this.stop();
       else this.playing = requestAnimationFrame(step);

@@ -38,6 +38,9 @@ struct spl_cmd_bench_arguments {
     enum spl_method methods[SPL_CMD_BENCH_LIST_MAX];
     double lods[SPL_CMD_BENCH_LIST_MAX], supersamples[SPL_CMD_BENCH_LIST_MAX];
     uint32_t atoms[SPL_CMD_BENCH_LIST_MAX];
+    struct spl_soft_params soft, softs[1 + SPL_SOFT_MODEL_COUNT]; /* of --soft; solid, then what it is drawn as */
+    enum spl_soft_model soft_models[SPL_SOFT_MODEL_COUNT];
+    size_t soft_model_count;
     size_t supersample_count, atom_count;
     struct spl_path path;
     const char *views, *set;

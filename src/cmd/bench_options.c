@@ -121,6 +121,39 @@ static int take_atom_counts(void *arguments, const char *option, char *text, str
     return each(option, text, take_atoms, a, err);
 }
 
+static int take_soft(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    if (spl_soft_parse(text, &((struct spl_cmd_bench_arguments *)arguments)->soft, &why))
+        return spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message);
+    return SPL_OK;
+}
+
+static const char *name_of_model(int model)
+{
+    return spl_soft_model_name((enum spl_soft_model)model);
+}
+
+static int take_soft_model(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
+{
+    int model = 0;
+    int status =
+        spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model, SPL_SOFT_MODEL_COUNT, &model, err);
+    for (size_t i = 0; !status && i < a->soft_model_count; i++)
+        if (a->soft_models[i] == (enum spl_soft_model)model)
+            status = spl_fail(err, SPL_E_USAGE, "--soft-model has '%s' twice", text);
+    if (!status)
+        a->soft_models[a->soft_model_count++] = (enum spl_soft_model)model;
+    return status;
+}
+
+static int take_soft_models(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_cmd_bench_arguments *a = arguments;
+    a->soft_model_count = 0;
+    return each(option, text, take_soft_model, a, err);
+}
+
 static int take_size(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     struct spl_cmd_bench_arguments *a = arguments;
@@ -161,6 +194,14 @@ static const struct spl_cmd_option options[] = {
     {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
     {"maps", "on|off|both", "colours from stations' maps, where the dataset has them", .otherwise = "on; both with -o",
      .take = take_maps},
+    {"soft", "TERMS",
+     "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is solid",
+     .take = take_soft},
+    {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express", .take = take_soft_models},
+    {"soft-opacity", "X", "of a soft sphere at its centre", .fallback = "0.3",
+     SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.opacity, 0, 1)},
+    {"soft-blend", "X", "how far beyond the ends of a term spheres are partly solid", .fallback = "0",
+     SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.blend, 0, 1e9)},
     {"memory-limit", "MIB", "device memory, or 2G and such; less than the dataset needs measures paging",
      SPL_CMD_MIB(struct spl_cmd_bench_arguments, bench.memory_limit, 1, 1u << 24)},
     {"json", NULL, "everything, quartiles too, as one JSON object", SPL_CMD_FLAG(struct spl_cmd_bench_arguments, json)},
@@ -199,6 +240,7 @@ const struct spl_cmd_table spl_cmd_bench_table = {
         "  splatd bench hall.spld\n"
         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
+        "  splatd bench hall.spld --soft 'uncertainty>q0.9' --soft-model express,base --frames 5\n"
         "  splatd bench hall.spld -o hall-bench\n"
         "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
         "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench\n\n",
@@ -256,6 +298,26 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
     return 0;
 }
 
+/* A row where all is solid, and what it is compared with. */
+static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
+{
+    if (!a->soft.count && a->soft_model_count)
+        return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'uncertainty>q0.9'");
+    if (a->soft.count && a->sweep.output)
+        return spl_fail(err, SPL_E_USAGE, "--soft is for the table of frame times; leave -o out");
+    if (!a->soft_model_count)
+        a->soft_models[a->soft_model_count++] = SPL_SOFT_MODEL_EXPRESS;
+    a->softs[0] = (struct spl_soft_params){.opacity = a->soft.opacity};
+    a->bench.softs = a->softs;
+    a->bench.soft_count = 1;
+    for (size_t i = 0; a->soft.count && i < a->soft_model_count; i++) {
+        struct spl_soft_params *soft = &a->softs[a->bench.soft_count++];
+        *soft = a->soft;
+        soft->model = a->soft_models[i];
+    }
+    return SPL_OK;
+}
+
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv, struct spl_error *err)
 {
     a->devices[0] = "auto";
@@ -271,6 +333,8 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
         .lod_count = 1,
     };
     int status = spl_cmd_table_parse(&spl_cmd_bench_table, argc, argv, a, err);
+    if (!status)
+        status = finish_soft(a, err);
     double size[2] = {a->size[0], a->size[1]};
     spl_size_follow(size, (const double[]){SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT});
     a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);

@@ -4,23 +4,29 @@
 
 #include "cmd/bench.h"
 
+static const char *name_soft(const struct spl_soft_params *soft)
+{
+    return soft->count ? spl_soft_model_name(soft->model) : "solid";
+}
+
 void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct spl_bench_report *r)
 {
     printf("%ux%u, %u frames a row, medians in ms; 1 unit = %.1f ms (quartiles %.1f to %.1f)\n", o->width, o->height,
            o->frames, r->calibrator.median, r->calibrator.q1, r->calibrator.q3);
     for (size_t i = 0; i < o->device_count; i++) {
-        const struct spl_bench_row *row = &r->rows[i * o->method_count * o->lod_count];
+        const struct spl_bench_row *row = &r->rows[i * o->method_count * o->lod_count * o->soft_count];
         printf("%s = %s, %s\n", row->device.backend, row->device.name, row->device.driver);
     }
-    printf("\n%-16s %-7s %-7s %4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s\n", "dataset", "device",
-           "method", "lod", "frame", "q1", "q3", "units", "floor", "select", "upload", "clear", "depth", "shade",
+    const int soft = o->soft_count > 1 ? 11 : 0; // the column is there where it says something
+    printf("\n%-16s %-7s %-7s %*s%4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s\n", "dataset", "device",
+           "method", -soft, soft ? "soft" : "", "lod", "frame", "q1", "q3", "units", "floor", "select", "upload", "clear", "depth", "shade",
            "resolve", "readback", "splats");
     for (size_t i = 0; i < r->row_count; i++) {
         const struct spl_bench_row *row = &r->rows[i];
         printf(
-            "%-16.16s %-7s %-7s %4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f %10.0f\n",
-            spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), row->lod,
-            row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
+            "%-16.16s %-7s %-7s %*s%4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f %10.0f\n",
+            spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), -soft,
+            soft ? name_soft(row->drawn_soft) : "", row->lod, row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
             row->select, row->upload, row->clear, row->depth, row->shade, row->resolve, row->readback, row->splats);
         if (row->panels || row->meshes || row->lines)
             printf("%-16s and %.0f panels, %.0f meshes, %.0f lines\n", "", row->panels, row->meshes, row->lines);
@@ -51,12 +57,12 @@ static json_t *row_json(const struct spl_bench_row *row)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(row->dataset);
     return json_pack(
-        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f, s:i, s:I}",
+        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f, s:s, s:i, s:I}",
         "dataset", info->id, "leaf_splats", (json_int_t)info->leaf_splats, "backend", row->device.backend, "device",
         row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
         "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
         passes_json(row), "splats_drawn", row->splats, "panels_drawn", row->panels, "meshes_drawn", row->meshes,
-        "lines_drawn", row->lines, "chunks_drawn", row->chunks,
+        "lines_drawn", row->lines, "chunks_drawn", row->chunks, "soft", name_soft(row->drawn_soft),
         "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
 }
 

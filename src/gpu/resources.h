@@ -23,6 +23,8 @@ enum spl_resource {
     SPL_RESOURCE_TESTS,     /* uint[], what marks are made of (src/render/marks.h) */
     SPL_RESOURCE_MARKS,     /* uint[], a byte for each splat or cell of chunks of which some are soft */
     SPL_RESOURCE_STEP,      /* struct spl_soft_step; the rest of soft transparency: src/render/soft/order.h */
+    SPL_RESOURCE_SLOTS,     /* uint[], SPL_SOFT_SLOT_WORDS of each that gathers; pairs of items and entries by bucket */
+    SPL_RESOURCE_STARTS,    /* uint[], the first item of each that gathers */
     SPL_RESOURCE_ITEMS,     /* uint[], soft spheres and their rectangles */
     SPL_RESOURCE_SORT_FROM, /* uint[], pairs of key and item; lists of items, tile by tile */
     SPL_RESOURCE_SORT_TO,   /* the same, written */

@@ -57,12 +57,12 @@ static void close_renderers(struct bench *b)
 
 static size_t row_device(const struct spl_bench_options *o, size_t row)
 {
-    return row / (o->lod_count * o->method_count) % o->device_count;
+    return row / (o->soft_count * o->lod_count * o->method_count) % o->device_count;
 }
 
 static size_t row_dataset(const struct spl_bench_options *o, size_t row)
 {
-    return row / (o->lod_count * o->method_count * o->device_count);
+    return row / (o->soft_count * o->lod_count * o->method_count * o->device_count);
 }
 
 static void init_rows(struct bench *b)
@@ -72,8 +72,9 @@ static void init_rows(struct bench *b)
         struct spl_bench_row *row = &b->report->rows[i];
         row->dataset = o->datasets[row_dataset(o, i)];
         row->device = *spl_renderer_get_device(b->renderers[row_device(o, i)]);
-        row->method = o->methods[i / o->lod_count % o->method_count];
-        row->lod = o->lods[i % o->lod_count];
+        row->method = o->methods[i / o->soft_count / o->lod_count % o->method_count];
+        row->lod = o->lods[i / o->soft_count % o->lod_count];
+        row->drawn_soft = &o->softs[i % o->soft_count];
     }
 }
 
@@ -85,6 +86,7 @@ static int render(struct bench *b, size_t row, uint32_t frame, struct sample *sa
     spl_setting_apply(&(struct spl_setting){b->report->rows[row].method, b->report->rows[row].lod, 1,
                                             SPL_TEXTURE_ATOMS, o->maps},
                       &view);
+    view.soft = *b->report->rows[row].drawn_soft;
     double share = (double)frame / (o->frames - 1);
     int status = spl_path_get_camera(&b->paths[row_dataset(o, row)], share, o->width, o->height, &view.camera, err);
     if (status)
@@ -159,11 +161,12 @@ static void summarise_row(struct bench *b, size_t index)
 
 int spl_bench(const struct spl_bench_options *o, struct spl_bench_report *report, struct spl_error *err)
 {
-    spl_assert(o->frames >= 2 && o->dataset_count && o->device_count && o->method_count && o->lod_count);
+    spl_assert(o->frames >= 2 && o->dataset_count && o->device_count && o->method_count && o->lod_count &&
+               o->soft_count);
     memset(report, 0, sizeof *report);
     struct bench b = {.options = o, .report = report};
     int status = SPL_E_NOMEM;
-    report->row_count = o->dataset_count * o->device_count * o->method_count * o->lod_count;
+    report->row_count = o->dataset_count * o->device_count * o->method_count * o->lod_count * o->soft_count;
     report->rows = spl_alloc(report->row_count, sizeof *report->rows, err);
     b.renderers = spl_alloc(o->device_count, sizeof *b.renderers, err);
     b.paths = spl_alloc(o->dataset_count, sizeof *b.paths, err);

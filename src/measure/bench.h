@@ -19,6 +19,8 @@ struct spl_bench_options {
     const double *lods;
     size_t lod_count;
     enum spl_setting_maps maps;          /* of datasets with maps; NO_MAPS = as views have it */
+    const struct spl_soft_params *softs; /* what is soft and how; without terms everything is solid */
+    size_t soft_count;                   /* at least 1 */
     uint32_t width, height;
     uint32_t frames;                     /* places on the path, at least 2 */
     const struct spl_path *path;         /* NULL = each dataset's own orbit */
@@ -33,6 +35,7 @@ struct spl_bench_row {
     struct spl_device_info device;
     enum spl_method method;
     double lod;
+    const struct spl_soft_params *drawn_soft; /* of the options */
     struct spl_summary frame;
     struct spl_summary units;            /* frame / calibrator of the same place on the path */
     double floor;                        /* median: the calibrator's time for as many points as splats were drawn */
@@ -47,7 +50,8 @@ struct spl_bench_row {
 
 struct spl_bench_report {
     struct spl_summary calibrator;       /* milliseconds */
-    struct spl_bench_row *rows;          /* datasets outermost, then devices, methods, lods; owned by the holder */
+    struct spl_bench_row *rows;          /* datasets outermost, then devices, methods, lods, softs; owned by the
+                                            holder */
     size_t row_count;
 };
 

@@ -58,6 +58,12 @@ def test_python_views():
         assert wall.depth(camera=opengl, **SMALL)[:2] == (65, 49)
         assert wall.view(camera=opengl, **SMALL, lod=None).bytes == view.bytes  # None is left out, whatever the method
         assert wall.view(camera=None, **POSE, **SMALL).bytes == view.bytes
+        terms = ["axis:0,0,0,0,0,1<0.5", "box:-1,-1,-1,1,1,1"]
+        for soft in terms, " or ".join(terms):
+            for camera in POSE, {"camera": {**POSE, "fov": 60}}:
+                told = json.loads(wall.view(**camera, **SMALL, soft=soft, soft_opacity=0.5).headers["Splatd-Soft"])
+                assert told["soft"] == terms and told["soft_opacity"] == 0.5, told
+        assert wall.view(**POSE, **SMALL, soft=[]).headers["Splatd-Soft"] is None
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
         assert (
             all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes)

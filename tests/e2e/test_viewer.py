@@ -688,7 +688,7 @@ def test_controls_are_those_of_the_table():
         for method in table["methods"]:
             tab.choose("#method", method["name"])
             lacks = {name for name, parameter in parameters.items()  # the wall
-                     if parameter["textures"] or parameter["maps"] or parameter["primitives"]}
+                     if parameter["textures"] or parameter["maps"] or parameter["primitives"] or parameter["soft"]}
             names = {name for name in method["parameters"] if name not in lacks}
             assert shown(tab) == names, method["name"]
             assert tab.text("#method-help") == method["description"]
@@ -737,6 +737,102 @@ def test_a_method_that_the_page_has_never_heard_of():
         assert all(name for _, name in tab.names())
         tab.choose("#method", "points")
         next_link(tab, lambda now: now["method"] == "points" and not {"thickness", "shade"} & set(now))
+
+
+# As the service describes an attribute whose values it knows: many small ones and a long tail, and a class of two.
+SPREAD = {"count": 1600, "p99": 0.08, "kinds": None, "quantiles": [0.1 * (i / 64) ** 4 for i in range(65)]}
+CLASSES = {"count": 1600, "p99": 5, "kinds": [{"value": 2, "count": 1200}, {"value": 5, "count": 400}],
+           "quantiles": [2] * 49 + [5] * 16}
+
+
+def test_what_is_soft():
+    """Histogram and threshold, classes, a height, terms as text; all of it from the keyboard, in the link, and asked for."""
+    dataset = daemon.ask("/v1/datasets/wall").json()
+    dataset["attributes"] = [{"name": "uncertainty", "unit": "", "values": SPREAD}, {"name": "class", "unit": "", "values": CLASSES},
+                             {"name": "odd", "unit": "", "values": None}]
+    script = f"""(usual => {{ const told = {json.dumps({"/v1/datasets/wall": dataset})}; window.asked = [];
+        window.fetch = (path, how) => {{
+            asked.push(path);
+            if (path in told) return Promise.resolve(new Response(JSON.stringify(told[path])));
+            return usual(path.replace(/soft=(odd|uncertainty|class)[^&]*/, 'soft=axis:0,0,0,0,0,1<0.1'), how);
+        }}; }})(fetch)"""
+    with page(before=script) as tab:
+        tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        assert "soft" not in link(tab) and not tab.run("document.querySelector('#soft-threshold').offsetHeight")
+        tab.choose("#soft-what", "uncertainty")
+        term = next_link(tab, lambda now: "soft" in now)["soft"]
+        assert term == "uncertainty>0.75", term  # three quarters of the way to the 99th percentile
+        assert tab.run("document.querySelector('#soft-terms').value") == term
+        bars = tab.run("[...document.querySelectorAll('#soft-histogram rect')].map(e => [+e.getAttribute('height'), e.classList.contains('on')])")
+        assert len(bars) == 40 and bars[0][0] == 12 and bars[5][0] < 6 and not bars[0][1] and bars[-1][1]
+        tab.run("document.querySelector('#soft-threshold').focus()")
+        for _ in range(3):
+            tab.key("ArrowLeft")
+        less = next_link(tab, lambda now: now["soft"] != term)["soft"]
+        less = next_link(tab, lambda now: float(now["soft"].split(">")[1]) < float(term.split(">")[1]) - 0.014)["soft"]
+        assert tab.text("#soft-threshold-label") == f"Threshold {less.split('>')[1]}"
+        tab.choose("#soft-side", "<")
+        next_link(tab, lambda now: now["soft"] == less.replace(">", "<"))
+        tab.run("document.querySelector('#control-soft_opacity').focus()")
+        tab.key("ArrowRight")
+        assert next_link(tab, lambda now: "soft_opacity" in now)["soft_opacity"] == "0.31"
+        tab.choose("#control-soft_model", "layer")
+        next_link(tab, lambda now: now.get("soft_model") == "layer")
+        tab.choose("#budget", "500ms")
+        kept = next_link(tab, lambda now: now.get("budget"))
+        assert kept["soft"] == less.replace(">", "<") and kept["soft_opacity"] == "0.31" and "method" not in kept
+        tab.choose("#budget", "")
+        tab.until(REST)
+        tab.choose("#soft-what", "class")
+        next_link(tab, lambda now: "soft" not in now)  # none is chosen yet
+        assert tab.run("[...document.querySelectorAll('#soft-kinds label')].map(e => e.textContent.trim())") == ["2 75.0 %", "5 25.0 %"]
+        tab.run("document.querySelector('#soft-kinds input[value=\"5\"]').focus()")
+        tab.key(" ")
+        next_link(tab, lambda now: now.get("soft") == "class:5")
+        tab.choose("#soft-what", ":height")
+        height = next_link(tab, lambda now: now["soft"].startswith("plane"))["soft"]
+        assert re.fullmatch(r"plane:0,0,1\.\d+,0,0,1>0", height), height
+        tab.choose("#soft-terms", "axis:0,0,0,0,0,1<0.5 or class:2")
+        next_link(tab, lambda now: now["soft"] == "axis:0,0,0,0,0,1<0.5 or class:2")
+        assert tab.run("document.querySelector('#soft-what').value") == ":text"
+        asked = urllib.parse.unquote(tab.run("asked").pop())
+        assert "soft=axis:0,0,0,0,0,1<0.5 or class:2" in asked and "soft_model=layer" in asked, asked
+        assert all(name for _, name in tab.names())
+        tab.choose("#soft-terms", "plane:0,0,1.25,0,0,1>0")
+        now = next_link(tab, lambda now: "1.25" in now["soft"])
+        assert tab.run("document.querySelector('#soft-what').value") == ":height"
+        tab.go(f"{SITE}/#" + urllib.parse.urlencode({**{k: ",".join(map(str, v)) if isinstance(v, list) else v for k, v in now.items()},
+                                                    "soft": less}))
+        tab.until("document.querySelector('#soft-what').value === 'uncertainty'")
+        assert tab.run("['what', 'side', 'threshold'].map(n => document.querySelector('#soft-' + n).value)") == \
+            ["uncertainty", ">", less.split(">")[1]], link(tab)
+        assert tab.run("document.querySelector('#control-soft_model').value") == "layer", (now, link(tab), tab.run("document.querySelector('#control-soft_model').value"))
+        tab.choose("#soft-what", "")
+        next_link(tab, lambda now: not any(name.startswith("soft") for name in now))
+
+
+def test_a_tour_keeps_and_fades_what_is_soft():
+    term = urllib.parse.quote("axis:0,0,0,0,0,1<0.5")
+    with tempfile.TemporaryDirectory() as folder, page(f"{SITE}/{FACING}&soft={term}&soft_opacity=0.8") as tab:
+        chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
+        tab.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        tab.press_on("#add")
+        tab.run("document.querySelector('#control-soft_opacity').focus()")
+        tab.key("Home")
+        next_link(tab, lambda now: now.get("soft_opacity") == "0")
+        tab.press_on("#add")
+        tab.choose("#keyframes li:nth-child(1) input", "0.5")
+        tab.press_on("#download")
+        tour = json.loads(appeared(folder, "wall-tour.json").read_text())
+        assert [key["soft_opacity"] for key in tour["keyframes"]] == [0.8, 0] and "soft_opacity" not in tour["keyframes"][0]["camera"]
+        assert tab.run("import('/viewer/tour.js').then(({Tour}) => Tour.prototype.opacityAt.call("
+                       "{keyframes: [{soft_opacity: 1}, {}, {soft_opacity: 0}], legs: [1, 3], closed: false}, 3))") == 0.25
+        tab.press_on("#keyframes li:nth-child(1) button")
+        next_link(tab, lambda now: now.get("soft_opacity") == "0.8")
+        assert tab.run("document.querySelector('#control-soft_opacity').value") == "0.8"
+        tab.press_on("#play")
+        tab.until("document.querySelector('#play').textContent === 'Play'")
+        next_link(tab, lambda now: now.get("soft_opacity") == "0")
 
 
 def refuse(tab, status, problem, retry):

@@ -50,7 +50,15 @@ with tempfile.TemporaryDirectory() as folder:
     table = must("bench", folder / "a.spld", *common)
     assert "1 unit =" in table and sum(line.startswith("a ") for line in table.splitlines()) == 1, table
 
-    for wrong in (["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],
+    soft = ["--soft", "box:-2,-2,0,2,2,3", "--soft", "plane:0,0,2,0,0,1>0", "--soft-model", "layer,express"]
+    rows = json.loads(must("bench", folder / "a.spld", *common, *soft, "--lod", "2,1", "--json"))["rows"]
+    assert [(r["lod"], r["soft"]) for r in rows] == [(l, s) for l in (2, 1) for s in ("solid", "layer", "express")], rows
+    table = must("bench", folder / "a.spld", *common, *soft)
+    assert [line.split()[3] for line in table.splitlines() if line.startswith("a ")] == ["solid", "layer", "express"], table
+
+    for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out"],
+                  ["--soft", "class:1", "--soft-model", "base,base"], ["--soft", "class:1", "--soft-opacity", 2],
+                  ["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],
                   ["--views", folder / "no.json"], ["--method", "lines"], ["--lod", "-1"], ["--size", "160x"]):
         done = run("bench", folder / "a.spld", *wrong)
         assert done.returncode == 2 and done.stderr and not done.stdout, (wrong, done)

@@ -106,7 +106,7 @@ static struct scene scene(uint32_t width, uint32_t height, uint32_t count)
                                         .radius = (float)(0.01 + 0.1 * uniform() * uniform()),
                                         .color = {(uint8_t)(256 * uniform()), (uint8_t)(256 * uniform()),
                                                   (uint8_t)(256 * uniform())},
-                                        .mark = SPL_SOFT_WHOLLY};
+                                        .mark = SPL_MARK_WHOLE};
     }
     return s;
 }
