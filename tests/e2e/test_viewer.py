@@ -945,6 +945,11 @@ def test_embed():
         tab.drag((200, 150), (260, 150))
         settled(tab, digest)
         assert all(name for _, name in tab.names())
+    term = "axis:0,0,0,0,0,1<0.5 or class:3"
+    with page(f"{SITE}/embed/wall#eye=3,0,1&target=0,0,1&budget=500ms&soft={urllib.parse.quote(term)}&soft_opacity=0.5",
+              size=(400, 300)) as tab:
+        asked = [urllib.parse.unquote(name) for name, *_ in tab.run(VIEWS)]
+        assert asked and all(f"soft={term}&soft_opacity=0.5" in url for url in asked), asked
     with page(
         f"{SITE}/embed/none", ready="!document.querySelector('#notice').hidden", complaints="404", size=(400, 300)
     ) as tab:
