@@ -764,6 +764,7 @@ def test_what_is_soft():
         assert term == "uncertainty>0.75", term  # three quarters of the way to the 99th percentile
         assert tab.run("document.querySelector('#soft-terms').value") == term
         bars = tab.run("[...document.querySelectorAll('#soft-histogram rect')].map(e => [+e.getAttribute('height'), e.classList.contains('on')])")
+        assert tab.run("document.querySelector('#soft-histogram').getBoundingClientRect().height") > 20, "it is seen"
         assert len(bars) == 40 and bars[0][0] == 12 and bars[5][0] < 6 and not bars[0][1] and bars[-1][1]
         tab.run("document.querySelector('#soft-threshold').focus()")
         for _ in range(3):
