@@ -6,7 +6,8 @@
  *   normal    octahedral word of the mean, world axes; SPL_NOTHING = none
  *   id        that of the nearest sample, the least among equals
  *   primitive the same; 0 = none
- *   coverage  float, share of the samples that hold something */
+ *   coverage  float, share of the samples that hold something
+ * With constant 2 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -15,8 +16,20 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
 layout(constant_id = 1) const uint RESOLVED = SPL_RESOLVED_SUMS;
+layout(constant_id = 2) const uint SOFT = 0;
 
 layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
+
+SPL_TEXEL_BUFFER(SPL_TEXELS_SOFT) soft_texels;
+
+/* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. */
+vec4 soft_over(uint at)
+{
+    int word = int(SPL_SOFT_STATE_WORDS * at);
+    vec4 state = vec4(imageLoad(soft_texels, word).x, imageLoad(soft_texels, word + 1).x,
+                      imageLoad(soft_texels, word + 2).x, imageLoad(soft_texels, word + 3).x);
+    return state * (1.0 / float(SPL_SOFT_CLEAR));
+}
 
 /* Sums have specks; colours that maps were added to are sums of floats. */
 const bool SUMMED = RESOLVED == SPL_RESOLVED_SUMS || RESOLVED == SPL_RESOLVED_MAPPED;
@@ -98,12 +111,22 @@ void main()
     ivec2 corner = ivec2(int(pixel) - int(row) * int(width), int(row)) * int(side) + ivec2(frame.crop_x, frame.crop_y);
     uint covered = 0u, nearest = SPL_NOTHING, id = SPL_NOTHING;
     uvec3 color = uvec3(0u);
+    vec4 mixed = vec4(0.0); /* with soft spheres: colour times share, share */
     vec3 normal = vec3(0.0);
     for (uint i = 0u;;) { /* the end is asked for at the end: see splat_depth.comp */
         uint at = pixel_sample(corner, i), bits = depth_word(at);
+        vec4 soft = vec4(0.0);
+        if (SOFT != 0u)
+            soft = soft_over(sample_index(pixel_place(corner, i)));
+        mixed += soft;
         if (bits != SPL_NOTHING) {
+            if (SOFT != 0u && LAYER == SPL_RESOLVE_COLOR) {
+                uvec3 own = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
+                mixed.rgb += (1.0 - soft.a) * vec3(own);
+            }
+            mixed.a += 1.0 - soft.a;
             covered++;
-            if (LAYER == SPL_RESOLVE_COLOR)
+            if (SOFT == 0u && LAYER == SPL_RESOLVE_COLOR)
                 color += RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
             if (LAYER == SPL_RESOLVE_NORMAL)
                 normal += sample_normal(at);
@@ -116,7 +139,13 @@ void main()
     }
 
     uint value = SPL_NOTHING;
-    if (LAYER == SPL_RESOLVE_COLOR) {
+    if (SOFT != 0u && LAYER == SPL_RESOLVE_COLOR) {
+        float total = float(side * side), back = float(frame.background >> 24) * (1.0 / 255.0) * (total - mixed.a);
+        float weight = mixed.a + back;
+        vec3 sum = mixed.rgb + back * vec3((uvec3(frame.background) >> uvec3(0u, 8u, 16u)) & 255u);
+        uvec3 rgb = weight > 0.0 ? uvec3(min(sum / weight, 255.0) + 0.5) : uvec3(0u);
+        value = rgb.x | rgb.y << 8 | rgb.z << 16 | uint(min(weight / total, 1.0) * 255.0 + 0.5) << 24;
+    } else if (LAYER == SPL_RESOLVE_COLOR) {
         uint total = side * side, back_alpha = frame.background >> 24, back_weight = back_alpha * (total - covered);
         uvec3 back = (uvec3(frame.background) >> uvec3(0u, 8u, 16u)) & 255u;
         uint weight = 255u * covered + back_weight;
@@ -157,7 +186,7 @@ void main()
     } else if (LAYER == SPL_RESOLVE_PRIMITIVE) {
         value = covered != 0u ? id : 0u;
     } else {
-        value = floatBitsToUint(float(covered) / float(side * side));
+        value = floatBitsToUint((SOFT != 0u ? mixed.a : float(covered)) / float(side * side));
     }
     pixels[frame.output_word + pixel] = value;
 }

@@ -377,10 +377,6 @@ struct spl_frame_params {
 #define SPL_SOFT_SLOT_SPLATS 4 /* discs of a slot; SPL_SOFT_SLOT_CELLS cells */
 #define SPL_SOFT_SLOT_CELLS 8
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
-/* (cos(pi d / r) + 1) / 2 = m^2 (A + B m + C m^2), m = 1 - (d / r)^2, to 5e-5; 1 for m = 1. */
-#define SPL_SOFT_EXPRESS_A 0.62015722f
-#define SPL_SOFT_EXPRESS_B 0.29355069f
-#define SPL_SOFT_EXPRESS_C 0.08629209f
 
 /* Of one dispatch of it. */
 struct spl_soft_step {
@@ -396,6 +392,7 @@ struct spl_soft_step {
     SPL_F32 depth;         /* optical, through a sphere's centre: models with a density, and layer */
     SPL_F32 reach;         /* no sphere of the lists has a larger radius */
     SPL_F32 until;         /* view depth up to which these lists are whole */
+    SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
 };

@@ -1,5 +1,5 @@
-/* Blends the lists of tiles front to back, model express: a disc that faces the eye, whose opacity falls as (cos(pi d /
- * r) + 1) / 2 (eq. 19) with the distance d of the sample's ray to the centre. All invocations of a tile walk the same
+/* Blends the lists of tiles front to back, model express: a disc that faces the eye, whose opacity falls with the
+ * distance d of the sample's ray to the centre (eq. 19; src/render/soft/models.h). All invocations of a tile walk the same
  * list, each for SPL_SOFT_SAMPLES of a column. In fixed point, so that every driver gives the same. Constants: 0: some
  * items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile. */
 #version 450
@@ -78,14 +78,15 @@ void main()
             precise float along = ox_along + oy * ry[k];
             precise float share = (ox_squared + oy * oy - along * along * inverse[k]) * closer;
             precise float m = max(1.0 - share, 0.0);
-            precise float fall = m * m * (SPL_SOFT_EXPRESS_A + m * (SPL_SOFT_EXPRESS_B + m * SPL_SOFT_EXPRESS_C));
+            precise float fall =
+                m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
             if (BORDER != 0u) {
                 precise float linear = 1.0 - sqrt(1.0 - m);
-                precise float mixed = linear * (1.0 - soft) + fall * soft;
+                precise float mixed = linear * job.opacity * (1.0 - soft) + fall * soft;
                 fall = mixed;
             }
-            precise float scaled = fall * job.opacity + 0.5;
-            uint opacity = key <= solid[k] ? min(uint(int(scaled)), 65536u) : 0u;
+            precise float scaled = clamp(fall + 0.5, 0.0, 65536.0);
+            uint opacity = key <= solid[k] ? uint(int(scaled)) : 0u;
             uint weight = ((clear[k] >> 8) * opacity) >> 8;
             clear[k] -= weight;
             sum[k] += weight * color;

@@ -7,6 +7,10 @@
 #include "common/splat.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint KINDS = 7; /* bit per kind of test that the tile has: the others cost nothing */
+
+const bool SHAPES = (KINDS >> SPL_TEST_SHAPE & 1u) != 0u, TABLES = (KINDS >> SPL_TEST_TABLE & 1u) != 0u;
+const bool NUMBERS = (KINDS >> SPL_TEST_NUMBERS & 1u) != 0u;
 
 layout(std430, binding = SPL_STORAGE_MARKS) writeonly buffer mark_buffer { uint marks[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_TESTS) test_texels;
@@ -74,17 +78,16 @@ uint make_mark(spl_draw_chunk chunk, uint index, vec3 p)
     for (uint t = 0u; t < count; t++) {
         uint at = first + 1u + t * SPL_TEST_WORDS, kind = test_word(at), word = test_word(at + 1u);
         uint packed_width = test_word(at + 2u), width = packed_width & (SPL_TEST_LAST_NONE - 1u);
-        uint own;
-        if (kind == SPL_TEST_SHAPE) {
-            own = test_shape(word, p);
-        } else {
-            uint code = load_code(word, width, index);
-            if (kind == SPL_TEST_TABLE)
+        if (SHAPES && kind == SPL_TEST_SHAPE) {
+            mark = max(mark, test_shape(word, p));
+        } else if (TABLES || NUMBERS) {
+            uint code = load_code(word, width, index), own = 0u;
+            if (TABLES && kind == SPL_TEST_TABLE)
                 own = test_word(at + SPL_TEST_TABLE_WORD + (code & 31u) / 4u) >> 8u * (code & 3u) & 255u;
-            else
+            else if (NUMBERS)
                 own = test_numbers(at, code, width, (packed_width & SPL_TEST_LAST_NONE) != 0u);
+            mark = max(mark, own);
         }
-        mark = max(mark, own);
     }
     return mark;
 }
@@ -96,8 +99,8 @@ void main()
     splat_run run = load_splat_run();
     uint index = item_of(run.first), lane = run.first >> SPL_CELL;
     for (uint word = run.end > 0u ? lane : SPL_MARKS_PANEL; word < SPL_MARKS_PANEL; word += SPL_CELL_LANES) {
-        uint four = 0u;
-        for (uint i = 0u; i < 4u; i++) {
+        uint four = SHAPES ? 0u : make_mark(run.chunk, index, vec3(0.0)) * 0x01010101u; /* a panel has one code */
+        for (uint i = SHAPES ? 0u : 4u; i < 4u; i++) {
             splat s = load_splat(run.chunk, index | (4u * word + i) << SPL_CELL, true);
             four |= make_mark(run.chunk, index, s.position) << 8u * i;
         }
@@ -114,7 +117,8 @@ void main()
         return;
     for (uint i = 0u; i < 4u; i++) {
         uint index = min(4u * word + i, run.end - 1u);
-        four |= make_mark(run.chunk, index, load_splat(run.chunk, index, true).position) << 8u * i;
+        vec3 p = SHAPES ? load_splat(run.chunk, index, true).position : vec3(0.0);
+        four |= make_mark(run.chunk, index, p) << 8u * i;
     }
     marks[run.chunk.marks + word] = four;
 }

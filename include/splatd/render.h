@@ -76,6 +76,8 @@ struct spl_frame_stats {
     bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the
                                    memory limit has no room for it */
     uint64_t panels_drawn, meshes_drawn, lines_drawn; /* as whole ones or cell by cell; straight pieces of lines */
+    uint64_t soft_drawn;        /* soft spheres, in every window that they are drawn in */
+    double soft_ms;             /* of their stage, as the others */
 };
 
 struct spl_frame {

@@ -26,7 +26,7 @@ void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct s
         printf(
             "%-16.16s %-7s %-7s %*s%4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f %10.0f\n",
             spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), -soft,
-            soft ? name_soft(row->soft) : "", row->lod, row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
+            soft ? name_soft(row->drawn_soft) : "", row->lod, row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
             row->select, row->upload, row->clear, row->depth, row->shade, row->resolve, row->readback, row->splats);
         if (row->panels || row->meshes || row->lines)
             printf("%-16s and %.0f panels, %.0f meshes, %.0f lines\n", "", row->panels, row->meshes, row->lines);
@@ -62,7 +62,7 @@ static json_t *row_json(const struct spl_bench_row *row)
         row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
         "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
         passes_json(row), "splats_drawn", row->splats, "panels_drawn", row->panels, "meshes_drawn", row->meshes,
-        "lines_drawn", row->lines, "chunks_drawn", row->chunks, "soft", name_soft(row->soft),
+        "lines_drawn", row->lines, "chunks_drawn", row->chunks, "soft", name_soft(row->drawn_soft),
         "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
 }
 

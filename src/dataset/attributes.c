@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "dataset/chunk.h"
 #include "dataset/open.h"
+#include "dataset/values.h"
 
 /* `index` and `member` say which stream is at fault, and what of it; `value` may be NULL. */
 static int wrong(const struct spl_dataset *dataset, struct spl_error *err, size_t index, const char *member,
@@ -88,6 +89,24 @@ int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err)
     info->stream_count = (uint32_t)count;
     info->has_class = spl_dataset_find_stream(dataset, "class") >= 0;
     info->has_uncertainty = spl_dataset_find_stream(dataset, "uncertainty") >= 0;
+    return SPL_OK;
+}
+
+int spl_dataset_read_values(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    const json_t *streams = json_object_get(dataset->meta, "streams");
+    for (uint32_t s = 0; s < info->stream_count; s++) {
+        const json_t *values = json_object_get(json_array_get(streams, s), "values");
+        const char *what =
+            values ? spl_values_from_json(values, info->leaf_splats, &dataset->stream_values[s]) : NULL;
+        if (what)
+            return spl_fail_field(err, SPL_E_CORRUPT, "streams",
+                                  "%s: section META: of \"streams[%u].values\" %s; pack the dataset again",
+                                  dataset->name, s, what);
+        if (values)
+            info->stream_values = dataset->stream_values;
+    }
     return SPL_OK;
 }
 

@@ -64,6 +64,7 @@ struct spl_dataset {
 
     struct spl_stream streams[SPL_STREAMS_MAX]; /* info.stream_count of them */
     enum spl_stream_type stream_types[SPL_STREAMS_MAX];
+    struct spl_stream_values stream_values[SPL_STREAMS_MAX];
     struct spl_dictionary dictionary; /* count 0 = no textures */
     json_t *meta;
 };
@@ -110,6 +111,9 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err);
 
 /* META's list of streams: fills info and `streams`. check_meta calls it. */
 int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err);
+
+/* What that says of their values, where it says anything. Behind all other checks. */
+int spl_dataset_read_values(struct spl_dataset *dataset, struct spl_error *err);
 
 /* PDIR, against the sizes of heads; fills `rows` and info's numbers of nodes, chunks and ids. */
 int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *err);

@@ -49,7 +49,7 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
     sweep(path);
     for (;;) { /* again where another's sweep came before our lock */
         struct stat st;
-        file->fd = open(file->part_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+        file->fd = open(file->part_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (file->fd < 0) {
             const char *slash = strrchr(path, '/');
             if (errno == ENOENT && slash)
@@ -79,6 +79,24 @@ int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void 
             continue;
         if (n <= 0)
             return spl_fail_errno(err, n ? errno : ENOSPC, "cannot write %s at byte %llu", file->part_path,
+                                  (unsigned long long)offset);
+        p += n;
+        offset += (uint64_t)n;
+        bytes -= (size_t)n;
+    }
+    return SPL_OK;
+}
+
+int spl_part_file_read(const struct spl_part_file *file, uint64_t offset, void *out, size_t bytes,
+                       struct spl_error *err)
+{
+    char *p = out;
+    while (bytes) {
+        ssize_t n = pread(file->fd, p, bytes, (off_t)offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return spl_fail_errno(err, n ? errno : EIO, "cannot read %s again at byte %llu", file->part_path,
                                   (unsigned long long)offset);
         p += n;
         offset += (uint64_t)n;

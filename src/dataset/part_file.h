@@ -22,6 +22,10 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
 int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void *data, size_t bytes,
                         struct spl_error *err);
 
+/* Reads what was written. */
+int spl_part_file_read(const struct spl_part_file *file, uint64_t offset, void *out, size_t bytes,
+                       struct spl_error *err);
+
 /* Syncs it, renames it over the path, and syncs the folder. Once it is renamed it stays, whatever comes after. */
 int spl_part_file_commit(struct spl_part_file *file, struct spl_error *err);
 

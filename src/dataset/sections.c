@@ -366,5 +366,5 @@ int spl_dataset_check_sections(struct spl_dataset *dataset, struct spl_error *er
     for (int k = 0; k < SPL_KIND_COUNT && !rc; k++)
         if (kinds[k].check && dataset->found[k].count)
             rc = kinds[k].check(dataset, err);
-    return rc;
+    return rc ? rc : spl_dataset_read_values(dataset, err); // what is worth less than the rest is looked at last
 }

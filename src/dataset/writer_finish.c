@@ -10,10 +10,12 @@
 #include "dataset/atoms.h"
 #include "dataset/counts.h"
 #include "dataset/head.h"
+#include "dataset/values.h"
 #include "dataset/writer_parts.h"
 
 /* META as the caller has it, "streams" and "counts"; NULL where memory is refused. */
-static char *describe(const struct spl_dataset_writer *writer, const struct spl_counts *counts, const json_t *meta)
+static char *describe(const struct spl_dataset_writer *writer, const struct spl_counts *counts,
+                      const struct spl_stream_values *values, const json_t *meta)
 {
     json_t *whole = json_copy((json_t *)meta), *streams = json_array();
     bool failed = false;
@@ -24,6 +26,8 @@ static char *describe(const struct spl_dataset_writer *writer, const struct spl_
             failed |= json_object_set_new(row, "first", json_real(stream->first)) != 0;
             failed |= json_object_set_new(row, "steps_a_unit", json_real(stream->steps_a_unit)) != 0;
         }
+        if (values[s].count)
+            failed |= json_object_set_new(row, "values", spl_values_to_json(&values[s])) != 0;
         json_array_append_new(streams, row);
     }
     failed |= json_array_size(streams) != writer->stream_count;
@@ -149,7 +153,14 @@ static int write_rest(struct spl_dataset_writer *writer, const struct described 
 static int finish(struct spl_dataset_writer *writer, const struct described *what, const json_t *meta,
                   struct spl_error *err)
 {
-    char *text = describe(writer, &what->counts, meta);
+    struct spl_stream_values *values = spl_alloc(SPL_STREAMS_MAX, sizeof *values, err);
+    int gathered = values ? spl_writer_gather_values(writer, what->pages, values, err) : SPL_E_NOMEM;
+    if (gathered) {
+        free(values);
+        return gathered;
+    }
+    char *text = describe(writer, &what->counts, values, meta);
+    free(values);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->file.path);
     int rc = strlen(text) > SPL_META_BYTES_MAX

@@ -74,7 +74,7 @@ static void init_rows(struct bench *b)
         row->device = *spl_renderer_get_device(b->renderers[row_device(o, i)]);
         row->method = o->methods[i / o->soft_count / o->lod_count % o->method_count];
         row->lod = o->lods[i / o->soft_count % o->lod_count];
-        row->soft = &o->softs[i % o->soft_count];
+        row->drawn_soft = &o->softs[i % o->soft_count];
     }
 }
 
@@ -86,7 +86,7 @@ static int render(struct bench *b, size_t row, uint32_t frame, struct sample *sa
     spl_setting_apply(&(struct spl_setting){b->report->rows[row].method, b->report->rows[row].lod, 1,
                                             SPL_TEXTURE_ATOMS, o->maps},
                       &view);
-    view.soft = *b->report->rows[row].soft;
+    view.soft = *b->report->rows[row].drawn_soft;
     double share = (double)frame / (o->frames - 1);
     int status = spl_path_get_camera(&b->paths[row_dataset(o, row)], share, o->width, o->height, &view.camera, err);
     if (status)

@@ -35,7 +35,7 @@ struct spl_bench_row {
     struct spl_device_info device;
     enum spl_method method;
     double lod;
-    const struct spl_soft_params *soft;  /* of the options */
+    const struct spl_soft_params *drawn_soft; /* of the options */
     struct spl_summary frame;
     struct spl_summary units;            /* frame / calibrator of the same place on the path */
     double floor;                        /* median: the calibrator's time for as many points as splats were drawn */

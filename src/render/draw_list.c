@@ -69,6 +69,7 @@ void spl_draw_list_clear(struct spl_draw_list *list)
     list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
     list->first_soft_chunk = list->first_mark_chunk = list->test_count = 0;
     list->mark_words = SPL_MARKS_NONE;
+    list->test_kinds = 0;
     memset(list->drawn, 0, sizeof list->drawn);
     list->listed_splats = list->sample_splats = list->sample_panels = 0;
     list->nodes = 0;

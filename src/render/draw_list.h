@@ -77,6 +77,7 @@ struct spl_draw_list {
     uint64_t mark_words;               /* of the buffer of marks, whose first SPL_MARKS_NONE are nobody's */
     uint32_t *tests;                   /* what marks are made of, see marks.h: words */
     size_t test_count, test_capacity;
+    uint32_t test_kinds;               /* bit per SPL_TEST_NUMBERS …: kinds of tests among them */
     bool complete;                     /* false: a coarser node stood in for pages that are not resident */
 };
 

@@ -9,6 +9,7 @@
 #include "render/occupancy.h"
 #include "render/readback.h"
 #include "render/slot.h"
+#include "render/soft/pass.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -157,12 +158,14 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         if (rc)
             return rc;
         struct spl_error why = {0};
-        rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+        rc = spl_soft_prepare(r, &tile->camera, &why);
+        rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
-            rc = spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+            rc = spl_soft_prepare(r, &tile->camera, &why);
+            rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);
         if (rc || !again)
@@ -206,6 +209,8 @@ static int record(struct spl_tile *tile, struct spl_error *err)
             continue;
         rc = spl_method_row(tile->view->method)->record(tile, group, first, err);
         first = false;
+        if (!rc && group == SPL_SUMS_COLOR && spl_soft_is_drawn(tile))
+            rc = spl_soft_record(tile, err);
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
             if (layers >> layer & 1)
                 rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);
@@ -227,6 +232,7 @@ static void add_times(const struct spl_tile *tile, struct spl_frame_stats *stats
         [SPL_STAGE_CLEAR] = &stats->clear_ms,
         [SPL_STAGE_DEPTH] = &stats->depth_ms,
         [SPL_STAGE_SHADE] = &stats->shade_ms,
+        [SPL_STAGE_SOFT] = &stats->soft_ms,
         [SPL_STAGE_RESOLVE] = &stats->resolve_ms,
     };
     for (uint32_t i = 1; i < tile->stamps; i++) {
@@ -281,6 +287,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     stats->lines_drawn += r->list.drawn[SPL_CHUNK_LINES];
     stats->panels_drawn += r->list.drawn[SPL_CHUNK_PANELS];
     stats->meshes_drawn += r->list.drawn[SPL_CHUNK_MESHES];
+    stats->soft_drawn += tile->soft_drawn;
     stats->chunks_drawn += r->list.chunk_count;
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;

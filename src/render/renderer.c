@@ -178,6 +178,11 @@ void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work)
     renderer->work_at_once = work;
 }
 
+void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items)
+{
+    renderer->soft_items_most = items;
+}
+
 void spl_renderer_inject_loss(struct spl_renderer *renderer)
 {
     spl_gpu_inject_loss(renderer->gpu);

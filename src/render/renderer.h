@@ -12,6 +12,7 @@
 #include "render/kernels.h"
 #include "render/residency.h"
 #include "render/select.h"
+#include "render/soft/order.h"
 
 /* Fixed, pre-sized device memory of one tile. */
 struct spl_scratch {
@@ -29,6 +30,8 @@ struct spl_scratch {
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
     struct spl_gpu_buffer *tests;    /* uint[], grown on demand */
     struct spl_gpu_buffer *marks;    /* bytes, grown on demand; what is in use is written in every tile */
+    struct spl_soft_memory soft;     /* of soft spheres, from when there are any: soft/pass.h */
+    uint64_t soft_bytes;             /* that it takes */
 };
 
 /* What the two blocks of scratch memory hold in turns. An area is begun, which asserts that its block is free, and
@@ -52,6 +55,7 @@ struct spl_renderer {
     struct spl_kernels kernels;
     struct spl_draw_list list; /* reused from tile to tile */
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
+    uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
 };
 
 /* One tile being recorded. */
@@ -69,11 +73,19 @@ struct spl_tile {
     uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
+    uint64_t soft_drawn;                         /* spheres */
     uint32_t stamps;                             /* timestamps written */
     uint8_t stamp_stage[SPL_GPU_TIMESTAMPS_MAX]; /* enum spl_stage that ended at each */
 };
 
-enum spl_stage { SPL_STAGE_BEGIN, SPL_STAGE_CLEAR, SPL_STAGE_DEPTH, SPL_STAGE_SHADE, SPL_STAGE_RESOLVE };
+enum spl_stage {
+    SPL_STAGE_BEGIN,
+    SPL_STAGE_CLEAR,
+    SPL_STAGE_DEPTH,
+    SPL_STAGE_SHADE,
+    SPL_STAGE_SOFT,
+    SPL_STAGE_RESOLVE
+};
 
 int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
                      const struct spl_renderer_options *options, struct spl_error *err);
@@ -84,6 +96,7 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
                        struct spl_error *err);
 
 /* Begins an area and returns its memory, for who clears it. What holds between dispatches is ended by who began it. */
+bool spl_tile_may_begin(const struct spl_tile *tile, enum spl_area area); /* is its block free? */
 struct spl_gpu_buffer *spl_tile_begin_area(struct spl_tile *tile, enum spl_area area);
 void spl_tile_end_area(struct spl_tile *tile, enum spl_area area);
 void spl_tile_end_group(struct spl_tile *tile); /* ends what holds until a group's layers are resolved */
@@ -95,6 +108,11 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
  * with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody waits for
  * the tile any more. */
 int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err);
+/* Runs what was recorded, for the host to read; errors as of spl_tile_add_work(). */
+int spl_tile_run(struct spl_tile *tile, struct spl_error *err);
+/* Takes parameters for dispatches to bind. SPL_E_LIMIT. */
+int spl_tile_put_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
+                        struct spl_error *err);
 
 /* Cuts the draw list's batches into rounds and takes their parameters, before anything else of the tile takes some.
  * SPL_E_LIMIT. */
@@ -131,6 +149,7 @@ struct spl_dispatch {
     uint32_t role;   /* enum spl_draw_role */
     bool by_cells;   /* only panels or meshes whose cells are drawn in any case, or only the others */
     bool cells;
+    const struct spl_gpu_binding *with; /* SPL_RESOURCE_COUNT: what it binds besides; NULL = nothing */
     struct spl_gpu_kernel *sum; /* runs before, to sum textures into SPL_AREA_SUMMED; NULL = none */
 };
 int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernels *kernels,

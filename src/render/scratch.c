@@ -27,11 +27,18 @@ static const struct {
     [SPL_AREA_SURFACE] = {false, LIFE_DISPATCHES, SPL_RESOURCE_SURFACE},
 };
 
+bool spl_tile_may_begin(const struct spl_tile *tile, enum spl_area area)
+{
+    for (int other = 0; other < SPL_AREA_COUNT; other++)
+        if (tile->areas >> other & 1 && areas[other].large == areas[area].large)
+            return false;
+    return true;
+}
+
 struct spl_gpu_buffer *spl_tile_begin_area(struct spl_tile *tile, enum spl_area area)
 {
     struct spl_scratch *scratch = &tile->renderer->scratch;
-    for (int other = 0; other < SPL_AREA_COUNT; other++)
-        spl_assert(!(tile->areas >> other & 1) || areas[other].large != areas[area].large);
+    spl_assert(spl_tile_may_begin(tile, area));
     tile->areas |= 1u << area;
     return areas[area].large ? scratch->large : scratch->small;
 }
@@ -51,6 +58,7 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_BOUNDS].buffer = scratch->bounds;
     bindings[SPL_RESOURCE_TESTS].buffer = scratch->tests;
     bindings[SPL_RESOURCE_MARKS].buffer = scratch->marks;
+    bindings[SPL_RESOURCE_SOFT].buffer = scratch->soft.buffers[SPL_SOFT_STATE];
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_MAP].buffer = tile->map;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
@@ -136,6 +144,7 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
                                     scratch->entries,  scratch->tests,  scratch->marks};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
+    spl_soft_memory_finish(&scratch->soft, gpu);
     *scratch = (struct spl_scratch){0};
 }
 

@@ -50,6 +50,8 @@ int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, 
     int rc = spl_draw_list_add_tests(w->list, w->judged.tests, w->judged.test_words, &marked.texture, err);
     if (rc)
         return rc;
+    for (uint32_t t = 0; t < w->judged.tests[0]; t++)
+        w->list->test_kinds |= 1u << w->judged.tests[1 + SPL_TEST_WORDS * t];
     if (w->list->mark_words > UINT32_MAX / 2) /* of 16 GiB: scratch has no room for them in any case */
         return spl_fail_field(err, SPL_E_LIMIT, "lod", "too many splats are to be told apart; raise lod");
     marked.marks = chunk->marks = (uint32_t)w->list->mark_words;

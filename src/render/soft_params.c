@@ -110,29 +110,3 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
             return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft %s", i + 1, fault);
     return SPL_OK;
 }
-
-static bool has_attribute(const struct spl_dataset_info *info, const char *name)
-{
-    for (uint32_t i = 0; i < info->stream_count; i++)
-        if (!strcmp(info->streams[i].name, name))
-            return true;
-    return false;
-}
-
-int spl_soft_check_dataset(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
-                           struct spl_error *err)
-{
-    char known[256] = "no attributes";
-    size_t used = 0;
-    for (uint32_t i = 0; i < soft->count && i < SPL_SOFT_TERMS_MAX; i++) {
-        const struct spl_soft_term *term = &soft->terms[i];
-        if (term->measure >= SPL_SOFT_AXIS || has_attribute(info, term->name))
-            continue;
-        for (uint32_t s = 0; s < info->stream_count && used < sizeof known; s++)
-            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", s ? ", " : "", info->streams[s].name);
-        return spl_fail_field(err, SPL_E_INPUT, "soft",
-                              "dataset '%s' has no attribute '%s' that soft could ask for; it has %s", info->id,
-                              term->name, known);
-    }
-    return SPL_OK;
-}

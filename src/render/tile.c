@@ -6,6 +6,7 @@
 #include "base/work.h"
 #include "render/method.h"
 #include "render/renderer.h"
+#include "render/soft/pass.h"
 
 static uint32_t ends_of(const struct spl_draw_key *key)
 {
@@ -87,8 +88,8 @@ static struct spl_gpu_binding put_params(const struct spl_tile *tile, uint32_t i
     return (struct spl_gpu_binding){.buffer = buffer, .offset = offset, .bytes = SPL_PARAMS_STRIDE};
 }
 
-static int next_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
-                       struct spl_error *err)
+int spl_tile_put_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
+                        struct spl_error *err)
 {
     if (tile->params_used == SPL_PARAMS_MAX)
         return too_many(err);
@@ -103,17 +104,22 @@ static uint32_t lanes_of(const struct spl_dispatch *what)
     return what->lanes ? what->lanes : what->kind == SPL_CHUNK_LINES ? SPL_RUN_SPLATS : SPL_LANES;
 }
 
-int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err)
+int spl_tile_run(struct spl_tile *tile, struct spl_error *err)
 {
-    tile->work += work;
-    if (tile->work <= tile->renderer->work_at_once || tile->work == work)
-        return SPL_OK;
-    tile->work = work;
+    tile->work = 0;
     if (spl_is_cancelled(tile->cancelled))
         return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
     if (spl_now_ns() >= tile->view->deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
     return spl_gpu_run(tile->renderer->gpu, err);
+}
+
+int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err)
+{
+    bool runs = tile->work && work > 0 && tile->work + work > tile->renderer->work_at_once;
+    int rc = runs ? spl_tile_run(tile, err) : SPL_OK;
+    tile->work += work;
+    return rc;
 }
 
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
@@ -160,6 +166,9 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
     int rc = SPL_OK;
     spl_tile_bind(tile, bindings);
+    for (int i = 0; what->with && i < SPL_RESOURCE_COUNT; i++)
+        if (what->with[i].buffer)
+            bindings[i] = what->with[i];
     for (size_t i = 0; i < list->batch_count && !rc; i++) {
         const struct spl_draw_batch *batch = &list->batches[i];
         if (!(what->phases & (batch->key.back ? SPL_PHASE_BACK : SPL_PHASE_FRONT)) || !is_of(what, &batch->key))
@@ -216,7 +225,7 @@ int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *
     spl_tile_bind(tile, bindings);
     int rc = spl_kernels_get(&r->kernels, r->gpu, key, &kernel, err);
     if (!rc)
-        rc = next_params(tile, params, &bindings[SPL_RESOURCE_FRAME], err);
+        rc = spl_tile_put_params(tile, params, &bindings[SPL_RESOURCE_FRAME], err);
     if (!rc)
         spl_gpu_dispatch(r->gpu, kernel, bindings, (items + SPL_WORKGROUP - 1) / SPL_WORKGROUP);
     spl_gpu_barrier(r->gpu);
@@ -285,7 +294,8 @@ int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint3
     const struct spl_method_row *method = spl_method_row(tile->view->method);
     bool mapped = layer == SPL_LAYER_COLOR && spl_tile_has_map_colors(tile, SPL_SUMS_COLOR);
     uint32_t resolved = !mapped ? method->resolve : method->sums ? SPL_RESOLVED_MAPPED : SPL_RESOLVED_MAPPED_BENT;
-    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved}};
+    bool over = spl_soft_is_drawn(tile) && (layer == SPL_LAYER_COLOR || layer == SPL_LAYER_COVERAGE);
+    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, over}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
     return spl_tile_dispatch_items(tile, &key, &params, tile->width * tile->height, err);

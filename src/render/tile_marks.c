@@ -12,7 +12,7 @@ static int make_marks(struct spl_tile *tile, uint32_t kind, const char *name, st
                                       .kind = kind,
                                       .role = SPL_ROLE_MARK,
                                       .lanes = spl_kind_has_panels(kind) ? SPL_CELL_DISC_LANES : SPL_LANES};
-    struct spl_kernel_key key = {.name = name};
+    struct spl_kernel_key key = {.name = name, .constants = {r->list.test_kinds}};
     int rc = spl_kernels_get(&r->kernels, r->gpu, &key, &kernels.of[SPL_ENDS_MARKED], err);
     return rc ? rc : spl_tile_dispatch_splats(tile, &kernels, &what, err);
 }

@@ -8,7 +8,6 @@
 #include "base/sized.h"
 #include "geom/size.h"
 #include "render/marks.h"
-#include "render/soft_params.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
@@ -87,9 +86,6 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
 {
     if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, err);
-    int rc = spl_soft_check_dataset(&view->soft, info, err);
-    if (rc)
-        return rc;
     if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "

@@ -14,8 +14,8 @@ def soft(reply):
 
 def test_what_is_soft_comes_back():
     with Daemon(REAL) as d:
-        query = f"width=16&height=16&soft=0.25%3Cuncertainty&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
-        whole = {"soft": ["uncertainty>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0,
+        query = f"width=16&height=16&soft=0.25%3Cclass&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
+        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0,
                  "soft_of": "solid"}
         first = d.ask(f"{VIEW}?{query}")
         assert first.status == 200 and soft(first) == whole, first.headers
@@ -24,12 +24,29 @@ def test_what_is_soft_comes_back():
         assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
         pick = d.ask(f"{PICK}?x=8&y=8&{query}&soft_of=first")
         assert pick.status == 200 and soft(pick) == {**whole, "soft_of": "first"}
-        for text in ["uncertainty>q0.9", "uncertainty:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
+        for text in ["class>3", "class:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
             reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer", "soft_of": "median"})
             assert reply.status == 200 and " or ".join(soft(reply)["soft"]) == text, reply.headers
         assert d.ask(f"{VIEW}?width=16&height=16&soft_opacity=0.5").headers["Splatd-Soft"] is None
         batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "soft": AXIS, "views": [{}, {"soft": []}]}))
         assert batch.status == 200 and batch.body.count(b"Splatd-Soft: ") == 1, batch.body[:2000]
+
+
+def test_a_dataset_says_what_may_be_soft():
+    with Daemon(REAL) as d:
+        info = d.ask("/v1/datasets/wall").json()
+        shapes = {term.partition(":")[0] for term in info["soft"]}
+        assert {"axis", "plane", "box"} <= shapes and len(info["soft"]) >= 3 + sum(a["values"] is not None for a in info["attributes"])
+        for term in info["soft"]:
+            assert d.view(width=8, height=8, soft=term).status == 200, term
+        for attribute in info["attributes"]:
+            values, name = attribute["values"], attribute["name"]
+            if values:
+                rising = values["quantiles"]
+                assert rising == sorted(rising) and rising[0] <= values["p99"] <= rising[-1], attribute
+                assert values["kinds"] is None or sum(k["count"] for k in values["kinds"]) == values["count"] > 0, attribute
+            else:  # a file from before
+                assert d.view(width=8, height=8, soft=f"{name}>q0.5").json()["field"] == "soft"
 
 
 def test_it_counts_where_something_is_soft():
@@ -38,15 +55,15 @@ def test_it_counts_where_something_is_soft():
             return d.ask(f"{VIEW}?width=16&height=16&{query}", "HEAD").headers["ETag"]
         assert tag("soft_opacity=0.9&soft_of=first&soft_model=layer") == tag("")
         tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_model=base",
-                                         f"soft={AXIS}&soft_of=first", f"soft={AXIS}&method=points", "soft=uncertainty>0.5")]
+                                         f"soft={AXIS}&soft_of=first", f"soft={AXIS}&method=points", "soft=class>0.5")]
         assert len(set(tags)) == len(tags), tags
-        assert tag("soft=uncertainty>0.50") == tags[-1] and tag("soft=.5<uncertainty") == tags[-1]
+        assert tag("soft=class>0.50") == tags[-1] and tag("soft=.5<class") == tags[-1]
 
 
 def test_a_dataset_is_asked_for_what_it_has():
     with Daemon(FAKE) as d:
         had = [a["name"] for a in d.ask("/v1/datasets/wall").json()["attributes"]]
-        for query in ["soft=smell>1", "soft=uncertainty>1+or+smell>1", "soft=smell>1&budget=500ms"]:
+        for query in ["soft=smell>1", "soft=class>1+or+smell>1", "soft=smell>1&budget=500ms"]:
             reply = d.ask(f"{VIEW}?{query}")
             assert reply.status == 400 and reply.json()["field"] == "soft", reply.body
             assert "'smell'" in reply.json()["detail"] and all(name in reply.json()["detail"] for name in had), reply.body

@@ -18,6 +18,7 @@
 #include "support/reference_fill.h"
 #include "support/reference_lines.h"
 #include "support/reference_maps.h"
+#include "support/reference_marks.h"
 #include "support/reference_panels.h"
 #include "support/reference_scene.h"
 
@@ -252,6 +253,20 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     }
 }
 
+/* Is what lies at `p`, view space, not drawn, since it is soft? */
+static bool is_soft(const struct scene *s, uint64_t id, const float p[3])
+{
+    double world[3];
+    if (!s->view->soft.count)
+        return false;
+    for (int a = 0; a < 3; a++) {
+        world[a] = s->camera.eye[a];
+        for (int i = 0; i < 3; i++)
+            world[a] += s->camera.rotation[3 * i + a] * (double)p[i];
+    }
+    return reference_is_soft(s->dataset, &s->view->soft, id, world);
+}
+
 /* A chunk of panels that is drawn. */
 struct panels {
     struct scene *scene;
@@ -264,6 +279,8 @@ static void draw_fragment(void *context, const struct reference_fragment *from)
 {
     const struct panels *panels = context;
     struct scene *s = panels->scene;
+    if (is_soft(s, from->id, (const float[3]){0})) /* terms of shapes cut panels into cells */
+        return;
     const struct reference_plane *plane = &panels->plane;
     float radius = plane->chunk->radius_min;
     struct disc d = {.id = from->id};
@@ -461,7 +478,7 @@ static void draw_panels(struct scene *s, const struct naive_chunk *drawn, bool s
         struct disc d = {
             .radius = SPL_RADIUS_SPACING * chunk->step, .end = 1, .texture_scale = 1, .trims = panels.trims};
         if (!reference_panel_cell(&panels.plane, i, &cell) || cell.p[2] < (float)s->camera.near ||
-            cell.p[2] > (float)s->camera.far)
+            cell.p[2] > (float)s->camera.far || is_soft(s, cell.id, cell.p))
             continue;
         d.id = cell.id;
         memcpy(d.p, cell.p, sizeof d.p);
@@ -484,7 +501,7 @@ static void for_each_disc(struct scene *s, bool shade)
         for (uint32_t index = 0; !s->chunks[c].lines && index < s->chunks[c].count; index++) {
             struct disc d;
             uint32_t low_bits;
-            if (!load_disc(s, &s->chunks[c], index, &d, &low_bits))
+            if (!load_disc(s, &s->chunks[c], index, &d, &low_bits) || is_soft(s, d.id, d.p))
                 continue;
             if (!draws_discs(s->view))
                 point(s, &d, low_bits);

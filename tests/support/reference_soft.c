@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "render/soft/models.h"
+
 enum { side = SPL_SOFT_TILE, span = SPL_SOFT_SPAN_MAX };
 
 /* The samples along an axis that a sphere may reach: the tangents to its circle in that plane. */
@@ -47,13 +49,20 @@ uint32_t soft_express(const struct spl_frame_params *params, const struct soft_i
     float inverse = 1 / (1 + rx * rx + ry * ry), closer = 1 / (item->radius * item->radius);
     float ox = item->x - rx * item->z, oy = item->y - ry * item->z, along = ox * rx + oy * ry;
     float share = (ox * ox + oy * oy - along * along * inverse) * closer, m = fmaxf(1 - share, 0);
-    float fall = m * m * (SPL_SOFT_EXPRESS_A + m * (SPL_SOFT_EXPRESS_B + m * SPL_SOFT_EXPRESS_C));
+    static double known = -1; /* a fit takes long */
+    static float f[SPL_SOFT_FALLOFF];
+    if (known != opacity) {
+        spl_soft_falloff(opacity, f);
+        for (int i = 0; i < SPL_SOFT_FALLOFF; i++)
+            f[i] *= 65536;
+        known = opacity;
+    }
+    float fall = m * (f[0] + m * (f[1] + m * (f[2] + m * (f[3] + m * f[4]))));
     if (border) {
         float soft = ((float)item->mark - 1) * (1.0f / 254);
-        fall = (1 - sqrtf(1 - m)) * (1 - soft) + fall * soft;
+        fall = (1 - sqrtf(1 - m)) * (float)(opacity * 65536) * (1 - soft) + fall * soft;
     }
-    float scaled = fall * (float)(opacity * 65536) + 0.5f;
-    return scaled < 65536 ? (uint32_t)(int)scaled : 65536;
+    return (uint32_t)fminf(fmaxf(fall + 0.5f, 0), 65536);
 }
 
 struct sorted {

@@ -1,6 +1,7 @@
 /* Device memory of soft transparency; see order.h. Sizes follow from how many items and entries are held at once; the
  * counters are as many as keep every invocation a table of its own. Belongs to the renderer's thread. */
 #include "render/soft/order.h"
+#include "render/soft/plan.h"
 
 /* Invocations that walk blocks: a software driver has few cores, and each has a counter for every tile. */
 enum { software_threads = 128, gpu_threads = 1024, tables_at_least = 16 };
@@ -27,6 +28,9 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     bytes[SPL_SOFT_ITEMS] = word * (SPL_SOFT_ITEM_WORDS + 1) * sizes->items;
     bytes[SPL_SOFT_PAIRS] = bytes[SPL_SOFT_OTHERS] = word * list;
     bytes[SPL_SOFT_COUNTS] = word * counters_of(sizes, software);
+    const uint64_t slots = sizes->slots, buckets = 2 * (uint64_t)SPL_SOFT_BUCKETS;
+    bytes[SPL_SOFT_SLOTS] = word * (SPL_SOFT_SLOT_WORDS * slots > buckets ? SPL_SOFT_SLOT_WORDS * slots : buckets);
+    bytes[SPL_SOFT_FIRSTS] = word * (slots ? slots : 1);
     bytes[SPL_SOFT_DIGITS] = word * digits_max;
     bytes[SPL_SOFT_TOTALS] = bytes[SPL_SOFT_STARTS] = word * sizes->tiles;
     bytes[SPL_SOFT_LISTS] = 3 * word * sizes->tiles;
@@ -47,6 +51,8 @@ int spl_soft_memory_init(struct spl_soft_memory *memory, const struct spl_soft_s
                          spl_soft_make *make, void *context, struct spl_gpu *gpu, struct spl_error *err)
 {
     static const enum spl_gpu_buffer_kind kinds[SPL_SOFT_BUFFERS] = {
+        [SPL_SOFT_SLOTS] = SPL_GPU_READBACK,
+        [SPL_SOFT_FIRSTS] = SPL_GPU_UPLOAD,
         [SPL_SOFT_TOTALS] = SPL_GPU_READBACK,
         [SPL_SOFT_STARTS] = SPL_GPU_UPLOAD,
         [SPL_SOFT_LISTS] = SPL_GPU_UPLOAD,

@@ -5,6 +5,8 @@
 
 #include <string.h>
 
+#include "render/soft/models.h"
+
 enum {
     sort_block = 1024,    // pairs that an invocation sorts at least
     sort_bits = 9,        // of a digit at most
@@ -20,11 +22,23 @@ static int add_work(struct spl_soft_order *order, uint64_t work, struct spl_erro
     return order->add_work ? order->add_work(order->context, work, err) : SPL_OK;
 }
 
-static int run(struct spl_soft_order *order, struct spl_error *err)
+int spl_soft_run(struct spl_soft_order *order, struct spl_error *err)
 {
-    int rc = spl_gpu_run(order->gpu, err);
+    int rc = order->run ? order->run(order->context, err) : spl_gpu_run(order->gpu, err);
     order->steps = 0;
     return rc;
+}
+
+int spl_soft_put_step(struct spl_soft_order *order, const struct spl_soft_step *step, struct spl_gpu_binding *binding,
+                      struct spl_error *err)
+{
+    struct spl_gpu_buffer *buffer = order->memory->buffers[SPL_SOFT_STEPS_OF];
+    int rc = order->steps == SPL_SOFT_STEPS ? spl_soft_run(order, err) : SPL_OK;
+    if (rc)
+        return rc;
+    *binding = (struct spl_gpu_binding){buffer, (uint64_t)order->steps++ * SPL_SOFT_STEP_STRIDE, SPL_SOFT_STEP_STRIDE};
+    memcpy((char *)spl_gpu_buffer_map(buffer) + binding->offset, step, sizeof *step);
+    return SPL_OK;
 }
 
 struct dispatch {
@@ -38,17 +52,15 @@ static int dispatch(struct spl_soft_order *order, const struct dispatch *what, s
 {
     struct spl_gpu_buffer *const *buffers = order->memory->buffers;
     struct spl_gpu_kernel *kernel;
+    struct spl_gpu_binding step;
     int rc = spl_kernels_get(order->kernels, order->gpu, &what->key, &kernel, err);
-    if (!rc && order->steps == SPL_SOFT_STEPS)
-        rc = run(order, err);
+    rc = rc ? rc : spl_soft_put_step(order, &what->step, &step, err);
     if (rc)
         return rc;
-    const uint64_t offset = (uint64_t)order->steps++ * SPL_SOFT_STEP_STRIDE;
-    memcpy((char *)spl_gpu_buffer_map(buffers[SPL_SOFT_STEPS_OF]) + offset, &what->step, sizeof what->step);
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {
         [SPL_RESOURCE_FRAME] = order->frame,
         [SPL_RESOURCE_DEPTH] = {.buffer = order->depth},
-        [SPL_RESOURCE_STEP] = {buffers[SPL_SOFT_STEPS_OF], offset, SPL_SOFT_STEP_STRIDE},
+        [SPL_RESOURCE_STEP] = step,
         [SPL_RESOURCE_ITEMS] = {.buffer = buffers[SPL_SOFT_ITEMS]},
         [SPL_RESOURCE_SORT_FROM] = {.buffer = buffers[what->from]},
         [SPL_RESOURCE_SORT_TO] = {.buffer = buffers[what->to]},
@@ -185,7 +197,7 @@ int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, s
     struct dispatch sums = what;
     sums.totals = SPL_SOFT_TOTALS;
     rc = rc ? rc : scan(order, sums, false, err);
-    rc = rc ? rc : run(order, err);
+    rc = rc ? rc : spl_soft_run(order, err);
     if (rc)
         return rc;
     uint64_t entries = lay_out(spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]),
@@ -205,6 +217,9 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
     const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]);
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups * (SPL_WORKGROUP / lanes);
+    const float scale = 65536;
+    float fall[SPL_SOFT_FALLOFF];
+    spl_soft_falloff(blend->opacity, fall);
     bool first = blend->first, left = order->entries > 0;
     int rc = SPL_OK;
     for (uint32_t round = 0; left && !rc; round++, first = false) {
@@ -213,7 +228,7 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
         uint64_t work = 0;
         left = false;
         if (round) /* the lists of the round before are being read */
-            rc = run(order, err);
+            rc = spl_soft_run(order, err);
         for (uint32_t tile = 0; tile < tiles && !rc; tile++) {
             uint32_t end = tile + 1 < tiles ? starts[tile + 1] : order->entries, own = end - starts[tile];
             bool here = own > skipped;
@@ -232,7 +247,12 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
             struct dispatch what = {.key = {"soft_blend", order->wide, {blend->border, first}},
                                     .step = {.count = listed - begun,
                                              .first = tile_words * begun,
-                                             .opacity = (float)(blend->opacity * 65536)},
+                                             .opacity = (float)(blend->opacity * 65536),
+                                             .fall_0 = fall[0] * scale,
+                                             .fall_1 = fall[1] * scale,
+                                             .fall_2 = fall[2] * scale,
+                                             .fall_3 = fall[3] * scale,
+                                             .fall_4 = fall[4] * scale},
                                     .from = other(order->sorted),
                                     .workgroups = groups((uint64_t)(listed - begun) * lanes, SPL_WORKGROUP)};
             rc = add_work(order, work, err);

@@ -20,6 +20,7 @@ struct spl_soft_sizes {
     uint32_t items;   /* at once */
     uint32_t entries; /* of lists */
     uint32_t tiles;
+    uint32_t slots;   /* that gather */
     uint64_t samples;
 };
 
@@ -28,6 +29,8 @@ enum spl_soft_buffer {
     SPL_SOFT_PAIRS,   /* of key and item, which sorting moves to and fro; then lists */
     SPL_SOFT_OTHERS,
     SPL_SOFT_COUNTS,
+    SPL_SOFT_SLOTS,   /* what they have, for the host */
+    SPL_SOFT_FIRSTS,  /* their first items, from the host */
     SPL_SOFT_DIGITS,  /* totals of a sort */
     SPL_SOFT_TOTALS,  /* of tiles, for the host */
     SPL_SOFT_STARTS,  /* of tiles, from the host */
@@ -67,11 +70,18 @@ struct spl_soft_order {
     /* Called before work is recorded, in samples that are looked at: runs what was recorded where that is too much; an
      * error ends the frame. NULL = never. */
     int (*add_work)(void *context, uint64_t work, struct spl_error *err);
+    int (*run)(void *context, struct spl_error *err); /* runs what was recorded; NULL = spl_gpu_run() */
     void *context;
     uint32_t steps;                /* of SPL_SOFT_STEPS_OF, used since it last ran */
     enum spl_soft_buffer sorted;   /* PAIRS or OTHERS: where the last sort ended */
     uint32_t entries;              /* of the lists */
 };
+
+/* Puts the parameters of a dispatch where it may bind them. */
+int spl_soft_put_step(struct spl_soft_order *order, const struct spl_soft_step *step, struct spl_gpu_binding *binding,
+                      struct spl_error *err);
+/* Runs what was recorded. */
+int spl_soft_run(struct spl_soft_order *order, struct spl_error *err);
 
 /* Sorts `items` pairs in SPL_SOFT_PAIRS whose keys are in [low, high]. */
 int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, uint32_t high, struct spl_error *err);

@@ -1,4 +1,6 @@
 /* Datasets as JSON. Owned by the loop's thread. */
+#include <string.h>
+
 #include "dataset/dataset.h"
 #include "service/datasets/library.h"
 
@@ -82,14 +84,59 @@ static json_t *describe_maps(const struct spl_catalog_entry *entry)
                      count(atomic_load(&entry->maps_at_once)), "limit_bytes", count(atomic_load(&entry->limit_bytes)));
 }
 
+/* How an attribute's values are distributed, from which pages choose what is soft; null where the file does not say. */
+static json_t *describe_values(const struct spl_stream_values *values)
+{
+    if (!values)
+        return json_null();
+    json_t *quantiles = json_array(), *kinds = json_array();
+    for (int i = 0; i <= SPL_VALUES_QUANTILES; i++)
+        json_array_append_new(quantiles, json_real(values->quantiles[i]));
+    for (uint32_t i = 0; i < values->kind_count; i++)
+        json_array_append_new(kinds, json_pack("{s:f, s:I}", "value", values->kinds[i].value, "count",
+                                               (json_int_t)values->kinds[i].count));
+    if (!values->kind_count) {
+        json_decref(kinds);
+        kinds = json_null();
+    }
+    return json_pack("{s:I, s:o, s:f, s:o}", "count", (json_int_t)values->count, "quantiles", quantiles, "p99",
+                     values->p99, "kinds", kinds);
+}
+
 /* What picks give of a splat beside what every dataset has. */
 static json_t *describe_attributes(const struct spl_dataset_info *info)
 {
     json_t *all = json_array();
     for (uint32_t s = 0; s < info->stream_count; s++)
-        json_array_append_new(all,
-                              json_pack("{s:s, s:s}", "name", info->streams[s].name, "unit", info->streams[s].unit));
+        json_array_append_new(all, json_pack("{s:s, s:s, s:o}", "name", info->streams[s].name, "unit",
+                                             info->streams[s].unit, "values",
+                                             describe_values(spl_dataset_info_get_values(info, s))));
     return all;
+}
+
+/* What views may name in soft: what is measured, its form and what it is of. */
+static json_t *describe_soft(const struct spl_dataset_info *info)
+{
+    json_t *forms = json_array();
+    for (uint32_t s = 0; s < info->stream_count; s++) {
+        const struct spl_stream_values *values = spl_dataset_info_get_values(info, s);
+        const char *name = info->streams[s].name;
+        bool share = !strcmp(name, "uncertainty"); // is asked for as a share of its 99th percentile
+        if (values && values->kind_count)
+            json_array_append_new(forms, json_sprintf("%s:%.17g", name, values->kinds[values->kind_count - 1].value));
+        else if (values || !share)
+            json_array_append_new(forms, json_sprintf("%s>%.4g", name, values ? share ? 0.5 : values->quantiles[32] : 0));
+        if (values)
+            json_array_append_new(forms, json_sprintf("%s>q0.9", name));
+    }
+    const double *low = info->bounds_min, *high = info->bounds_max;
+    double middle[3] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2};
+    json_array_append_new(forms, json_sprintf("axis:%.9g,%.9g,%.9g,0,0,1<%.4g", middle[0], middle[1], middle[2],
+                                              (high[0] - low[0]) / 4));
+    json_array_append_new(forms, json_sprintf("plane:%.9g,%.9g,%.9g,0,0,1>0", middle[0], middle[1], middle[2]));
+    json_array_append_new(forms, json_sprintf("box:%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", low[0], low[1], middle[2], high[0],
+                                              high[1], high[2]));
+    return forms;
 }
 
 /* A copy: a reply is taken apart while other threads may read META. */
@@ -137,6 +184,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "layers", describe_layers());
     set(json, "methods", describe_methods(info));
     set(json, "attributes", describe_attributes(info));
+    set(json, "soft", describe_soft(info));
     set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     set(json, "maps", info->maps ? describe_maps(entry) : json_null());

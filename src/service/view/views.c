@@ -7,7 +7,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "dataset/dataset.h"
-#include "render/soft_params.h"
+#include "render/marks.h"
 #include "service/datasets/library.h"
 #include "service/http.h"
 #include "service/ops/ops.h"
@@ -111,7 +111,8 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);
     if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
         view->view.layers &= ~(1u << SPL_LAYER_NORMAL);
-    return view->planned ? spl_soft_check_dataset(&view->view.soft, info, err) : spl_view_check_layers(&view->view, info, err); // what is planned may get another method
+    return view->planned ? spl_marks_resolve(&view->view.soft, info, NULL, err) // it may get another method
+                         : spl_view_check_layers(&view->view, info, err);
 }
 
 /* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view

@@ -60,7 +60,11 @@ static void by_page_they_are_the_same(void **state)
     uint64_t node_count, next_node = 0, bytes = 0;
     const struct spl_node *nodes = spl_dataset_get_nodes(all, &node_count);
     assert_true(spl_dataset_keeps_all(all) && !spl_dataset_keeps_all(by_page) && info->pages > 20 && info->levels > 2);
-    assert_memory_equal(info, spl_dataset_get_info(by_page), sizeof *info);
+    struct spl_dataset_info same = *spl_dataset_get_info(by_page);
+    assert_true(info->stream_values && same.stream_values && info->stream_count);
+    assert_memory_equal(info->stream_values, same.stream_values, info->stream_count * sizeof *same.stream_values);
+    same.stream_values = info->stream_values;
+    assert_memory_equal(info, &same, sizeof *info);
     for (uint32_t page = 0; page < info->pages; page++) {
         struct spl_tables *read, *none;
         const struct spl_tables *a = spl_dataset_borrow_tables(all, page, &none, NULL),

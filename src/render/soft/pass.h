@@ -1,0 +1,20 @@
+/* The stage of a tile that draws what is soft, over what a method drew of the rest: counting, windows of depth, sorting,
+ * lists, blending. What it leaves is a share and a colour a sample, for resolving to put over the solid. Everything
+ * belongs to the renderer's thread. */
+#ifndef SPL_RENDER_SOFT_PASS_H
+#define SPL_RENDER_SOFT_PASS_H
+
+#include "render/renderer.h"
+
+/* Makes room for the list's soft spheres on a tile of such a camera, at the cost of pages that the frame has not asked
+ * for, and tells chunks where their slots start; before the list is uploaded. Nothing where there are none. SPL_E_LIMIT
+ * as spl_scratch_upload(). */
+int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, struct spl_error *err);
+
+/* Is there anything soft to draw? */
+bool spl_soft_is_drawn(const struct spl_tile *tile);
+
+/* Records and runs it, once the solid depth of the colours is there. */
+int spl_soft_record(struct spl_tile *tile, struct spl_error *err);
+
+#endif

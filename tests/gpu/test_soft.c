@@ -1,0 +1,243 @@
+/* Soft spheres in whole frames: however they are cut in windows of depth or in tiles, every byte is the same; backends
+ * differ by a level at most; a turn all round flips nothing; they lie over what is solid and change no other layer;
+ * opacity 0 draws none; nobody waits longer for them, and a device that is lost is told. One body for every backend. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "gpu/frames.h"
+#include "render/fault.h"
+
+/* What lies on one side of a plane through the origin is soft. */
+static void soften(struct spl_view *view, double nx, double from, double opacity)
+{
+    view->soft.count = 1;
+    view->soft.terms[0] = (struct spl_soft_term){.measure = SPL_SOFT_PLANE, .least = from, .most = INFINITY,
+                                                 .shape = {0, 0, 0, nx, 1 - nx, 0}};
+    view->soft.opacity = opacity;
+}
+
+static struct spl_frame draw(struct spl_renderer *with, const struct spl_dataset *dataset, const struct spl_view *view)
+{
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    if (spl_renderer_render(with, dataset, view, &frame, &err))
+        fail_msg("%s", err.message);
+    return frame;
+}
+
+static void assert_same(const struct spl_frame *a, const struct spl_frame *b, const char *what)
+{
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+        const struct spl_image *x = &a->images[layer], *y = &b->images[layer];
+        if (x->pixels && memcmp(x->pixels, y->pixels, (size_t)x->width * x->height * spl_pixel_bytes(x->type)))
+            fail_msg("%s: layer %s differs", what, spl_layer_name((enum spl_layer)layer));
+    }
+}
+
+static void windows_change_no_byte(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.02);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct spl_view view = looking(origin, 2.5, 203, 151);
+        view.method = (enum spl_method)method;
+        soften(&view, 1, 0, 0.4);
+        spl_renderer_set_soft_items(renderer, 0);
+        struct spl_frame whole = draw(renderer, dataset, &view);
+        assert_true(whole.stats.soft_drawn > 5000 && whole.stats.soft_drawn < 30000);
+        static const uint32_t held[] = {3000, 500};
+        for (size_t i = 0; i < 2; i++) {
+            spl_renderer_set_soft_items(renderer, held[i]);
+            spl_renderer_set_work_at_once(renderer, 1);
+            struct spl_frame cut = draw(renderer, dataset, &view);
+            spl_renderer_set_work_at_once(renderer, UINT64_MAX);
+            assert_same(&whole, &cut, spl_method_name(view.method));
+            assert_int_equal(cut.stats.soft_drawn, whole.stats.soft_drawn);
+            spl_frame_finish(&cut);
+        }
+        spl_renderer_set_soft_items(renderer, 0);
+        spl_frame_finish(&whole);
+    }
+    done(dataset);
+}
+
+static void tiles_leave_no_seams(void **state)
+{
+    (void)state;
+    struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 160 * 160};
+    struct spl_renderer *small;
+    assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+    for (uint64_t seed = 1; seed <= 3; seed++) {
+        random_state = seed;
+        struct spl_dataset *dataset = random_cube(20000, origin, seed == 2 ? 0.1 : 0.02);
+        assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
+        struct spl_view view = looking(origin, seed == 3 ? 1 : 3, 203, 151);
+        view.supersample = 1 + (double)(seed % 2);
+        soften(&view, 1, -100, 0.3); /* everything: method splat chooses each tile's largest weight */
+        struct spl_frame one = draw(renderer, dataset, &view), many = draw(small, dataset, &view);
+        assert_true(many.stats.tiles > 1);
+        assert_same(&one, &many, "in tiles");
+        spl_frame_finish(&one);
+        spl_frame_finish(&many);
+        spl_renderer_remove(small, dataset);
+        done(dataset);
+    }
+    spl_renderer_destroy(small);
+}
+
+/* Levels by which two images' colours differ at most. */
+static int worst_level(const struct spl_frame *a, const struct spl_frame *b)
+{
+    const struct spl_image *x = &a->images[SPL_LAYER_COLOR], *y = &b->images[SPL_LAYER_COLOR];
+    const uint8_t *p = x->pixels, *q = y->pixels;
+    int worst = 0;
+    for (size_t i = 0; i < 4 * (size_t)x->width * x->height; i++)
+        worst = abs(p[i] - q[i]) > worst ? abs(p[i] - q[i]) : worst;
+    return worst;
+}
+
+static void backends_agree(void **state)
+{
+    (void)state;
+    struct spl_renderer_options options = {.size = sizeof options, .device = "egl"};
+    struct spl_renderer *other;
+    if (spl_renderer_create(&options, &other, NULL))
+        skip();
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.05);
+    assert_int_equal(spl_renderer_add(other, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 2.5, 203, 151);
+    soften(&view, 1, -100, 0.3);
+    struct spl_frame a = draw(renderer, dataset, &view), b = draw(other, dataset, &view);
+    assert_true(worst_level(&a, &b) <= 1);
+    spl_frame_finish(&a);
+    spl_frame_finish(&b);
+    spl_renderer_remove(other, dataset);
+    spl_renderer_destroy(other);
+    done(dataset);
+}
+
+static void soft_lies_over_the_solid(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.03);
+    struct spl_view view = looking(origin, 3, 203, 151);
+    view.background[3] = 0;
+    soften(&view, 1, 0, 0);
+    struct spl_frame solid = draw(renderer, dataset, &view);
+    assert_int_equal(solid.stats.soft_drawn, 0);
+    soften(&view, 1, 0, 0.3);
+    struct spl_frame both = draw(renderer, dataset, &view);
+    assert_true(both.stats.soft_drawn > 0);
+    const float *was = solid.images[SPL_LAYER_COVERAGE].pixels, *is = both.images[SPL_LAYER_COVERAGE].pixels;
+    const uint8_t *rgba = both.images[SPL_LAYER_COLOR].pixels;
+    size_t partly = 0;
+    for (size_t i = 0; i < 203 * 151; i++) {
+        assert_true(is[i] >= was[i] - 1e-6f && is[i] <= 1);
+        assert_true(fabs(is[i] * 255 - rgba[4 * i + 3]) <= 0.51);
+        partly += is[i] > 0.05f && is[i] < 0.95f;
+    }
+    assert_true(partly > 500);
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        if (layer != SPL_LAYER_COLOR && layer != SPL_LAYER_COVERAGE) {
+            const struct spl_image *x = &solid.images[layer], *y = &both.images[layer];
+            assert_memory_equal(x->pixels, y->pixels, (size_t)x->width * x->height * spl_pixel_bytes(x->type));
+        }
+    spl_frame_finish(&solid);
+    spl_frame_finish(&both);
+    done(dataset);
+}
+
+/* A fiftieth of a degree at a time, all round: no picture differs from the one before by more than the content's own motion. */
+static void a_turn_flips_nothing(void **state)
+{
+    (void)state;
+    enum { steps = 24, apart = 15 };
+    struct spl_dataset *dataset = random_cube(3000, origin, 0.05);
+    struct spl_view view = looking(origin, 3, 120, 90);
+    view.lod = 0; /* every splat, as far as it is */
+    view.layers = 1u << SPL_LAYER_COLOR;
+    soften(&view, 1, -100, 0.3);
+    double most = 0, sum = 0;
+    for (int i = 0; i < steps; i++) {
+        struct spl_frame frames[2];
+        for (int k = 0; k < 2; k++) {
+            const double turn = (i * apart + k * 0.02) * 3.14159265358979 / 180;
+            const double eye[3] = {3 * cos(turn), 3 * sin(turn), 0.5}, up[3] = {0, 0, 1};
+            assert_int_equal(spl_camera_look_at(&view.camera, eye, origin, up, NULL), SPL_OK);
+            assert_int_equal(spl_camera_set_fov(&view.camera, 50, 120, 90, NULL), SPL_OK);
+            frames[k] = draw(renderer, dataset, &view);
+        }
+        const uint8_t *p = frames[0].images[0].pixels, *q = frames[1].images[0].pixels;
+        double difference = 0;
+        for (size_t n = 0; n < 4 * 120 * 90; n++)
+            difference += abs(p[n] - q[n]);
+        difference /= 4 * 120 * 90;
+        most = fmax(most, difference);
+        sum += difference / steps;
+        spl_frame_finish(&frames[0]);
+        spl_frame_finish(&frames[1]);
+    }
+    print_message("levels from a picture to the next: %.3f at most, %.3f in the mean\n", most, sum);
+    assert_true(most < 2 * sum); /* six orders of axes flip at 45 degrees, which is one of these */
+    assert_true(most < 1);
+    done(dataset);
+}
+
+static void nobody_waits_for_it(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.03);
+    struct spl_view view = looking(origin, 3, 203, 151);
+    struct spl_frame frame;
+    soften(&view, 1, -100, 0.3);
+    spl_frame_finish(&(struct spl_frame){0});
+    frame = draw(renderer, dataset, &view);
+    assert_true(frame.stats.soft_ms >= 0);
+    spl_frame_finish(&frame);
+    view.deadline_ns = spl_now_ns() + 2000000;
+    spl_renderer_set_soft_items(renderer, 64); /* hundreds of windows */
+    int rc = spl_renderer_render(renderer, dataset, &view, &frame, NULL);
+    assert_int_equal(rc, SPL_E_TIMEOUT);
+    view.deadline_ns = UINT64_MAX;
+    spl_renderer_set_soft_items(renderer, 0);
+    frame = draw(renderer, dataset, &view);
+    spl_frame_finish(&frame);
+    done(dataset);
+}
+
+static void loss_is_told(void **state)
+{
+    (void)state;
+    struct spl_renderer_options options = {.size = sizeof options, .device = device};
+    struct spl_renderer *mortal;
+    assert_int_equal(spl_renderer_create(&options, &mortal, NULL), SPL_OK);
+    struct spl_dataset *dataset = random_cube(5000, origin, 0.03);
+    assert_int_equal(spl_renderer_add(mortal, dataset, NULL), SPL_OK);
+    struct spl_view view = looking(origin, 3, 203, 151);
+    struct spl_frame frame;
+    soften(&view, 1, -100, 0.3);
+    frame = draw(mortal, dataset, &view);
+    spl_frame_finish(&frame);
+    spl_renderer_inject_loss(mortal); /* the first part to be run is the counting of what is soft */
+    assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_E_DEVICE_LOST);
+    assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_E_DEVICE_LOST);
+    spl_renderer_destroy(mortal);
+    done(dataset);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
+        frames_test(soft_lies_over_the_solid), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
+        frames_test(loss_is_told),
+    };
+    return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
+}
