@@ -173,6 +173,10 @@
 /* Soft spheres of model concentric have a shell for every so many samples of their radius, at most so many. */
 #define SPL_SOFT_SHELL_SAMPLES 4
 #define SPL_SOFT_SHELLS_MAX 16
+/* Models with a kernel of their own, beside express. */
+#define SPL_SOFT_BASE 0
+#define SPL_SOFT_CONCENTRIC 1
+#define SPL_SOFT_LAYER 2
 
 #define SPL_NOTHING 0xffffffffu /* depth word or id of a sample that nothing covers */
 
@@ -385,6 +389,9 @@ struct spl_soft_step {
     SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
     SPL_U32 first;         /* word of the lists where those of this dispatch start */
     SPL_F32 opacity;       /* at a sphere's centre, of 65536 */
+    SPL_F32 depth;         /* optical, through a sphere's centre: models with a density, and layer */
+    SPL_F32 reach;         /* no sphere of the lists has a larger radius */
+    SPL_F32 until;         /* view depth up to which these lists are whole */
     SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "support/soft_reference.h"
+#include "support/soft_rays.h"
 #include "synth/random.h"
 
 enum { SIDE = 120, CROWD = 50 };
@@ -42,9 +42,9 @@ static struct tally measure(struct soft_look look, const struct soft_sphere *sph
     for (int i = 0; i < SIDE * SIDE; i++) {
         double ray[2] = {((i % SIDE + 0.5) / SIDE * 2 - 1) * half / depth_of_scene,
                          ((i / SIDE + 0.5) / SIDE * 2 - 1) * half / depth_of_scene};
-        struct soft_seen wanted = soft_reference(&base, spheres, count, ray, 1, 1e6);
+        struct soft_seen wanted = soft_see(&base, spheres, count, ray, 1, 1e6);
         if (wanted.transmittance < 1)
-            compare(&t, soft_reference(&look, spheres, count, ray, 1, 1e6), wanted);
+            compare(&t, soft_see(&look, spheres, count, ray, 1, 1e6), wanted);
     }
     return t;
 }

@@ -11,7 +11,7 @@
 
 #include "render/soft/models.h"
 #include "shared.h"
-#include "support/soft_reference.h"
+#include "support/soft_rays.h"
 #include "synth/random.h"
 
 static const double opacities[] = {0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99};
@@ -147,7 +147,7 @@ static struct soft_sphere sphere(double x, double z, double radius, double red)
 static void same_as_march(const struct soft_look *look, const struct soft_sphere *spheres, size_t count,
                           const double ray[2], double near, double far, const char *what)
 {
-    struct soft_seen by_stretches = soft_reference(look, spheres, count, ray, near, far);
+    struct soft_seen by_stretches = soft_see(look, spheres, count, ray, near, far);
     struct soft_seen by_steps = soft_march(look, spheres, count, ray, near, far, 40000);
     near_to(by_stretches.transmittance, by_steps.transmittance, 2e-4, what);
     for (int c = 0; c < 3; c++)
@@ -197,14 +197,14 @@ static void depths_add(void **state)
     for (int i = 0; i < OPACITIES; i++) {
         struct soft_look look = {.model = SPL_SOFT_MODEL_BASE, .opacity = opacities[i]};
         double clear = pow(1 - opacities[i], 2);
-        near_to(soft_reference(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-9, "base");
-        near_to(soft_reference(&look, pair, 1, axis, 5, 100).transmittance, sqrt(1 - opacities[i]), 1e-9,
+        near_to(soft_see(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-9, "base");
+        near_to(soft_see(&look, pair, 1, axis, 5, 100).transmittance, sqrt(1 - opacities[i]), 1e-9,
                 "half a sphere");
         look.model = SPL_SOFT_MODEL_CONCENTRIC;
         look.focal = 100;
-        near_to(soft_reference(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-9, "concentric");
+        near_to(soft_see(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-9, "concentric");
         look.model = SPL_SOFT_MODEL_EXPRESS;
-        near_to(soft_reference(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-6, "express");
+        near_to(soft_see(&look, pair, 2, axis, 0.1, 100).transmittance, clear, 1e-6, "express");
     }
 }
 
@@ -215,11 +215,11 @@ static void order_is_by_depth(void **state)
     (void)state;
     struct soft_sphere pair[2] = {sphere(0, 5, 1, 255), sphere(0, 5, 1, 0)};
     struct soft_look look = {.model = SPL_SOFT_MODEL_EXPRESS, .opacity = 0.5};
-    struct soft_seen seen = soft_reference(&look, pair, 2, axis, 0.1, 100);
+    struct soft_seen seen = soft_see(&look, pair, 2, axis, 0.1, 100);
     near_to(seen.color[0], 127.5, 1e-4, "the first of two at one place");
     near_to(seen.color[1], 63.75, 1e-4, "the second");
     look.model = SPL_SOFT_MODEL_BASE;
-    seen = soft_reference(&look, pair, 2, axis, 0.1, 100);
+    seen = soft_see(&look, pair, 2, axis, 0.1, 100);
     near_to(seen.color[0], 0.75 * 127.5, 1e-9, "a mean");
     near_to(seen.color[0], seen.color[1], 1e-9, "of both");
 }
@@ -230,11 +230,11 @@ static void layers_are_one(void **state)
     (void)state;
     struct soft_sphere three[3] = {sphere(0, 5, 1, 200), sphere(0, 5.05, 1, 100), sphere(0, 5.5, 1, 0)};
     struct soft_look look = {.model = SPL_SOFT_MODEL_LAYER, .opacity = 0.3, .margin = 0.1};
-    struct soft_seen seen = soft_reference(&look, three, 3, axis, 0.1, 100);
+    struct soft_seen seen = soft_see(&look, three, 3, axis, 0.1, 100);
     near_to(seen.transmittance, 0.7, 1e-12, "layer");
     near_to(seen.color[0], 0.3 * 150, 1e-9, "of the two nearest");
-    near_to(soft_reference(&look, three, 3, axis, 5.2, 100).color[0], 0, 1e-9, "what begins behind them");
-    near_to(soft_reference(&look, three, 3, axis, 0.1, 4).transmittance, 1, 0, "behind a wall");
+    near_to(soft_see(&look, three, 3, axis, 5.2, 100).color[0], 0, 1e-9, "what begins behind them");
+    near_to(soft_see(&look, three, 3, axis, 0.1, 4).transmittance, 1, 0, "behind a wall");
 }
 
 /* Eq. 22: at the border a sphere is as dense as 1 - d / r in each model, far from it as the model says. */
@@ -246,9 +246,9 @@ static void borders_are_dense(void **state)
             struct soft_sphere one = {.center = {delta, 0, 1000}, .radius = 1};
             struct soft_look look = {.model = (enum spl_soft_model)model, .opacity = 0.2, .focal = 20000};
             double inside = soft_profile(&look, 20, delta);
-            near_to(1 - soft_reference(&look, &one, 1, axis, 1, 1e6).transmittance, 1 - delta, 1e-5, "at the border");
+            near_to(1 - soft_see(&look, &one, 1, axis, 1, 1e6).transmittance, 1 - delta, 1e-5, "at the border");
             one.soft = 0.5;
-            near_to(1 - soft_reference(&look, &one, 1, axis, 1, 1e6).transmittance, (1 - delta + inside) / 2, 1e-5,
+            near_to(1 - soft_see(&look, &one, 1, axis, 1, 1e6).transmittance, (1 - delta + inside) / 2, 1e-5,
                     "half way");
         }
 }

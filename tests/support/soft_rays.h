@@ -1,8 +1,8 @@
 /* Soft spheres along one ray, in doubles: what kernels are compared with. View space: x to the right, y down, z away
  * from the eye; a ray goes through (x, y, 1). Two ways for what has a density: stretches between entries and exits with
  * closed integrals, and steps small enough not to need them. */
-#ifndef TEST_SUPPORT_SOFT_REFERENCE_H
-#define TEST_SUPPORT_SOFT_REFERENCE_H
+#ifndef TEST_SUPPORT_SOFT_RAYS_H
+#define TEST_SUPPORT_SOFT_RAYS_H
 
 #include <stddef.h>
 
@@ -28,7 +28,7 @@ struct soft_seen {
 
 /* What a ray sees of `count` spheres from view depth `near` to `far`. They lie in order of their centres' depth; which
  * of equals comes first, the caller says. */
-struct soft_seen soft_reference(const struct soft_look *look, const struct soft_sphere *spheres, size_t count,
+struct soft_seen soft_see(const struct soft_look *look, const struct soft_sphere *spheres, size_t count,
                                 const double ray[2], double near, double far);
 
 /* The same of base and concentric, where everything is wholly soft, by `steps` steps over what the spheres span. */

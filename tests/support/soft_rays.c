@@ -1,7 +1,7 @@
-/* The reference of soft spheres; see soft_reference.h. Written from the paper's equations and the comments of
+/* The reference of soft spheres; see soft_rays.h. Written from the paper's equations and the comments of
  * src/render/soft/models.h; of the product only the integrals of one sphere and the number of shells are used, which
  * soft_march() holds against densities. */
-#include "support/soft_reference.h"
+#include "support/soft_rays.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -164,7 +164,7 @@ static struct soft_seen see_stretches(const struct soft_look *look, const struct
     return seen;
 }
 
-struct soft_seen soft_reference(const struct soft_look *look, const struct soft_sphere *spheres, size_t count,
+struct soft_seen soft_see(const struct soft_look *look, const struct soft_sphere *spheres, size_t count,
                                 const double ray[2], double near, double far)
 {
     return look->model == SPL_SOFT_MODEL_EXPRESS ? see_express(look, spheres, count, ray, near, far)
@@ -222,5 +222,5 @@ double soft_profile(const struct soft_look *look, double radius_samples, double 
     struct soft_sphere sphere = {.center = {delta, 0, 1000}, .radius = 1, .soft = 1};
     const double axis[2] = {0, 0};
     close.focal = 1000 * radius_samples;
-    return 1 - soft_reference(&close, &sphere, 1, axis, 1, 1e6).transmittance;
+    return 1 - soft_see(&close, &sphere, 1, axis, 1, 1e6).transmittance;
 }

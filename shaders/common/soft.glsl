@@ -1,0 +1,66 @@
+/* Soft spheres on the ray of a sample; src/render/soft/models.h says what of, tests/support/soft_rays.c is the same
+ * in doubles. Depths are along the viewing axis; a sphere's entries and exits, too, so that they compare with those of
+ * what is solid. */
+#ifndef SPL_SOFT_GLSL
+#define SPL_SOFT_GLSL
+
+#include "common/frame.glsl"
+
+struct soft_ray {
+    vec2 slope;     /* the ray goes through (slope, 1) */
+    float inverse;  /* 1 / |(slope, 1)|^2 */
+};
+
+soft_ray load_soft_ray(ivec2 at)
+{
+    soft_ray ray;
+    precise vec2 slope = vec2(at) + 0.5 - vec2(frame.cx, frame.cy);
+    slope *= vec2(frame.inverse_fx, frame.inverse_fy);
+    precise float inverse = 1.0 / (1.0 + slope.x * slope.x + slope.y * slope.y);
+    ray.slope = slope;
+    ray.inverse = inverse;
+    return ray;
+}
+
+/* The squared distance of the ray to a sphere's centre, and how much deeper than the centre the ray's point next to it
+ * lies. The centre's offset from the ray at its own depth is small where it matters, so nothing cancels. */
+float soft_distance(soft_ray ray, vec3 center, out float behind)
+{
+    precise vec2 off = center.xy - ray.slope * center.z;
+    precise float along = off.x * ray.slope.x + off.y * ray.slope.y;
+    precise float shift = along * ray.inverse;
+    precise float distance = max(off.x * off.x + off.y * off.y - along * shift, 0.0);
+    behind = shift;
+    return distance;
+}
+
+/* Eq. 22: spheres near the border to what is solid are as dense as 1 - d / r; soft = W. */
+float soft_modulate(float opacity, float q, float soft)
+{
+    precise float modulated = (1.0 - sqrt(q)) * (1.0 - soft) + opacity * soft;
+    return modulated;
+}
+
+/* spl_soft_base_part() of delta = sqrt(q): share of the depth through the centre, from the middle to zeta radii. */
+float soft_base_part(float q, float zeta)
+{
+    float square = zeta * zeta + q, root = sqrt(square), far = abs(zeta);
+    float tail = q * (log(far + root + 1e-12) - 0.5 * log(q + 1e-24));
+    return 0.5 * sign(zeta) * (far * (2.0 - root) - tail);
+}
+
+/* spl_soft_concentric_part() */
+float soft_concentric_part(float shells, float q, float zeta)
+{
+    float part = 0.0, delta = sqrt(q), share = 1.0 / shells;
+    for (float radius = 1.0;;) {
+        float half_chord = sqrt(max(radius * radius - q, 0.0)), inverse = share / radius;
+        part += max(inverse * (1.0 - delta * inverse), 0.0) * clamp(zeta, -half_chord, half_chord);
+        radius -= share;
+        if (radius < max(delta, 0.5 * share))
+            break;
+    }
+    return 0.5 * part;
+}
+
+#endif

@@ -1,0 +1,289 @@
+/* Kernel soft_base against the reference in doubles: base and concentric over lists of tiles, with spheres that overlap,
+ * are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds than a
+ * kernel may take; and layer. Colour over black and what passes, within a level of 255. One body for every backend. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "gpu/gpu.h"
+#include "render/soft/models.h"
+#include "shared.h"
+#include "support/soft_rays.h"
+
+enum { width = 36, height = 28, columns = (width + 7) / 8, rows = (height + 7) / 8, items_max = 4000,
+       tiles = columns * rows, progress_words = 1 + 64 * tiles };
+static const double focal = 40;
+static struct spl_gpu *gpu;
+static struct spl_gpu_buffer *buffers[SPL_RESOURCE_COUNT], *down;
+
+static uint64_t random_state = 1;
+static double between(double low, double high)
+{
+    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
+    return low + (high - low) * (double)(random_state >> 11) / 9007199254740992.0;
+}
+
+static int open_all(void **state)
+{
+    (void)state;
+    static const struct { enum spl_resource what; uint64_t bytes; enum spl_gpu_buffer_kind kind; } rows_of[] = {
+        {SPL_RESOURCE_FRAME, sizeof(struct spl_frame_params), SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_STEP, sizeof(struct spl_soft_step), SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_SOFT, 16 * width * height, SPL_GPU_DEVICE},
+        {SPL_RESOURCE_COUNTS, 4 * progress_words, SPL_GPU_DEVICE},
+        {SPL_RESOURCE_ITEMS, 24 * items_max, SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_SORT_FROM, 4 * items_max * tiles, SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_LISTS, 12 * tiles, SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_DEPTH, 4 * width * height, SPL_GPU_UPLOAD}};
+    struct spl_error err = {0};
+    struct spl_gpu_options options = {.device = getenv("SPLATD_TEST_DEVICE"), .debug = true, .cache_dir = ""};
+    if (spl_gpu_open(&options, &gpu, &err))
+        fail_msg("%s", err.message);
+    for (size_t i = 0; i < sizeof rows_of / sizeof *rows_of; i++)
+        assert_int_equal(spl_gpu_buffer_create(gpu, rows_of[i].kind, rows_of[i].bytes, &buffers[rows_of[i].what], NULL),
+                         0);
+    assert_int_equal(spl_gpu_buffer_create(gpu, SPL_GPU_READBACK, 16 * width * height + 4, &down, NULL), 0);
+    return 0;
+}
+
+static int close_all(void **state)
+{
+    (void)state;
+    for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
+        spl_gpu_buffer_destroy(gpu, buffers[i]);
+    spl_gpu_buffer_destroy(gpu, down);
+    spl_gpu_close(gpu);
+    assert_int_equal(spl_gpu_count_complaints(), 0);
+    return 0;
+}
+
+struct scene {
+    struct soft_look look;
+    struct soft_sphere *spheres; /* by depth */
+    size_t count;
+    float solid[width * height];
+    bool border;
+};
+
+static int by_depth(const void *a, const void *b)
+{
+    double x = ((const struct soft_sphere *)a)->center[2], y = ((const struct soft_sphere *)b)->center[2];
+    return (x > y) - (x < y);
+}
+
+/* Spheres as floats have them, so that both sides are asked the same. */
+static struct scene make_scene(enum spl_soft_model model, double opacity, size_t count)
+{
+    struct scene s = {.look = {.model = model, .opacity = opacity, .focal = focal, .margin = 0.25},
+                      .spheres = calloc(count, sizeof *s.spheres), .count = count};
+    random_state = count;
+    for (size_t i = 0; i < count; i++) {
+        struct soft_sphere *p = &s.spheres[i];
+        double z = between(1.5, 6);
+        p->center[0] = (double)(float)(z * between(-0.5, 0.5));
+        p->center[1] = (double)(float)(z * between(-0.4, 0.4));
+        p->center[2] = (double)(float)z;
+        p->radius = (double)(float)between(0.05, 0.5);
+        p->soft = 1;
+        for (int c = 0; c < 3; c++)
+            p->color[c] = floor(between(0, 256));
+    }
+    for (int i = 0; i < width * height; i++)
+        s.solid[i] = INFINITY;
+    return s;
+}
+
+static uint32_t bits(double value)
+{
+    float f = (float)value;
+    uint32_t word;
+    memcpy(&word, &f, 4);
+    return word;
+}
+
+static void fill(const struct scene *s)
+{
+    struct spl_frame_params frame = {.fx = (float)focal, .fy = (float)focal, .cx = width / 2.0f, .cy = height / 2.0f,
+                                     .inverse_fx = (float)(1 / focal), .inverse_fy = (float)(1 / focal), .near = 0.125f,
+                                     .far = 100, .width = width, .height = height, .margin = (float)s->look.margin};
+    struct spl_soft_step step = {.count = tiles, .depth = (float)spl_soft_depth(s->look.opacity), .until = 1e9f};
+    uint32_t *items = spl_gpu_buffer_map(buffers[SPL_RESOURCE_ITEMS]);
+    uint32_t *entries = spl_gpu_buffer_map(buffers[SPL_RESOURCE_SORT_FROM]);
+    uint32_t *lists = spl_gpu_buffer_map(buffers[SPL_RESOURCE_LISTS]), entry = 0;
+    uint32_t *depth = spl_gpu_buffer_map(buffers[SPL_RESOURCE_DEPTH]);
+    assert_true(s->count <= items_max);
+    for (uint32_t i = 0; i < s->count; i++) {
+        const struct soft_sphere *p = &s->spheres[i];
+        uint32_t paint = (uint32_t)lround(1 + 254 * p->soft) << 24;
+        for (int c = 0; c < 3; c++) {
+            items[6 * i + (uint32_t)c] = bits(p->center[c]);
+            paint |= (uint32_t)p->color[c] << 8 * c;
+        }
+        items[6 * i + 3] = bits(p->radius);
+        items[6 * i + 4] = paint;
+        items[6 * i + 5] = i;
+        step.reach = fmaxf(step.reach, (float)p->radius);
+    }
+    for (uint32_t t = 0; t < tiles; t++) { /* every sphere in each tile: more than must be, never less */
+        lists[3 * t] = t % columns | t / columns << 16;
+        lists[3 * t + 1] = entry;
+        for (uint32_t i = 0; i < s->count; i++)
+            entries[entry++] = i;
+        lists[3 * t + 2] = entry;
+    }
+    for (int i = 0; i < width * height; i++)
+        depth[i] = isinf(s->solid[i]) ? SPL_NOTHING : bits((double)s->solid[i]);
+    memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_FRAME]), &frame, sizeof frame);
+    memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_STEP]), &step, sizeof step);
+}
+
+/* Runs until nothing is left unfinished; how often that was. */
+static int draw(const struct scene *s)
+{
+    static const uint32_t models[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
+                                      [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
+                                      [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
+    const uint32_t constants[] = {models[s->look.model], s->border};
+    struct spl_gpu_kernel *kernel;
+    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {{0}};
+    uint32_t *got = spl_gpu_buffer_map(down);
+    int times = 0;
+    fill(s);
+    for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
+        bindings[i].buffer = buffers[i];
+    assert_int_equal(spl_gpu_kernel_create(gpu, "soft_base", constants, 2, &kernel, NULL), 0);
+    do {
+        uint64_t ticket;
+        struct spl_error err = {0};
+        assert_int_equal(spl_gpu_begin(gpu, NULL), 0);
+        if (times == 0)
+            spl_gpu_fill(gpu, buffers[SPL_RESOURCE_SOFT], 0, 16 * width * height, 0);
+        spl_gpu_fill(gpu, buffers[SPL_RESOURCE_COUNTS], 0, times ? 4 : 4 * progress_words, 0);
+        spl_gpu_barrier(gpu);
+        spl_gpu_dispatch(gpu, kernel, bindings, tiles);
+        spl_gpu_barrier(gpu);
+        spl_gpu_copy(gpu, buffers[SPL_RESOURCE_SOFT], 0, down, 0, 16 * width * height);
+        spl_gpu_copy(gpu, buffers[SPL_RESOURCE_COUNTS], 0, down, 16 * width * height, 4);
+        if (spl_gpu_submit(gpu, &ticket, &err) || spl_gpu_wait(gpu, ticket, spl_now_ns() + 60 * SPL_NS_PER_S, &err))
+            fail_msg("%s", err.message);
+        assert_true(++times < 200);
+    } while (got[4 * width * height]);
+    spl_gpu_kernel_destroy(gpu, kernel);
+    return times;
+}
+
+/* Also says how often the kernel ran; ends the scene. */
+static int matches(struct scene *s, const char *what)
+{
+    qsort(s->spheres, s->count, sizeof *s->spheres, by_depth);
+    int times = draw(s);
+    const uint32_t *got = spl_gpu_buffer_map(down);
+    double most = 0;
+    for (int i = 0; i < width * height; i++) {
+        double ray[2] = {(i % width + 0.5 - width / 2.0) / focal, (i / width + 0.5 - height / 2.0) / focal};
+        struct soft_seen wanted =
+            soft_see(&s->look, s->spheres, s->count, ray, 0.125, fmin(100, (double)s->solid[i]));
+        for (int c = 0; c < 4; c++) {
+            double is = c < 3 ? got[4 * i + c] / (double)SPL_SOFT_CLEAR : 255 * (1 - got[4 * i + 3] / (double)SPL_SOFT_CLEAR);
+            double off = fabs(is - (c < 3 ? wanted.color[c] : 255 * wanted.transmittance));
+            most = fmax(most, off);
+            if (off > 1)
+                fail_msg("%s, sample %d: word %d is %.3f, not %.3f", what, i, c, is,
+                         c < 3 ? wanted.color[c] : 255 * wanted.transmittance);
+        }
+    }
+    print_message("%s: %d runs, off by at most %.3f levels\n", what, times, most);
+    free(s->spheres);
+    return times;
+}
+
+static const enum spl_soft_model dense[] = {SPL_SOFT_MODEL_BASE, SPL_SOFT_MODEL_CONCENTRIC};
+
+static void crowds_match(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 2; m++) {
+        struct scene none = make_scene(dense[m], 0.5, 0), one = make_scene(dense[m], 0.3, 1);
+        matches(&none, "nothing");
+        matches(&one, "one");
+        for (double opacity = 0.01; opacity <= 1; opacity *= 10) {
+            struct scene s = make_scene(dense[m], opacity, 150);
+            matches(&s, spl_soft_model_name(dense[m]));
+        }
+    }
+}
+
+static void walls_cut(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 2; m++) {
+        struct scene s = make_scene(dense[m], 0.3, 100);
+        for (int i = 0; i < width * height; i++)
+            s.solid[i] = (float)between(0.5, 8);
+        matches(&s, "walls");
+    }
+}
+
+static void eyes_within_and_equal_depths(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 2; m++) {
+        struct scene s = make_scene(dense[m], 0.3, 60);
+        for (size_t i = 0; i < s.count; i += 3)
+            s.spheres[i].radius = (double)(float)(1.5 * s.spheres[i].center[2]);
+        for (size_t i = 1; i < s.count; i += 3)
+            s.spheres[i].center[2] = 3;
+        for (size_t i = 2; i < s.count; i += 6)
+            s.spheres[i].center[2] *= 0.05;
+        matches(&s, "around the eye");
+    }
+}
+
+static void borders_match(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 2; m++) {
+        struct scene s = make_scene(dense[m], 0.2, 60);
+        s.border = true;
+        for (size_t i = 0; i < s.count; i++)
+            s.spheres[i].soft = (double)(i % 5 * 63) / 254;
+        for (size_t i = 0; i < s.count; i += 5)
+            s.spheres[i].soft = 1;
+        matches(&s, "border");
+    }
+}
+
+/* So many that overlap that the walk is left and taken up again. */
+static void long_walks_go_on(void **state)
+{
+    (void)state;
+    struct scene s = make_scene(SPL_SOFT_MODEL_BASE, 0.002, 600);
+    for (size_t i = 0; i < s.count; i++)
+        s.spheres[i].center[0] *= 0.1, s.spheres[i].center[1] *= 0.1;
+    assert_true(matches(&s, "long walk") > 1);
+}
+
+static void layers_match(void **state)
+{
+    (void)state;
+    struct scene s = make_scene(SPL_SOFT_MODEL_LAYER, 0.4, 300);
+    for (int i = 0; i < width * height; i += 3)
+        s.solid[i] = (float)between(1, 8);
+    assert_int_equal(matches(&s, "layer"), 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(crowds_match),  cmocka_unit_test(walls_cut),        cmocka_unit_test(eyes_within_and_equal_depths),
+        cmocka_unit_test(borders_match), cmocka_unit_test(long_walks_go_on), cmocka_unit_test(layers_match),
+    };
+    return cmocka_run_group_tests(tests, open_all, close_all);
+}
