@@ -35,6 +35,7 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
     rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
         renderer->work_at_once = spl_gpu_get_device(renderer->gpu)->software ? software_work : gpu_work;
+        renderer->work_a_step = renderer->work_at_once;
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
     }
     if (!rc) {
@@ -176,6 +177,11 @@ uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer)
 void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work)
 {
     renderer->work_at_once = work;
+}
+
+void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
+{
+    renderer->work_a_step = work;
 }
 
 void spl_renderer_inject_loss(struct spl_renderer *renderer)

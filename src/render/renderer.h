@@ -50,6 +50,7 @@ struct spl_renderer {
     struct spl_kernels kernels;
     struct spl_draw_list list; /* reused from tile to tile */
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
+    uint64_t work_a_step;      /* that a step of a frame has, unless its piece is a few pixels; see work.c */
 };
 
 /* One tile being recorded. */
@@ -93,6 +94,12 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
  * with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody waits for
  * the tile any more. */
 int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err);
+
+/* work.c: upper bounds of work, known from the draw list: of the tile, drawn for so many groups of layers; of textures
+ * of `entries` runs that are summed; of cells of maps. */
+uint64_t spl_tile_count_work(const struct spl_tile *tile, uint32_t groups);
+uint64_t spl_tile_get_sum_work(const struct spl_tile *tile, uint32_t planes, uint32_t entries);
+uint64_t spl_tile_get_map_work(uint32_t cells);
 
 /* Cuts the draw list's batches into rounds and takes their parameters, before anything else of the tile takes some.
  * SPL_E_LIMIT. */

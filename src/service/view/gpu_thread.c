@@ -1,7 +1,7 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
- * It renders a tile at a time and then asks again whose turn it is (turns.h), so a view of many tiles is interrupted by
- * others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
+ * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so a
+ * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
  * have had alone. Frames of tours have the turns that nobody wants.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
@@ -23,6 +23,8 @@
 
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S, aside_window_ns = 600 * SPL_NS_PER_S;
 static const uint64_t behind_turn_ns = 10 * SPL_NS_PER_S;
+static const uint64_t small_turn_ns = 250 * SPL_NS_PER_MS; // a small view of several pieces has so long at first
+static const uint64_t slow_ns = 1000;                        // a sample: several times what views take
 static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
@@ -211,13 +213,22 @@ static void complete(struct gpu *gpu, struct spl_job *job)
         spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
 }
 
+/* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
+ * what is large. */
+static uint64_t count_left(const struct spl_job *job)
+{
+    uint64_t left = spl_frame_get_samples_left(job->steps), drawn = job->samples > left ? job->samples - left : 0;
+    uint64_t slow = drawn ? job->frame_ns / drawn / slow_ns : 0;
+    return slow > 1 ? (left < UINT64_MAX / slow ? left * slow : UINT64_MAX) : left;
+}
+
 /* The job waits for its next turn, or for pages first, where it waited before or, if it was small, among the large
  * ones. */
 static void put_aside(struct gpu *gpu, struct spl_job *job)
 {
     job->waits = spl_frame_is_waiting(job->steps);
     job->paused_ns = spl_now_ns();
-    job->samples_left = spl_frame_get_samples_left(job->steps);
+    job->samples_left = count_left(job);
     if (!job->behind && !job->in_turns)
         spl_turns_add(&gpu->turns, job);
 }
@@ -230,7 +241,14 @@ static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
     return job->behind && end < deadline ? end : deadline;
 }
 
-/* Renders a tile of one job and passes it on after the last; false when the thread must end. */
+/* A small view that is in pieces goes on without a turn between, unless it takes long. */
+static bool goes_on(const struct spl_job *job, uint64_t since)
+{
+    return !job->large && !job->behind && !job->in_turns && !spl_frame_is_waiting(job->steps) &&
+           spl_now_ns() - since < small_turn_ns;
+}
+
+/* Renders a tile of one job, or a piece of it, and passes it on after the last; false when the thread must end. */
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -246,7 +264,9 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     if (!rc && !job->steps)
         rc = begin(gpu, job);
     if (!rc)
-        rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
+        do
+            rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
+        while (!rc && more && goes_on(job, clock));
     uint64_t took = spl_now_ns() - clock;
     job->frame_ns += took;
     spl_pipeline_touch(pipeline);
