@@ -184,6 +184,11 @@ void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
     renderer->work_a_step = work;
 }
 
+const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer)
+{
+    return renderer->residency.lost_by;
+}
+
 void spl_renderer_inject_loss(struct spl_renderer *renderer)
 {
     spl_gpu_inject_loss(renderer->gpu);

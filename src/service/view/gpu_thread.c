@@ -5,7 +5,7 @@
  * have had alone. Frames of tours have the turns that nobody wants.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames it is lost twice within
+ * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames or pages it is lost twice within
  * `aside_window_ns` is put aside, where there are others. More than SPL_GPU_REBUILDS_MAX losses within
  * `rebuild_window_ns` that are not explained by this end the process, for its supervisor to decide.
  *
@@ -95,21 +95,44 @@ static bool may_rebuild(struct gpu *gpu)
     return allowed;
 }
 
-/* The device was lost in a frame of `entry`, to which the caller has a reference. The second time the dataset is the
- * fault, and its losses do not count against the device. */
-static void blame(struct gpu *gpu, struct spl_catalog_entry *entry)
+/* The device was lost for `entry`, to which the caller has a reference, or which is loading. The second time the dataset
+ * is the fault, and its losses do not count against the device. */
+static void blame_entry(struct gpu *gpu, struct spl_catalog_entry *entry)
 {
     uint64_t now = spl_now_ns(), before = entry->lost_ns;
     entry->lost_ns = now;
     if (entry->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, entry))
         return;
-    entry->aside = true;
-    entry->err = (struct spl_error){0};
-    spl_fail(&entry->err, SPL_E_DEVICE_LOST,
-             "the device was lost twice within %d minutes while the dataset was drawn; a changed file is tried again",
+    struct spl_error why = {0};
+    spl_fail(&why, SPL_E_DEVICE_LOST,
+             "the device was lost twice within %d minutes while the dataset was drawn or loaded; a changed file is tried "
+             "again",
              (int)(aside_window_ns / (60 * SPL_NS_PER_S)));
     gpu->losses = 0;
+    if (entry->loading) {
+        spl_gpu_refuse(gpu, entry, &why);
+        return;
+    }
+    entry->aside = true;
+    entry->err = why;
     spl_pipeline_report_change(gpu->pipeline, spl_catalog_entry_ref(entry), SPL_ENTRY_ASIDE);
+}
+
+/* Finds who the device was lost for: the dataset of the page that was on its way to it, whoever's turn it was, else that
+ * of the frame, `drawn`, which may be NULL. */
+static void blame(struct gpu *gpu, struct spl_catalog_entry *drawn)
+{
+    const struct spl_dataset *dataset = gpu->renderer ? spl_renderer_get_lost_dataset(gpu->renderer) : NULL;
+    struct spl_catalog_entry *entry, *held = NULL;
+    if (!dataset && drawn)
+        blame_entry(gpu, drawn);
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    if (dataset && entry->dataset == dataset)
+        break;
+    if (!entry || (!entry->loading && !(held = spl_catalog_entry_try_ref(entry)))) // nobody's, or it is about to go
+        return;
+    blame_entry(gpu, entry);
+    spl_catalog_entry_unref(held);
 }
 
 /* Makes a new renderer after a loss; false when the process had better end. */
@@ -132,6 +155,7 @@ static bool recover(struct gpu *gpu, const struct spl_error *why)
         err = (struct spl_error){0};
         if (!spl_gpu_build(gpu, &err))
             break;
+        blame(gpu, NULL);
     }
     spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
     set_state(gpu->pipeline, SPL_PIPELINE_READY);
@@ -273,7 +297,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     struct spl_error err = job->err;
     if (rc) {
         bool lost = err.code == SPL_E_DEVICE_LOST && !(job->entry && job->entry->aside);
-        if (lost && job->entry)
+        if (lost)
             blame(gpu, job->entry);
         leave(gpu, job);
         return !lost || recover(gpu, &err);
@@ -356,12 +380,19 @@ static bool wait_for_pages(struct gpu *gpu)
     return true;
 }
 
+/* After a loss in no frame. */
+static bool reopen(struct gpu *gpu, const struct spl_error *why)
+{
+    blame(gpu, NULL);
+    return recover(gpu, why);
+}
+
 static void run(struct gpu *gpu)
 {
     for (;;) {
         struct spl_error err = {0};
         spl_gpu_take_orders(gpu);
-        if (spl_gpu_upload(gpu, &err) && !recover(gpu, &err))
+        if (spl_gpu_upload(gpu, &err) && !reopen(gpu, &err))
             break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
@@ -373,7 +404,7 @@ static void run(struct gpu *gpu)
         }
         if (job && !serve(gpu, job))
             break;
-        if (loading && spl_gpu_load_page(gpu, loading, &err) && !recover(gpu, &err))
+        if (loading && spl_gpu_load_page(gpu, loading, &err) && !reopen(gpu, &err))
             break;
     }
 }
