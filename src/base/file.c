@@ -7,10 +7,13 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <glob.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 int spl_write_all(int fd, const void *bytes, size_t length)
@@ -48,6 +51,70 @@ int spl_file_sync_folder(const char *path)
     return rc;
 }
 
+/* A number as it is printed; where it ends, or NULL. */
+static const char *skip_number(const char *text)
+{
+    size_t digits = strspn(text, "0123456789");
+    return digits && (digits == 1 || *text != '0') ? text + digits : NULL;
+}
+
+/* PID-N, and no date of somebody's copy. */
+static bool is_of_a_writer(const char *end)
+{
+    const char *dash = skip_number(end), *after = dash && *dash == '-' ? skip_number(dash + 1) : NULL;
+    return after && !*after;
+}
+
+static void sweep(const char *begin, const char *end, bool (*is_left)(const char *))
+{
+    char pattern[4096];
+    glob_t found = {0};
+    size_t used = 0;
+    if (strlen(begin) > (sizeof pattern - 32) / 2)
+        return;
+    for (const char *c = begin; *c; c++) {
+        if (strchr("*?[\\", *c))
+            pattern[used++] = '\\';
+        pattern[used++] = *c;
+    }
+    snprintf(pattern + used, sizeof pattern - used, "%s", end);
+    if (!glob(pattern, GLOB_NOSORT, NULL, &found))
+        for (size_t i = 0; i < found.gl_pathc; i++) {
+            if (is_left && !is_left(found.gl_pathv[i] + strlen(begin)))
+                continue;
+            int fd = open(found.gl_pathv[i], O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+            if (fd >= 0 && !flock(fd, LOCK_EX | LOCK_NB))
+                unlink(found.gl_pathv[i]);
+            if (fd >= 0)
+                close(fd);
+        }
+    globfree(&found);
+}
+
+void spl_file_sweep(const char *begin, const char *end)
+{
+    sweep(begin, end, NULL);
+}
+
+void spl_file_sweep_beside(const char *path)
+{
+    char *begin;
+    int folder = folder_length(path);
+    if (asprintf(&begin, "%.*s.%s.", folder, path, path + folder) < 0)
+        return;
+    sweep(begin, "[0-9]*-[0-9]*", is_of_a_writer);
+    free(begin);
+}
+
+/* Says that the new file is in use; false where another's sweep came before. File systems without locks are not swept
+ * either. */
+static bool lock(int fd)
+{
+    struct stat status;
+    flock(fd, LOCK_EX | LOCK_NB);
+    return fstat(fd, &status) || status.st_nlink;
+}
+
 /* Opens a file of its own beside `path`; its name, owned by the caller, goes to *beside. -1 with errno. */
 static int open_beside(const char *path, char **beside)
 {
@@ -61,10 +128,14 @@ static int open_beside(const char *path, char **beside)
             return -1;
         }
         int fd = open(*beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (fd >= 0)
+        if (fd >= 0 && lock(fd))
             return fd;
         free(*beside);
         *beside = NULL;
+        if (fd >= 0) {
+            close(fd);
+            continue;
+        }
         if (errno != EEXIST) /* left by a process of the same number that was killed: the next number */
             return -1;
     }

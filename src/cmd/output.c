@@ -19,8 +19,10 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
         return spl_write_all(STDOUT_FILENO, bytes, length) ? spl_fail_errno(err, errno, "cannot write 'stdout'")
                                                            : SPL_OK;
     struct stat status;
-    if (stat(path, &status) || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode))
+    if (stat(path, &status) || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)) {
+        spl_file_sweep_beside(path);
         return spl_file_replace(path, bytes, length, err);
+    }
     int fd = open(path, O_WRONLY | O_CLOEXEC);
     if (fd < 0)
         return spl_fail_errno(err, errno, "cannot write '%s'", path);

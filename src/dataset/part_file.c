@@ -4,7 +4,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,30 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* Removes what killed processes left of `path`: part files that nobody holds a lock on. */
-static void sweep(const char *path)
-{
-    char pattern[4096];
-    glob_t found = {0};
-    size_t used = 0;
-    if (strlen(path) > (sizeof pattern - 16) / 2)
-        return;
-    for (const char *c = path; *c; c++) {
-        if (strchr("*?[\\", *c))
-            pattern[used++] = '\\';
-        pattern[used++] = *c;
-    }
-    snprintf(pattern + used, sizeof pattern - used, ".part-[0-9]*");
-    if (!glob(pattern, GLOB_NOSORT, NULL, &found))
-        for (size_t i = 0; i < found.gl_pathc; i++) {
-            int fd = open(found.gl_pathv[i], O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-            if (fd >= 0 && !flock(fd, LOCK_EX | LOCK_NB))
-                unlink(found.gl_pathv[i]);
-            if (fd >= 0)
-                close(fd);
-        }
-    globfree(&found);
-}
+#include "base/file.h"
 
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err)
 {
@@ -46,7 +22,7 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
         spl_fail(err, rc, "out of memory for the name of %s", path);
         goto failed;
     }
-    sweep(path);
+    spl_file_sweep(path, ".part-[0-9]*");
     for (;;) { /* again where another's sweep came before our lock */
         struct stat st;
         file->fd = open(file->part_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);

@@ -2,6 +2,7 @@
  * where the next row begins, so each node but the root is exactly one node's child, whose number is larger than its
  * parent's; each chunk is one node's; every stream lies in its page; and every code decodes to finite numbers. Any walk
  * of the tree ends, and the renderer and the shaders check nothing. Linear in nodes and chunks. Any thread. */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 
@@ -54,6 +55,7 @@ const char *spl_node_judge_child(const struct spl_node *parent, const struct spl
         return "is larger than half its parent";
     for (int a = 0; a < 3; a++) {
         double low = child->origin[a] - parent->origin[a];
+        slack = fmax(slack, 2 * DBL_EPSILON * fabs(parent->origin[a])); /* far away an origin is rounded by as much */
         if (low < -slack || low + child->size > parent->size + slack)
             return "lies outside its parent's cube";
     }

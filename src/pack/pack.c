@@ -94,6 +94,7 @@ static int write_drawing(const struct spl_pack_options *options, const struct sp
 {
     struct spl_error why = {0};
     const char *path = options->export_primitives;
+    spl_file_sweep_beside(path);
     int rc = spl_file_replace(path, out->drawing, out->drawing_length, &why);
     if (!rc && spl_file_sync_folder(path))
         rc = spl_fail_errno(&why, errno, "cannot bring '%s' to disk", path);

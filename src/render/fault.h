@@ -1,4 +1,4 @@
-/* Faults on demand, for tests of whoever renders. */
+/* Faults: on demand, for tests of whoever renders, and whose they were. */
 #ifndef SPL_RENDER_FAULT_H
 #define SPL_RENDER_FAULT_H
 
@@ -7,10 +7,16 @@
 /* The next submit reports a lost device. */
 void spl_renderer_inject_loss(struct spl_renderer *renderer);
 
+/* The dataset in whose page, on its way to the device, that was lost; NULL: in none. To be compared: it may have gone
+ * since. */
+const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer);
+
 /* How much work the device is given at a time (render/draw_list.h). */
 void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work);
 
 /* How many soft spheres are held at once (render/soft/pass.h); 0 = as memory has room. */
 void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items);
+/* How much a step of a frame has, before its tile is cut. */
+void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work);
 
 #endif

@@ -123,6 +123,16 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
+/* A piece has the weight of its tile, so that bytes are the same as of the tile in one, where both saw all that there
+ * is to draw; where something stood in, the piece may have more on a sample than was counted of the tile. */
+static uint32_t choose_weight(const struct spl_frame_job *job, const struct spl_draw_list *list)
+{
+    const uint32_t own = spl_occupancy_weight(list->sample_splats, list->sample_panels), tile = job->whole.weight_max;
+    if (!tile)
+        return own;
+    return (job->whole.complete && list->complete) || tile < own ? tile : own;
+}
+
 static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = job->renderer;
@@ -137,12 +147,33 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
         return waits;
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    tile->params.weight_max = spl_occupancy_weight(r->list.sample_splats, r->list.sample_panels);
+    tile->params.weight_max = choose_weight(job, &r->list);
     if (!tile->params.weight_max && method->sums)
         return spl_fail_field(err, SPL_E_LIMIT, "lod",
                               "at lod %g up to %llu splats would blend in one pixel; raise lod", job->view->lod,
                               (unsigned long long)(r->list.sample_splats + r->list.sample_panels));
     return SPL_OK;
+}
+
+/* As long as most of what is drawn is the tile's own, and not what lies around it. */
+static bool may_cut(const struct spl_tile *tile)
+{
+    uint64_t side = (uint64_t)tile->view->supersample, pixels = (uint64_t)tile->width * tile->height;
+    return pixels > 1 && 2 * pixels * side * side >= tile->samples;
+}
+
+/* Too much for a step; then the tile is known for its pieces. */
+static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
+{
+    uint32_t groups = 0;
+    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+        groups |= tile->view->layers >> layer & 1 ? 1u << group_of_layer[layer] : 0;
+    if (!may_cut(tile) ||
+        spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups)) <= job->renderer->work_a_step)
+        return false;
+    if (!job->whole.weight_max)
+        job->whole = (struct spl_frame_whole){tile->params.weight_max, job->renderer->list.complete};
+    return true;
 }
 
 /* Selects and uploads. Pages are taken while selecting; where they leave the draw list no room, it takes that of some,
@@ -157,6 +188,8 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         stats->select_ms += spl_since_ms(&clock);
         if (rc)
             return rc;
+        if (is_too_much(job, tile))
+            return SPL_FRAME_TOO_MUCH;
         struct spl_error why = {0};
         rc = spl_soft_prepare(r, &tile->camera, &why);
         rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
@@ -292,6 +325,5 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     stats->nodes_drawn += r->list.nodes;
     stats->complete &= r->list.complete;
     stats->pending |= r->residency.later;
-    stats->tiles++;
     return SPL_OK;
 }

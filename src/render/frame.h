@@ -9,6 +9,12 @@
 #include "render/renderer.h"
 #include "render/tiling.h"
 
+/* What is known of a tile that is too much work, for its pieces. */
+struct spl_frame_whole {
+    uint32_t weight_max; /* of its sums; 0 = nothing: what is drawn is a tile itself */
+    bool complete;       /* its draw list was */
+};
+
 struct spl_frame_job {
     struct spl_renderer *renderer;
     struct spl_resident_dataset *resident; /* valid until a dataset is added or removed: looked up for each tile */
@@ -19,6 +25,7 @@ struct spl_frame_job {
     const atomic_bool *cancelled;  // may be NULL
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
+    struct spl_frame_whole whole;
 };
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
@@ -34,8 +41,10 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
 int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err);
 
 /* Renders `tile` into the job's images, which it makes, and adds to its stats. Blocks until it is done;
- * SPL_SLOT_PENDING where it has pages to wait for, and nothing was drawn; SPL_E_TIMEOUT where the view's deadline had
- * passed before. */
+ * SPL_SLOT_PENDING where it has pages to wait for, and nothing was drawn; SPL_FRAME_TOO_MUCH where it is too much work
+ * for a step and may be cut, and nothing was drawn: job->whole is set, and its pieces are to be drawn.
+ * SPL_E_TIMEOUT where the view's deadline had passed before. */
+enum { SPL_FRAME_TOO_MUCH = SPL_SLOT_PENDING + 1 };
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
 
 /* Milliseconds since *from, which becomes now. */

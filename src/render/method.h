@@ -31,6 +31,8 @@ struct spl_method_row {
     int (*prepare)(struct spl_frame_job *job, struct spl_error *err);
     /* Fills in its own parameters of a tile; may be NULL. */
     void (*place)(struct spl_tile *tile);
+    /* What a tile is beside its draw list, in the units of draw_list.h; may be NULL. */
+    uint64_t (*count_work)(const struct spl_tile *tile);
     /* Records everything from the scratch to what resolve reads, once for each group of layers that the view has: those
      * with the same SPL_SUMS_*. `first` is true for the tile's first group. */
     int (*record)(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err);

@@ -35,6 +35,7 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
     rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
         renderer->work_at_once = spl_gpu_get_device(renderer->gpu)->software ? software_work : gpu_work;
+        renderer->work_a_step = renderer->work_at_once;
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
     }
     if (!rc) {
@@ -181,6 +182,16 @@ void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work)
 void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items)
 {
     renderer->soft_items_most = items;
+}
+
+void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
+{
+    renderer->work_a_step = work;
+}
+
+const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer)
+{
+    return renderer->residency.lost_by;
 }
 
 void spl_renderer_inject_loss(struct spl_renderer *renderer)

@@ -56,6 +56,7 @@ struct spl_renderer {
     struct spl_draw_list list; /* reused from tile to tile */
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
     uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
+    uint64_t work_a_step;      /* that a step of a frame has, unless its piece is a few pixels; see work.c */
 };
 
 /* One tile being recorded. */
@@ -113,6 +114,12 @@ int spl_tile_run(struct spl_tile *tile, struct spl_error *err);
 /* Takes parameters for dispatches to bind. SPL_E_LIMIT. */
 int spl_tile_put_params(struct spl_tile *tile, const struct spl_frame_params *params, struct spl_gpu_binding *binding,
                         struct spl_error *err);
+
+/* work.c: upper bounds of work, known from the draw list: of the tile, drawn for so many groups of layers; of textures
+ * of `entries` runs that are summed; of cells of maps. */
+uint64_t spl_tile_count_work(const struct spl_tile *tile, uint32_t groups);
+uint64_t spl_tile_get_sum_work(const struct spl_tile *tile, uint32_t planes, uint32_t entries);
+uint64_t spl_tile_get_map_work(uint32_t cells);
 
 /* Cuts the draw list's batches into rounds and takes their parameters, before anything else of the tile takes some.
  * SPL_E_LIMIT. */

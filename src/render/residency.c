@@ -268,6 +268,8 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
         }
         struct spl_error why = {0};
         if ((rc = fill(residency, page, read, &why))) {
+            if (rc == SPL_E_DEVICE_LOST && !residency->lost_by)
+                residency->lost_by = read->what.source;
             spl_residency_drop_slot(residency, page);
             if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
                 return spl_fail(err, rc, "%s", why.message);

@@ -88,6 +88,7 @@ struct spl_residency {
     uint64_t releases;              /* of what was held, so far */
     uint32_t failures;              /* slots whose read has failed and that nobody has asked for since */
     uint64_t pages_loaded, pages_evicted; /* since init */
+    const struct spl_dataset *lost_by; /* in whose page the device was lost; compared, not looked at; NULL = in none */
 
     /* The walk under way. */
     uint64_t frame;          /* what it has asked for is not evicted */

@@ -1,8 +1,8 @@
-/* A frame from its first tile to its last, one tile a step.
+/* A frame from its first tile to its last, one tile a step, or a piece of one that is too much work for a step.
  *
- * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the place of the
- * next tile and the fill plan, which is the whole image's, are all on the host. So frames may take turns, and a tile
- * is the same whatever was drawn before it. Images are made when there is a tile to put into them: one that waits for
+ * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of the
+ * next tile and of the pieces of this one, and the fill plan, which is the whole image's, are all on the host. So frames
+ * may take turns, and a tile is the same whatever was drawn before it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for
  * its first pages has none. Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +31,8 @@ struct spl_frame_steps {
     struct spl_frame frame;       /* of `view` */
     struct spl_frame enlarged;    /* of `wanted`, where it has less than a sample a pixel */
     struct spl_frame_job job;
-    uint32_t x, y; /* corner of the next tile; y = height: all are there */
+    uint32_t x, y; /* corner of the tile; y = height: all are there */
+    struct spl_pieces pieces; /* of it that are to be drawn; none: it was not begun */
     uint32_t row;  /* of `enlarged`, the next */
     uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
     bool prepared; /* its plan is made, for which it may have waited */
@@ -185,6 +186,24 @@ void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel
     steps->job.cancelled = spl_cancel_get_flag(cancel);
 }
 
+/* Draws the next piece; what is too much is cut until it is not. */
+static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    struct spl_frame_job *job = &steps->job;
+    for (;;) {
+        struct spl_tile tile = {.renderer = job->renderer,
+                                .resident = job->resident,
+                                .view = &steps->view,
+                                .cancelled = job->cancelled};
+        spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
+        int rc = spl_frame_render_tile(job, &tile, err);
+        if (rc != SPL_FRAME_TOO_MUCH)
+            return rc;
+        bool cut = spl_pieces_cut(&steps->pieces);
+        spl_assert(cut); // a pixel is never too much
+    }
+}
+
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
 {
     const struct spl_camera *camera = &steps->view.camera;
@@ -192,18 +211,22 @@ static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = find_resident(steps, err); // others may have been added or removed
     if (rc)
         return rc;
-    struct spl_tile tile = {.renderer = job->renderer,
-                            .resident = job->resident,
-                            .view = &steps->view,
-                            .cancelled = job->cancelled};
-    spl_tiling_place(&job->tiling, steps->x, steps->y, &tile);
-    if ((rc = spl_frame_render_tile(job, &tile, err)))
+    const struct spl_piece tile = spl_tiling_get_tile(&job->tiling, camera, steps->x, steps->y);
+    if (!steps->pieces.count) {
+        job->whole = (struct spl_frame_whole){0};
+        spl_pieces_begin(&steps->pieces, &tile);
+    }
+    if ((rc = draw_piece(steps, err)))
         return rc;
-    steps->x += job->tiling.width;
+    spl_pieces_remove(&steps->pieces);
+    if (steps->pieces.count)
+        return SPL_OK;
+    steps->frame.stats.tiles++;
+    steps->x += tile.width;
     if (steps->x < camera->width)
         return SPL_OK;
     steps->x = 0;
-    steps->y = camera->height - steps->y > job->tiling.height ? steps->y + job->tiling.height : camera->height;
+    steps->y += tile.height;
     return SPL_OK;
 }
 
@@ -268,8 +291,10 @@ uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
     const struct spl_camera *camera = &steps->view.camera, *wanted = &steps->wanted.camera;
     uint64_t side = (uint64_t)steps->view.supersample, rows = camera->height - steps->y;
     uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
+    const struct spl_piece tile = spl_tiling_get_tile(&steps->job.tiling, camera, steps->x, steps->y);
+    uint64_t pieces = steps->pieces.count ? (uint64_t)tile.width * tile.height - steps->pieces.pixels : 0; /* drawn */
     uint64_t enlarged = steps->wanted.supersample < 1 ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
-    return (camera->width * rows - steps->x * drawn) * side * side + enlarged;
+    return (camera->width * rows - steps->x * drawn - pieces) * side * side + enlarged;
 }
 
 void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)

@@ -140,13 +140,6 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
     return SPL_OK;
 }
 
-/* A texel that an atom is added to costs an eighth of a sample that is looked at. */
-static uint64_t sum_work(const struct spl_tile *tile, const struct spl_dispatch *what, uint32_t entries)
-{
-    const uint64_t size = tile->params.texture_size;
-    return entries * SPL_RUN_SPLATS * size * size * what->planes / 8;
-}
-
 /* Sums the textures of as many entries, for the dispatch behind to read. */
 static void dispatch_sums(const struct spl_tile *tile, struct spl_gpu_kernel *kernel,
                           const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t entries)
@@ -192,7 +185,8 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             params.first_entry = batch->first_entry + done;
             params.entries = left < batch->round_entries ? left : batch->round_entries;
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
-            if (what->sum && (rc = spl_tile_add_work(tile, sum_work(tile, what, params.entries), err)))
+            uint64_t sums = what->sum ? spl_tile_get_sum_work(tile, what->planes, params.entries) : 0;
+            if (what->sum && (rc = spl_tile_add_work(tile, sums, err)))
                 break;
             if (what->sum)
                 dispatch_sums(tile, what->sum, bindings, params.entries);

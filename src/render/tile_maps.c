@@ -4,9 +4,6 @@
 #include "render/renderer.h"
 #include "render/slot.h"
 
-/* A sample of a map, of the units of draw_list.h. */
-enum { sample_work = 128 };
-
 /* View space to the station's frame, in doubles: both may lie far from the origin. */
 static void set_pose(const struct spl_camera *camera, const struct spl_map_row *row, float pose[12])
 {
@@ -60,7 +57,7 @@ int spl_tile_dispatch_maps(struct spl_tile *tile, struct spl_error *err)
             struct spl_frame_params params = tile->params;
             params.first_entry = map->first_entry + done;
             params.entries = map->cells - done < most ? map->cells - done : most;
-            rc = spl_tile_add_work(tile, (uint64_t)params.entries * SPL_WORKGROUP * sample_work, err);
+            rc = spl_tile_add_work(tile, spl_tile_get_map_work(params.entries), err);
             rc = rc ? rc
                     : spl_tile_dispatch_items(tile, &(struct spl_kernel_key){"map", bent, {bent}}, &params,
                                               params.entries * SPL_WORKGROUP, err);

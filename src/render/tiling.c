@@ -91,14 +91,24 @@ static void set_params(struct spl_tile *tile)
             tile->params.rotation[4 * row + column] = (float)camera->rotation[3 * row + column];
 }
 
-void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, struct spl_tile *tile)
+struct spl_piece spl_tiling_get_tile(const struct spl_tiling *tiling, const struct spl_camera *whole, uint32_t x,
+                                     uint32_t y)
+{
+    uint32_t width = whole->width - x, height = whole->height - y;
+    return (struct spl_piece){.x = x,
+                              .y = y,
+                              .width = width < tiling->width ? width : tiling->width,
+                              .height = height < tiling->height ? height : tiling->height};
+}
+
+void spl_tiling_place(const struct spl_tiling *tiling, const struct spl_piece *place, struct spl_tile *tile)
 {
     const struct spl_camera *whole = &tile->view->camera;
-    uint32_t side = (uint32_t)tile->view->supersample;
+    const uint32_t side = (uint32_t)tile->view->supersample, x = place->x, y = place->y;
     tile->x = x;
     tile->y = y;
-    tile->width = whole->width - x < tiling->width ? whole->width - x : tiling->width;
-    tile->height = whole->height - y < tiling->height ? whole->height - y : tiling->height;
+    tile->width = place->width;
+    tile->height = place->height;
     tile->fill = tiling->fill;
     int64_t from[2], to[2];
     widen(&tiling->reach, side, whole->width, x, x + tile->width, &from[0], &to[0]);

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "render/fill.h"
+#include "render/pieces.h"
 
 struct spl_tile;
 
@@ -29,8 +30,12 @@ void spl_tiling_get_camera(const struct spl_view *view, struct spl_camera *camer
 /* How large tiles of at most `samples` can be. SPL_E_LIMIT where what samples reach does not fit. */
 int spl_tiling_init(struct spl_tiling *tiling, const struct spl_view *view, uint64_t samples, struct spl_error *err);
 
-/* Fills in the camera, place and parameters of the tile with its corner at pixel (x, y); its renderer, dataset and view
- * are set. */
-void spl_tiling_place(const struct spl_tiling *tiling, uint32_t x, uint32_t y, struct spl_tile *tile);
+/* The tile with its corner at pixel (x, y) of the view's image. */
+struct spl_piece spl_tiling_get_tile(const struct spl_tiling *tiling, const struct spl_camera *whole, uint32_t x,
+                                     uint32_t y);
+
+/* Fills in the camera, place and parameters of the tile, or of a piece of one; its renderer, dataset and view are set.
+ */
+void spl_tiling_place(const struct spl_tiling *tiling, const struct spl_piece *place, struct spl_tile *tile);
 
 #endif

@@ -1,5 +1,6 @@
-/* Much work in a tile: it is given to the device in parts, which changes no byte, ends soon after the deadline and
- * when nobody waits for it any more, and never costs the device, whatever a file makes it draw. One body for every
+/* Much work in a tile: it is cut into pieces, so that others come between, and given to the device in parts; neither
+ * changes a byte. It ends soon after the deadline and when nobody waits for it any more, and never costs the device,
+ * whatever a file makes it draw. One body for every
  * backend. */
 #include <pthread.h>
 #include <setjmp.h>
@@ -15,6 +16,7 @@
 #include "gpu/frames.h"
 #include "gpu/panel_scenes.h"
 #include "render/fault.h"
+#include "render/method.h"
 
 static void assert_same(const struct spl_frame *a, const struct spl_frame *b, const char *what)
 {
@@ -44,6 +46,53 @@ static void parts_change_no_byte(void **state)
         spl_frame_finish(&parts);
     }
     done(dataset);
+}
+
+static struct spl_frame render_in_steps(const struct spl_dataset *dataset, const struct spl_view *view, size_t *steps)
+{
+    struct spl_frame_steps *made;
+    struct spl_frame frame;
+    bool more = true;
+    assert_int_equal(spl_frame_begin(renderer, dataset, view, &made, NULL), SPL_OK);
+    uint64_t left = spl_frame_get_samples_left(made);
+    for (*steps = 0; more; ++*steps) {
+        assert_int_equal(spl_frame_step(made, SPL_NEVER, &more, NULL), SPL_OK);
+        while (more && spl_frame_is_waiting(made)) {
+            spl_renderer_wait(renderer, SPL_NEVER);
+            assert_int_equal(spl_frame_step(made, SPL_NEVER, &more, NULL), SPL_OK);
+        }
+        assert_true(spl_frame_get_samples_left(made) < left);
+        left = spl_frame_get_samples_left(made);
+    }
+    spl_frame_end(made, &frame);
+    return frame;
+}
+
+/* Method splat too: a piece has the weight of its tile. */
+static void pieces_change_no_byte(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_panels(4, 4000, origin, 0.02, 4);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        struct spl_view view = looking(origin, 2, 101, 75);
+        size_t steps;
+        view.method = (enum spl_method)method;
+        view.supersample = 1 + method % 2;
+        view.lod = 0;
+        view.fill.kernel = 4;
+        spl_renderer_set_work_a_step(renderer, UINT64_MAX);
+        struct spl_frame whole = render_in_steps(dataset, &view, &steps);
+        assert_int_equal(steps, 1);
+        spl_renderer_set_work_a_step(renderer, spl_method_row(view.method)->discs ? 1 << 24 : 1 << 18);
+        struct spl_frame pieces = render_in_steps(dataset, &view, &steps);
+        assert_true(steps > 3);
+        assert_same(&whole, &pieces, spl_method_name(view.method));
+        assert_int_equal(pieces.stats.tiles, 1);
+        spl_frame_finish(&whole);
+        spl_frame_finish(&pieces);
+    }
+    done(dataset);
+    spl_renderer_set_work_a_step(renderer, UINT64_MAX);
 }
 
 /* Chunks of meshes that no packer makes: panels in one place, of the finest lattice, each of whose triangles is as
@@ -89,6 +138,49 @@ static void assert_alive(const struct spl_dataset *other)
     struct spl_view view = looking(origin, 3, 64, 48);
     struct spl_frame frame = render(other, &view);
     spl_frame_finish(&frame);
+}
+
+/* Discs that all cover the whole image, one behind the other: each is work for every sample. */
+static struct spl_dataset *add_discs(size_t count)
+{
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    assert_non_null(splats);
+    for (size_t i = 0; i < count; i++)
+        splats[i] = (struct make_splat){.position = {0, 1e-4 * (double)(count - i), 0},
+                                        .normal = {0, -1, 0},
+                                        .radius = 4,
+                                        .color = {90, 160, 30}};
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    return dataset;
+}
+
+/* As the renderer is made: of what would take a minute a step is a small share, and others come between. */
+static void a_step_of_too_much_work_is_a_piece(void **state)
+{
+    (void)state;
+    struct spl_renderer_options options = {.size = sizeof options, .device = device};
+    struct spl_dataset *forged[2] = {add_forged(8), add_discs(20000)};
+    struct spl_renderer *own;
+    assert_int_equal(spl_renderer_create(&options, &own, NULL), SPL_OK);
+    const bool software = spl_renderer_get_device(own)->software;
+    for (int i = 0; i < 2; i++) {
+        struct spl_view view = i ? looking(origin, 2, 640, 360) : looking_at_forged();
+        struct spl_frame_steps *steps;
+        bool more;
+        view.layers = 1 << SPL_LAYER_COLOR;
+        assert_int_equal(spl_renderer_add(own, forged[i], NULL), SPL_OK);
+        assert_int_equal(spl_renderer_preload(own, forged[i], NULL), SPL_OK);
+        assert_int_equal(spl_frame_begin(own, forged[i], &view, &steps, NULL), SPL_OK);
+        uint64_t all = spl_frame_get_samples_left(steps);
+        assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+        uint64_t drawn = all - spl_frame_get_samples_left(steps);
+        assert_true(drawn > 0 && (!software || drawn < all / 32));
+        spl_frame_end(steps, NULL);
+        done(forged[i]);
+    }
+    spl_renderer_destroy(own);
 }
 
 static void too_much_work_ends_at_the_deadline(void **state)
@@ -182,6 +274,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(parts_change_no_byte),
+        frames_test(pieces_change_no_byte),
+        frames_test(a_step_of_too_much_work_is_a_piece),
         frames_test(too_much_work_ends_at_the_deadline),
         frames_test(work_beyond_all_bounds_is_refused),
         frames_test(too_much_work_ends_when_it_is_cancelled),

@@ -1,8 +1,8 @@
-/* make_wall [--small | --large | --textured | --mapped | --knot | --tree | --unit=UNIT] [--crs=CRS] NAME.spld…: a
+/* make_wall [--small | --large | --textured | --mapped | --knot | --tree | --heap | --unit=UNIT] [--crs=CRS] NAME.spld…: a
  * coloured wall of 40 × 40 splats (--small: its lower half; --large: 600 × 600, several MiB), two levels, in the plane
  * x = 0. --textured gives its splats up to 8 of 16 atoms, --mapped the map of a station at (2, 0, 1) that sees it in
  * other colours, striped, and through its splats from y = 0.5 on. --knot makes what once took long to open, --tree a
- * ground of several levels on many small pages. --unit= and --crs= are what the dataset says, nothing where they are
+ * ground of several levels on many small pages, --heap 20,000 discs, one behind the other, each of which covers the image. --unit= and --crs= are what the dataset says, nothing where they are
  * empty. */
 #include <math.h>
 #include <stdlib.h>
@@ -34,6 +34,16 @@ static void look(const struct make_map *map, const double d[3], double color[3],
         *range = INFINITY;
 }
 
+static void make_heap(const char *path)
+{
+    enum { discs = 20000 };
+    static struct make_splat splats[discs];
+    for (int i = 0; i < discs; i++)
+        splats[i] = (struct make_splat){
+            .position = {1e-4 * i, 0, 0}, .normal = {1, 0, 0}, .radius = 4, .color = {200, 90, 30}};
+    make_dataset_file(path, splats, discs, 1);
+}
+
 int main(int argc, char **argv)
 {
     if (argc > 1 && !strncmp(argv[1], "--unit=", 7)) {
@@ -45,6 +55,10 @@ int main(int argc, char **argv)
         argc--, argv++;
     }
     const char *kind = argc > 1 ? argv[1] : "";
+    if (!strcmp(kind, "--heap")) {
+        make_heap(argv[2]);
+        return 0;
+    }
     int small = !strcmp(kind, "--small"), textured = !strcmp(kind, "--textured"), large = !strcmp(kind, "--large");
     int side = large ? side_large : side_usual;
     struct make_splat *splats = calloc((size_t)side * (size_t)side, sizeof *splats);

@@ -3,8 +3,10 @@ small ones are served between their tiles, while the large ones go on too."""
 import os
 import re
 import socket
+import subprocess
 import tempfile
 import threading
+import time
 
 from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, run, together
 
@@ -37,6 +39,25 @@ def test_small_views_go_between_the_tiles_of_large_ones():
             assert d.ask(fresh(SMALL)).status == 200
         assert len(replies) < 4, "small views waited for all the large ones"
         finish_large(replies, threads)
+
+
+def test_a_small_view_of_much_work_holds_up_no_other():
+    """What a forged dataset makes of it would take the device for minutes; it ends at its own deadline."""
+    with tempfile.TemporaryDirectory(prefix="splatd-heap-") as home:
+        heap = os.path.join(home, "heap.spld")
+        subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--heap", heap], check=True)
+        with Daemon(REAL, "--deadline", "15000", datasets=[os.environ["SPLATD_WALL"], heap]) as d:
+            assert d.ask(fresh(SMALL)).status == 200
+            begun = time.monotonic()
+            path = "/v1/datasets/heap/view?width=640&height=360&eye=6,0,0&target=0,0,0"
+            replies, threads = begin_large(d, 2, path)
+            for _ in range(3):
+                assert d.ask(fresh(SMALL)).status == 200
+            # on a machine of which others have most; 15 s each would be those of the two
+            assert not replies and time.monotonic() - begun < 14, "small views waited for what is much work"
+            for thread in threads:
+                thread.join()
+            assert {reply.status for reply in replies} <= {503, 504}, replies
 
 
 def test_large_views_do_not_fill_the_queue_of_small_ones():

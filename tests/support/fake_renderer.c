@@ -3,8 +3,8 @@
  * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
  * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
  * takes to put them on the device, and FAKE_HANG_MS that the first frame
- * ignores its deadline for, as a hanging driver does. TSan sees all of it, which it cannot with a driver that compiles
- * its own code. */
+ * ignores its deadline for, as a hanging driver does; FAKE_LOSE_LOADING pages of one dataset in which the device is lost.
+ * TSan sees all of it, which it cannot with a driver that compiles its own code. */
 #include <splatd/render.h>
 
 #include <stdlib.h>
@@ -19,6 +19,7 @@
 struct spl_renderer {
     struct spl_device_info device;
     bool lose_next, lost, hung;
+    const struct spl_dataset *lost_by;
     long uploads;
 };
 
@@ -84,8 +85,16 @@ bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns)
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err)
 {
-    static long late;
+    static long late, losses;
+    static const struct spl_dataset *loser; /* the first that is loaded once it is set */
     *more = false;
+    if (losses < setting("FAKE_LOSE_LOADING", 0) && (!loser || loser == dataset)) {
+        losses++;
+        loser = dataset;
+        renderer->lost = true;
+        renderer->lost_by = dataset;
+        return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was lost in a page");
+    }
     if (late++ < setting("FAKE_LOAD_LATE", 0))
         return spl_fail(err, SPL_E_TIMEOUT, "no page has come for 10 s");
     *page = 1;
@@ -235,6 +244,11 @@ uint64_t spl_renderer_get_memory(const struct spl_renderer *renderer)
 {
     (void)renderer;
     return 1 << 20;
+}
+
+const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer)
+{
+    return renderer->lost_by;
 }
 
 void spl_renderer_inject_loss(struct spl_renderer *renderer)

@@ -41,6 +41,13 @@ static int prepare(struct spl_frame_job *job, struct spl_error *err)
     return check_work(job, &camera, err);
 }
 
+/* The constant operator's looks. */
+static uint64_t count_work(const struct spl_tile *tile)
+{
+    const uint64_t side = 2 * (uint64_t)tile->fill.kernel + 1;
+    return tile->view->fill.visibility == SPL_VISIBILITY_CONSTANT ? side * side * tile->samples : 0;
+}
+
 static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_error *err)
 {
     int rc = spl_points_record(tile, group, true, err);
@@ -56,6 +63,7 @@ const struct spl_method_row spl_method_fill = {
     .lines = true,
     .prepare = prepare,
     .place = spl_fill_set_params,
+    .count_work = count_work,
     .record = record,
     .resolve = SPL_RESOLVED_NEAREST,
     .guesses = {{1, 0.25, 5, 31, 22.0}, {1, 0.5, 8, 60, 23.36}, {1, 1, 8, 140, 23.7}},

@@ -60,6 +60,14 @@ struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry)
     return entry;
 }
 
+struct spl_catalog_entry *spl_catalog_entry_try_ref(struct spl_catalog_entry *entry)
+{
+    unsigned before = atomic_load(&entry->references);
+    while (before && !atomic_compare_exchange_weak(&entry->references, &before, before + 1))
+        continue;
+    return before ? entry : NULL;
+}
+
 void spl_catalog_entry_unref(struct spl_catalog_entry *entry)
 {
     if (!entry || atomic_fetch_sub(&entry->references, 1) > 1)

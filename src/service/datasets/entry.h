@@ -62,6 +62,8 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
 
 /* Only somebody who holds a reference may take another. Any thread. Returns `entry`. */
 struct spl_catalog_entry *spl_catalog_entry_ref(struct spl_catalog_entry *entry);
+/* The same for who only knows that it was not destroyed; NULL where nobody holds one any more. */
+struct spl_catalog_entry *spl_catalog_entry_try_ref(struct spl_catalog_entry *entry);
 void spl_catalog_entry_unref(struct spl_catalog_entry *entry); /* NULL-safe; any thread */
 
 /* Whatever its references say; for its last owner. NULL-safe. Unmaps, which may take a while. */

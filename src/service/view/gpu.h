@@ -41,6 +41,9 @@ struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
  * else is the entry's fault. */
 int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err);
 
+/* Gives back one that is being loaded, with the reason. */
+void spl_gpu_refuse(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why);
+
 /* Gives back what is still to be loaded when the service stops. */
 void spl_gpu_refuse_loading(struct gpu *gpu);
 

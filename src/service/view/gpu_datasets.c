@@ -119,6 +119,12 @@ static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const
     spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
 }
 
+void spl_gpu_refuse(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+{
+    let_entry_go(gpu, entry);
+    refuse_entry(gpu, entry, why);
+}
+
 /* What the device has no room for is refused at start, when nobody has asked for it yet; not in a device that is
  * reopened, where requests refer to it: there its views fail, and say why. */
 static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int rc, struct spl_error *err)
@@ -207,10 +213,8 @@ void spl_gpu_take_orders(struct gpu *gpu)
         entry->pages_wanted = 0;
         entry->loading = true;
         struct spl_error err = {0};
-        if (spl_renderer_add(gpu->renderer, entry->dataset, &err)) {
-            let_entry_go(gpu, entry);
-            refuse_entry(gpu, entry, &err);
-        }
+        if (spl_renderer_add(gpu->renderer, entry->dataset, &err))
+            spl_gpu_refuse(gpu, entry, &err);
     }
 }
 
@@ -245,8 +249,7 @@ int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct s
         return spl_fail(err, rc, "%s", why.message);
     spl_gpu_publish_residency(gpu);
     if (rc) {
-        let_entry_go(gpu, entry);
-        refuse_entry(gpu, entry, &why);
+        spl_gpu_refuse(gpu, entry, &why);
     } else if (!more) {
         entry->loading = false;
         judge_maps(gpu, entry);

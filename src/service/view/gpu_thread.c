@@ -1,11 +1,11 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
- * It renders a tile at a time and then asks again whose turn it is (turns.h), so a view of many tiles is interrupted by
- * others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
+ * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so a
+ * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
  * have had alone. Frames of tours have the turns that nobody wants.
  *
  * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames it is lost twice within
+ * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames or pages it is lost twice within
  * `aside_window_ns` is put aside, where there are others. More than SPL_GPU_REBUILDS_MAX losses within
  * `rebuild_window_ns` that are not explained by this end the process, for its supervisor to decide.
  *
@@ -23,6 +23,8 @@
 
 static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S, aside_window_ns = 600 * SPL_NS_PER_S;
 static const uint64_t behind_turn_ns = 10 * SPL_NS_PER_S;
+static const uint64_t small_turn_ns = 250 * SPL_NS_PER_MS; // a small view of several pieces has so long at first
+static const uint64_t slow_ns = 1000;                        // a sample: several times what views take
 static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
 static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
@@ -93,21 +95,44 @@ static bool may_rebuild(struct gpu *gpu)
     return allowed;
 }
 
-/* The device was lost in a frame of `entry`, to which the caller has a reference. The second time the dataset is the
- * fault, and its losses do not count against the device. */
-static void blame(struct gpu *gpu, struct spl_catalog_entry *entry)
+/* The device was lost for `entry`, to which the caller has a reference, or which is loading. The second time the dataset
+ * is the fault, and its losses do not count against the device. */
+static void blame_entry(struct gpu *gpu, struct spl_catalog_entry *entry)
 {
     uint64_t now = spl_now_ns(), before = entry->lost_ns;
     entry->lost_ns = now;
     if (entry->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, entry))
         return;
-    entry->aside = true;
-    entry->err = (struct spl_error){0};
-    spl_fail(&entry->err, SPL_E_DEVICE_LOST,
-             "the device was lost twice within %d minutes while the dataset was drawn; a changed file is tried again",
+    struct spl_error why = {0};
+    spl_fail(&why, SPL_E_DEVICE_LOST,
+             "the device was lost twice within %d minutes while the dataset was drawn or loaded; a changed file is tried "
+             "again",
              (int)(aside_window_ns / (60 * SPL_NS_PER_S)));
     gpu->losses = 0;
+    if (entry->loading) {
+        spl_gpu_refuse(gpu, entry, &why);
+        return;
+    }
+    entry->aside = true;
+    entry->err = why;
     spl_pipeline_report_change(gpu->pipeline, spl_catalog_entry_ref(entry), SPL_ENTRY_ASIDE);
+}
+
+/* Finds who the device was lost for: the dataset of the page that was on its way to it, whoever's turn it was, else that
+ * of the frame, `drawn`, which may be NULL. */
+static void blame(struct gpu *gpu, struct spl_catalog_entry *drawn)
+{
+    const struct spl_dataset *dataset = gpu->renderer ? spl_renderer_get_lost_dataset(gpu->renderer) : NULL;
+    struct spl_catalog_entry *entry, *held = NULL;
+    if (!dataset && drawn)
+        blame_entry(gpu, drawn);
+    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    if (dataset && entry->dataset == dataset)
+        break;
+    if (!entry || (!entry->loading && !(held = spl_catalog_entry_try_ref(entry)))) // nobody's, or it is about to go
+        return;
+    blame_entry(gpu, entry);
+    spl_catalog_entry_unref(held);
 }
 
 /* Makes a new renderer after a loss; false when the process had better end. */
@@ -130,6 +155,7 @@ static bool recover(struct gpu *gpu, const struct spl_error *why)
         err = (struct spl_error){0};
         if (!spl_gpu_build(gpu, &err))
             break;
+        blame(gpu, NULL);
     }
     spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
     set_state(gpu->pipeline, SPL_PIPELINE_READY);
@@ -211,13 +237,22 @@ static void complete(struct gpu *gpu, struct spl_job *job)
         spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
 }
 
+/* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
+ * what is large. */
+static uint64_t count_left(const struct spl_job *job)
+{
+    uint64_t left = spl_frame_get_samples_left(job->steps), drawn = job->samples > left ? job->samples - left : 0;
+    uint64_t slow = drawn ? job->frame_ns / drawn / slow_ns : 0;
+    return slow > 1 ? (left < UINT64_MAX / slow ? left * slow : UINT64_MAX) : left;
+}
+
 /* The job waits for its next turn, or for pages first, where it waited before or, if it was small, among the large
  * ones. */
 static void put_aside(struct gpu *gpu, struct spl_job *job)
 {
     job->waits = spl_frame_is_waiting(job->steps);
     job->paused_ns = spl_now_ns();
-    job->samples_left = spl_frame_get_samples_left(job->steps);
+    job->samples_left = count_left(job);
     if (!job->behind && !job->in_turns)
         spl_turns_add(&gpu->turns, job);
 }
@@ -230,7 +265,14 @@ static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
     return job->behind && end < deadline ? end : deadline;
 }
 
-/* Renders a tile of one job and passes it on after the last; false when the thread must end. */
+/* A small view that is in pieces goes on without a turn between, unless it takes long. */
+static bool goes_on(const struct spl_job *job, uint64_t since)
+{
+    return !job->large && !job->behind && !job->in_turns && !spl_frame_is_waiting(job->steps) &&
+           spl_now_ns() - since < small_turn_ns;
+}
+
+/* Renders a tile of one job, or a piece of it, and passes it on after the last; false when the thread must end. */
 static bool serve(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
@@ -246,14 +288,16 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     if (!rc && !job->steps)
         rc = begin(gpu, job);
     if (!rc)
-        rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
+        do
+            rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
+        while (!rc && more && goes_on(job, clock));
     uint64_t took = spl_now_ns() - clock;
     job->frame_ns += took;
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
     if (rc) {
         bool lost = err.code == SPL_E_DEVICE_LOST && !(job->entry && job->entry->aside);
-        if (lost && job->entry)
+        if (lost)
             blame(gpu, job->entry);
         leave(gpu, job);
         return !lost || recover(gpu, &err);
@@ -336,12 +380,19 @@ static bool wait_for_pages(struct gpu *gpu)
     return true;
 }
 
+/* After a loss in no frame. */
+static bool reopen(struct gpu *gpu, const struct spl_error *why)
+{
+    blame(gpu, NULL);
+    return recover(gpu, why);
+}
+
 static void run(struct gpu *gpu)
 {
     for (;;) {
         struct spl_error err = {0};
         spl_gpu_take_orders(gpu);
-        if (spl_gpu_upload(gpu, &err) && !recover(gpu, &err))
+        if (spl_gpu_upload(gpu, &err) && !reopen(gpu, &err))
             break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
@@ -353,7 +404,7 @@ static void run(struct gpu *gpu)
         }
         if (job && !serve(gpu, job))
             break;
-        if (loading && spl_gpu_load_page(gpu, loading, &err) && !recover(gpu, &err))
+        if (loading && spl_gpu_load_page(gpu, loading, &err) && !reopen(gpu, &err))
             break;
     }
 }

@@ -39,7 +39,7 @@ struct spl_job {
     bool in_turns;
     bool waits; /* for pages */
     struct spl_frame_steps *steps; // may be NULL: not begun, or done
-    uint64_t samples_left;         /* of the frame, for its turns */
+    uint64_t samples_left;         /* of the frame, for its turns; more where they take long */
     uint64_t paused_ns;            /* when its last tile was done, or its pages had come */
     struct spl_frame frame;        /* between gpu and encode */
     struct spl_frame_stats stats;

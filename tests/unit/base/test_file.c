@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -92,6 +93,30 @@ static void a_failure_leaves_what_was_there(void **state)
     assert_int_equal(errno, ENOENT);
 }
 
+/* What a writer that was killed left goes with the next sweep; what one that lives holds, and what is no writer's, stays. */
+static void what_killed_writers_left_is_swept(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"123-0", "99999-17", "123-x", "2026-11-23", "2026-01"};
+    const char *name = strrchr(path, '/') + 1;
+    char beside[5][sizeof path + 32];
+    for (int i = 0; i < 5; i++) {
+        snprintf(beside[i], sizeof beside[i], "%s/.%s.%s", folder, name, names[i]);
+        int fd = open(beside[i], O_WRONLY | O_CREAT, 0666);
+        assert_true(fd >= 0);
+        close(fd);
+    }
+    int held = open(beside[1], O_WRONLY);
+    assert_int_equal(flock(held, LOCK_EX | LOCK_NB), 0);
+    spl_file_sweep_beside(path);
+    assert_int_equal(spl_file_replace(path, "third", 5, NULL), 0);
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(access(beside[i], F_OK), i ? 0 : -1);
+    close(held);
+    for (int i = 1; i < 5; i++)
+        unlink(beside[i]);
+}
+
 static void *write_own_letter(void *letter)
 {
     char *bytes = malloc(LONG);
@@ -130,6 +155,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(replaces_as_a_whole),
         cmocka_unit_test(a_failure_leaves_what_was_there),
+        cmocka_unit_test(what_killed_writers_left_is_swept),
         cmocka_unit_test(writers_never_mix),
     };
     if (!mkdtemp(folder))

@@ -249,6 +249,17 @@ static void test_degenerate_clouds(void **state)
     write_ply(path_of("in.ply"), (const double(*)[3])position, many);
     assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, &report, &err), 0);
     check_dataset(path_of("out.spld"), (const double(*)[3])position, many, true);
+    for (double width = 1e-4; width > 1e-9; width /= 10) { // a node is narrower than its corner is rounded
+        for (size_t i = 0; i < many; i++)
+            for (int c = 0; c < 3; c++)
+                position[i][c] = 1e7 + (c < 2 ? width * uniform(&random) : 0);
+        write_ply(path_of("in.ply"), (const double(*)[3])position, many);
+        assert_int_equal(pack_file(path_of("in.ply"), path_of("out.spld"), 2, NULL, &err), 0);
+        struct spl_dataset *dataset;
+        if (spl_dataset_open(path_of("out.spld"), true, &dataset, &err))
+            fail_msg("%g wide: %s", width, err.message);
+        spl_dataset_close(dataset);
+    }
     free(position);
 }
 

@@ -524,6 +524,29 @@ static void what_costs_the_device_twice_is_put_aside(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
+/* The second time in its pages; the others are served, and the device is not given up. */
+static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
+{
+    (void)state;
+    struct spl_pipeline *pipeline = start(8);
+    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
+    spl_pipeline_add(pipeline, other);
+    assert_ptr_equal(take_change(pipeline), other);
+    const uint64_t losses = counters.device_losses;
+    setenv("FAKE_LOSE_LOADING", "10", 1);
+    spl_pipeline_add(pipeline, entry);
+    assert_ptr_equal(take_change(pipeline), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_REFUSED);
+    assert_non_null(strstr(entry->err.message, "lost twice"));
+    wait_until_ready(pipeline, losses + 2);
+    assert_int_equal(view_of(pipeline, other), 0);
+    assert_int_equal(counters.device_losses - losses, 2);
+    unsetenv("FAKE_LOSE_LOADING");
+    spl_catalog_entry_unref(entry);
+    spl_catalog_entry_unref(other);
+    spl_pipeline_destroy(pipeline);
+}
+
 static void versions_come_and_go_while_the_device_is_lost(void **state)
 {
     (void)state;
@@ -591,6 +614,7 @@ int main(void)
         cmocka_unit_test(what_was_read_is_uploaded_without_rests),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(what_costs_the_device_twice_is_put_aside),
+        cmocka_unit_test(what_costs_the_device_while_it_is_loaded_is_refused),
         cmocka_unit_test(a_view_ends_within_its_tile_when_nobody_waits),
         cmocka_unit_test(a_tile_behind_is_given_up),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
