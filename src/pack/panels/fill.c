@@ -1,6 +1,6 @@
-/* The cells of a panel, from the discs that reach into it: those whose middles a disc covers, or what lies between it and
- * its crease, and each point's own. Which cells there are can be asked alone, before what there is to know of a panel's
- * colours; where a point's own cell is in it, without looking at any disc.
+/* The cells of a panel, from the discs that reach into it: those whose middles a disc covers, or what lies between it
+ * and its crease, and each point's own. Which cells there are can be asked alone, before what there is to know of a
+ * panel's colours; where a point's own cell is in it, without looking at any disc.
  *
  * Colours are sums over discs in the order of the points, in floats: the same for any number of threads. */
 #include "pack/panels/raster_parts.h"
@@ -19,14 +19,14 @@ struct sums {
 /* A disc and the part of a panel that it may cover. */
 struct part {
     struct spl_panel_disc disc;
-    int32_t column, row;      /* of the panel's first cell */
-    int32_t low[2], high[2];  /* cells of both */
-    int32_t own[2];           /* the middle's */
-    bool plain;               /* it is round, and ends where it does by itself */
+    int32_t column, row;     /* of the panel's first cell */
+    int32_t low[2], high[2]; /* cells of both */
+    int32_t own[2];          /* the middle's */
+    bool plain;              /* it is round, and ends where it does by itself */
 };
 
-static void get_part(const struct spl_panel_raster *r, const struct spl_panel_grid *g, const struct spl_panel_touch *touch,
-                     struct part *p)
+static void get_part(const struct spl_panel_raster *r, const struct spl_panel_grid *g,
+                     const struct spl_panel_touch *touch, struct part *p)
 {
     const struct spl_panel_place *place = &r->places[touch->place];
     p->disc = spl_panel_grid_disc(g, touch->member);
@@ -55,8 +55,8 @@ static float tent(double x)
     return x < 1 && x > -1 ? (float)(1 - fabs(x)) : 0;
 }
 
-/* Adds what a disc covers. In a leaf colours are interpolated between points, which lie a spacing apart, and sharper than
- * drawing cells interpolates once more; in an inner node a cell has the mean of what lies in it. */
+/* Adds what a disc covers. In a leaf colours are interpolated between points, which lie a spacing apart, and sharper
+ * than drawing cells interpolates once more; in an inner node a cell has the mean of what lies in it. */
 static void add_disc(const struct part *p, uint32_t color, bool leaf, struct sums *s)
 {
     const struct spl_panel_disc *d = &p->disc;
