@@ -100,29 +100,3 @@ void spl_panel_fill(const struct spl_panel_raster *r, const struct spl_panel_gri
         }
     }
 }
-
-bool spl_panel_cover(const struct spl_panel_raster *r, const struct spl_panel_grid *g, size_t place,
-                     uint16_t cells[SPL_PANEL_SIDE])
-{
-    bool any = false;
-    for (int y = 0; cells && y < side; y++)
-        cells[y] = 0;
-    for (uint32_t t = spl_panel_first_touch(r, place); t < r->places[place].touches; t++) {
-        struct part p;
-        any |= r->sorted[t].own;
-        if (any && !cells)
-            return true;
-        get_part(r, g, &r->sorted[t], &p);
-        for (int32_t y = p.low[1]; y <= p.high[1]; y++)
-            for (int32_t x = p.low[0]; x <= p.high[0]; x++) {
-                double squared;
-                bool own = x == p.own[0] && y == p.own[1];
-                if (!covers(&p, x + 0.5 - p.disc.x, y + 0.5 - p.disc.y, own, &squared))
-                    continue;
-                any = true;
-                if (cells)
-                    cells[y - p.row] |= (uint16_t)(1u << (x - p.column));
-            }
-    }
-    return any;
-}

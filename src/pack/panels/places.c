@@ -15,6 +15,7 @@ void spl_panel_raster_finish(struct spl_panel_raster *r)
     free(r->touches);
     free(r->sorted);
     free(r->order);
+    free(r->filled);
     *r = (struct spl_panel_raster){0};
 }
 
@@ -134,4 +135,18 @@ static bool sort_touches(struct spl_panel_raster *r)
 bool spl_panel_places_find(struct spl_panel_raster *r, const struct spl_panel_grid *g)
 {
     return find_places(r, g) && sort_touches(r);
+}
+
+size_t spl_panel_place_find(const struct spl_panel_raster *r, int32_t column, int32_t row)
+{
+    uint64_t order = spread((uint32_t)column) | spread((uint32_t)row) << 1;
+    size_t low = 0, high = r->place_count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (r->places[middle].order < order)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < r->place_count && r->places[low].order == order ? low : SIZE_MAX;
 }

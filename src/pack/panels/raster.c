@@ -1,6 +1,7 @@
 /* Discs of a plane into cells. The panels that discs reach into are found first (a hash), then put in Morton order, so
  * that runs of them are compact chunks, then filled one by one from the discs that reach into each (fill.c): so no more
- * than one panel's sums are held at a time, however the points lie.
+ * than one panel's sums are held at a time, however the points lie. Of a group all panels are held, since slits are
+ * closed by what lies around them (slits.c).
  *
  * Cells are counted from the plane's own origin: those of one plane and one size lie on one grid in all nodes, though
  * panels, the squares of 16, begin where a node's cells do.
@@ -154,7 +155,7 @@ static bool fill_panels(struct making *m, struct spl_node_panels *out)
     for (size_t k = 0; k < m->count; k++) {
         const struct spl_panel_place *p = &r->places[m->order[k]];
         struct spl_panel_relief made;
-        spl_panel_fill(r, g, m->order[k], &m->panels[k]);
+        m->panels[k] = r->filled[m->order[k]].panel;
         m->panels[k].column = (uint8_t)(p->column - m->column);
         m->panels[k].row = (uint8_t)(p->row - m->row);
         if (g->group->plane->heights) {
@@ -209,6 +210,22 @@ static bool add_chunk(const struct spl_panel_raster *r, const struct spl_panel_g
     return true;
 }
 
+/* Fills the panels of all places. False: no memory. */
+static bool fill_places(struct spl_panel_raster *r, const struct spl_panel_grid *g)
+{
+    if (spl_array_reserve(r->filled, r->filled_capacity, r->place_count, NULL))
+        return false;
+    for (size_t i = 0; i < r->place_count; i++) {
+        struct spl_panel_filled *f = &r->filled[i];
+        spl_panel_fill(r, g, i, &f->panel);
+        memcpy(f->covered, f->panel.cells, sizeof f->covered);
+        memset(f->claimed, 0, sizeof f->claimed);
+    }
+    if (!g->group->plane->heights)
+        spl_panel_slits_close(r, g);
+    return true;
+}
+
 /* Lists the places that have cells; those with relief by their levels, which takes their meshes. False: no memory. */
 static bool list_places(struct spl_panel_raster *r, const struct spl_panel_grid *g, size_t *count)
 {
@@ -218,14 +235,14 @@ static bool list_places(struct spl_panel_raster *r, const struct spl_panel_grid 
         return false;
     for (size_t i = 0; i < r->place_count; i++) {
         struct spl_panel_place *p = &r->places[i];
-        struct spl_panel panel;
+        const struct spl_panel *panel = &r->filled[i].panel;
         struct spl_panel_relief made;
-        bool any = spl_panel_cover(r, g, i, relief ? panel.cells : NULL);
+        bool any = count_cells(panel);
         p->level = any ? 0 : no_level;
         p->low = p->high = 0;
         if (!relief || !any)
             continue;
-        spl_panel_relief_choose(g, &panel, g->first[0] + side * p->column, g->first[1] + side * p->row, &made);
+        spl_panel_relief_choose(g, panel, g->first[0] + side * p->column, g->first[1] + side * p->row, &made);
         p->level = (uint8_t)made.relief.level;
         p->low = made.low;
         p->high = made.high;
@@ -268,7 +285,7 @@ int spl_panel_raster_add(struct spl_panel_raster *r, const struct spl_panel_grou
     size_t count;
     if (!spl_panel_grid_init(&g, group))
         return SPL_E_LIMIT;
-    if (!spl_panel_places_find(r, &g) || !list_places(r, &g, &count))
+    if (!spl_panel_places_find(r, &g) || !fill_places(r, &g) || !list_places(r, &g, &count))
         return SPL_E_NOMEM;
     if (!out->chunk_count)
         for (int c = 0; c < 3; c++) {

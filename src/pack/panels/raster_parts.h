@@ -23,6 +23,13 @@ struct spl_panel_touch {
     uint32_t member;
 };
 
+/* The panel of a place. */
+struct spl_panel_filled {
+    struct spl_panel panel;
+    uint16_t covered[SPL_PANEL_SIDE];              /* its cells before slits were closed */
+    float claimed[SPL_PANEL_SIDE][SPL_PANEL_SIDE]; /* what points that lie in a cell stand for, in cells */
+};
+
 /* Where the group's cells lie. */
 struct spl_panel_grid {
     const struct spl_panel_group *group;
@@ -127,9 +134,11 @@ static inline uint32_t spl_panel_first_touch(const struct spl_panel_raster *rast
 void spl_panel_fill(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid, size_t place,
                     struct spl_panel *panel);
 
-/* Whether a cell is there in the panel of a place; with `cells`, unless NULL, which ones. */
-bool spl_panel_cover(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid, size_t place,
-                     uint16_t cells[SPL_PANEL_SIDE]);
+/* The place of a column and row of panels; SIZE_MAX: there is none. */
+size_t spl_panel_place_find(const struct spl_panel_raster *raster, int32_t column, int32_t row);
+
+/* Closes slits between scan lines in raster->filled (slits.c). */
+void spl_panel_slits_close(struct spl_panel_raster *raster, const struct spl_panel_grid *grid);
 
 /* The mesh of a panel (relief.c). */
 struct spl_panel_relief {
