@@ -1,6 +1,5 @@
 /* The cells of a panel, from the discs that reach into it: those whose middles a disc covers, or what lies between it
- * and its crease, and each point's own. Which cells there are can be asked alone, before what there is to know of a
- * panel's colours; where a point's own cell is in it, without looking at any disc.
+ * and its crease, and each point's own.
  *
  * Colours are sums over discs in the order of the points, in floats: the same for any number of threads. */
 #include "pack/panels/raster_parts.h"
