@@ -33,7 +33,8 @@ static void encode_block(const struct spl_panel *panel, const struct spl_panel_t
         spl_panel_mean_color(panel, x0, y0, 4, mean);
     for (unsigned i = 0; i < 16; i++) {
         bool own = t->level || spl_panel_has(panel, x0 + i % 4, y0 + i / 4);
-        memcpy(texels[i], own ? t->color[y0 + i / 4][x0 + i % 4] : mean, sizeof mean);
+        for (int c = 0; c < 3; c++)
+            texels[i][c] = own ? t->color[y0 + i / 4][x0 + i % 4][c] : mean[c];
     }
     spl_block_encode((const float(*)[3])texels, words);
 }
@@ -82,7 +83,9 @@ static void read_texels(const struct spl_panel_words *r, uint32_t at, unsigned l
         unsigned x = i % count, y = i / count, b = y / 4 * across + x / 4;
         uint32_t first = at + 2 * (level ? b : (unsigned)__builtin_popcount(there & ((1u << b) - 1)));
         const uint32_t words[2] = {spl_panel_word(r, first), spl_panel_word(r, first + 1)};
-        spl_block_get_color(words, y % 4 * 4 + x % 4, t->color[y][x]);
+        float color[3];
+        spl_block_get_color(words, y % 4 * 4 + x % 4, color);
+        t->color[y][x] = (spl_panel_texel){color[0], color[1], color[2], 0};
     }
 }
 
@@ -101,33 +104,38 @@ void spl_panel_colors_decode(const struct spl_panel_words *words, uint32_t at, u
         }
 }
 
-/* Mean squared difference of a block's cells' colours; 0: it has none. */
-static double measure_block(const struct spl_panel *panel, const struct spl_panel *decoded, unsigned b)
+/* Mean squared difference of the colours of a block's cells to what texels, not of level 0, show of them; 0: it has no
+ * cells. */
+static double measure_block(const struct spl_panel *panel, const struct spl_panel_texels *texels,
+                            const struct spl_panel_between between[side], unsigned b)
 {
-    double sum = 0, cells = 0;
-    for (unsigned i = 0; i < 16; i++) {
-        unsigned x = b % 4 * 4 + i % 4, y = b / 4 * 4 + i / 4;
-        for (int c = 0; spl_panel_has(panel, x, y) && c < 3; c++) {
-            double d = (double)decoded->color[y][x][c] - panel->color[y][x][c];
-            sum += d * d;
+    unsigned sum = 0, count = 0, left = b % 4 * 4;
+    for (unsigned y = b / 4 * 4; y < b / 4 * 4 + 4; y++)
+        for (unsigned cells = panel->cells[y] >> left & 15; cells; cells &= cells - 1) {
+            unsigned x = left + (unsigned)__builtin_ctz(cells);
+            spl_panel_texel color = spl_panel_texels_at(texels, &between[x], &between[y]);
+            for (int c = 0; c < 3; c++) {
+                int d = to_byte(color[c]) - panel->color[y][x][c];
+                sum += (unsigned)(d * d);
+            }
+            count++;
         }
-        cells += spl_panel_has(panel, x, y);
-    }
-    return cells > 0 ? sum / (3 * cells) : 0;
+    return count ? (double)sum / (3 * count) : 0;
 }
 
-/* How far the cells' colours are from those of `words`: the worst block's, in which a letter or a joint of mortar is as
- * large as it is small in its panel. */
-static double measure(const struct spl_panel *panel, unsigned level, uint32_t there, const uint32_t *words,
-                      uint32_t count)
+/* Whether the cells' colours are as near to those of `words` as they must be, in the worst block too, in which a letter
+ * or a joint of mortar is as large as it is small in its panel. */
+static bool is_near(const struct spl_panel *panel, unsigned level, uint32_t there, const uint32_t *words,
+                    uint32_t count, double color_error)
 {
-    struct spl_panel decoded = *panel;
     struct spl_panel_texels texels;
-    double worst = 0;
-    spl_panel_colors_decode(&(struct spl_panel_words){words, count - 1}, 0, level, there, &decoded, &texels);
+    struct spl_panel_between between[side];
+    read_texels(&(struct spl_panel_words){words, count - 1}, 0, level, there, &texels);
+    spl_panel_texels_place(texels.level, between);
     for (unsigned b = 0; b < blocks; b++)
-        worst = fmax(worst, measure_block(panel, &decoded, b));
-    return worst;
+        if (measure_block(panel, &texels, between, b) > color_error * color_error)
+            return false;
+    return true;
 }
 
 uint32_t spl_panel_colors_encode(const struct spl_panel *panel, uint32_t there, double color_error, uint32_t *words,
@@ -137,6 +145,6 @@ uint32_t spl_panel_colors_encode(const struct spl_panel *panel, uint32_t there, 
     *level = levels;
     do {
         used = encode(panel, --*level, there, words);
-    } while (*level && measure(panel, *level, there, words, used) > color_error * color_error);
+    } while (*level && !is_near(panel, *level, there, words, used, color_error));
     return used;
 }

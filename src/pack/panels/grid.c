@@ -17,7 +17,9 @@ static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *gr
         plane.normal[c] = (float)group->plane->normal[c];
     spl_panels_begin(&plane, &chunk);
     spl_panels_get_frame(&chunk, &frame);
-    *g = (struct spl_panel_grid){.group = group, .inverse = 1 / group->cell};
+    bool lines = group->leaf && (group->crease || group->points->clip);
+    *g = (struct spl_panel_grid){
+        .group = group, .inverse = 1 / group->cell, .round = !lines && !group->plane->heights};
     for (int c = 0; c < 3; c++) {
         g->u[c] = frame.u[c];
         g->v[c] = frame.v[c];
@@ -29,12 +31,6 @@ static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *gr
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void get_offset(const struct spl_panel_grid *g, size_t i, double off[3])
-{
-    for (int c = 0; c < 3; c++)
-        off[c] = g->group->points->axis[c][i] - g->group->plane->origin[c];
 }
 
 /* How a disc of that normal rises: no steeper than pieces are. */
@@ -69,41 +65,20 @@ static void end_at_crease(const struct spl_panel_grid *g, size_t i, const struct
     d->clip_offset += cut * (fabs(d->clip[0]) + fabs(d->clip[1]));
 }
 
-struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *g, uint32_t member)
+void spl_panel_grid_shape(const struct spl_panel_grid *g, size_t i, struct spl_panel_disc *d)
 {
     const struct spl_points *p = g->group->points;
-    size_t i = g->group->first + member;
-    double off[3];
-    get_offset(g, i, off);
-    struct spl_panel_disc d = {.x = dot(off, g->u) * g->inverse,
-                               .y = dot(off, g->v) * g->inverse,
-                               .radius = (double)p->radius[i] * g->inverse,
-                               .clip_offset = INFINITY};
     const struct spl_point_clip *clip = p->clip ? &p->clip[i] : NULL;
     if (g->group->plane->heights)
-        get_tilt(g, p->normal[i], d.tilt);
+        get_tilt(g, p->normal[i], d->tilt);
     uint32_t crease = g->group->leaf && g->group->crease ? g->group->crease[i] : SPL_NO_PLANE;
     if (crease != SPL_NO_PLANE)
-        end_at_crease(g, i, &g->group->planes->list[crease], &d);
+        end_at_crease(g, i, &g->group->planes->list[crease], d);
     else if (g->group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2])) {
         double direction[3] = {clip->direction[0] / 127.0, clip->direction[1] / 127.0, clip->direction[2] / 127.0};
-        d.clip[0] = dot(direction, g->u) + d.tilt[0] * dot(direction, g->normal);
-        d.clip[1] = dot(direction, g->v) + d.tilt[1] * dot(direction, g->normal);
-        d.clip_offset = d.radius * clip->offset / 255;
-    }
-    return d;
-}
-
-void spl_panel_disc_range(const struct spl_panel_disc *d, int32_t low[2], int32_t high[2])
-{
-    const double at[2] = {d->x, d->y};
-    for (int a = 0; a < 2; a++) {
-        int32_t own = (int32_t)floor(at[a]);
-        double end = at[a] + (d->reach > 0 ? d->reach * d->clip[a] : 0);
-        low[a] = (int32_t)ceil(fmin(at[a], end) - d->radius - 0.5);
-        high[a] = (int32_t)floor(fmax(at[a], end) + d->radius - 0.5);
-        low[a] = low[a] < own ? low[a] : own;
-        high[a] = high[a] > own ? high[a] : own;
+        d->clip[0] = dot(direction, g->u) + d->tilt[0] * dot(direction, g->normal);
+        d->clip[1] = dot(direction, g->v) + d->tilt[1] * dot(direction, g->normal);
+        d->clip_offset = d->radius * clip->offset / 255;
     }
 }
 

@@ -15,6 +15,7 @@ void spl_panel_raster_finish(struct spl_panel_raster *r)
     free(r->touches);
     free(r->sorted);
     free(r->order);
+    free(r->filled);
     *r = (struct spl_panel_raster){0};
 }
 
@@ -42,40 +43,49 @@ static bool grow_slots(struct spl_panel_raster *r)
     return true;
 }
 
-/* Notes that `member` reaches into the panel. */
-static bool touch(struct spl_panel_raster *r, int32_t column, int32_t row, uint32_t member)
+/* The index of the place (column, row), a new one where there is none yet; UINT32_MAX: no memory. */
+static uint32_t place_of(struct spl_panel_raster *r, int32_t column, int32_t row)
 {
     if (2 * (r->place_count + 1) > r->slot_count && !grow_slots(r))
-        return false;
+        return UINT32_MAX;
     size_t at = hash_of(column, row) & (r->slot_count - 1);
     while (r->slots[at] && (r->places[r->slots[at] - 1].column != column || r->places[r->slots[at] - 1].row != row))
         at = (at + 1) & (r->slot_count - 1);
     if (!r->slots[at]) {
         if (spl_array_reserve(r->places, r->place_capacity, r->place_count + 1, NULL))
-            return false;
+            return UINT32_MAX;
         r->places[r->place_count] = (struct spl_panel_place){.column = column, .row = row};
         r->slots[at] = (uint32_t)++r->place_count;
     }
-    if (spl_array_reserve(r->touches, r->touch_capacity, r->touch_count + 1, NULL))
-        return false;
-    r->places[r->slots[at] - 1].touches++;
-    r->touches[r->touch_count++] = (struct spl_panel_touch){r->slots[at] - 1, member};
-    return true;
+    return r->slots[at] - 1;
 }
 
 static bool find_places(struct spl_panel_raster *r, const struct spl_panel_grid *g)
 {
+    uint32_t last = UINT32_MAX; /* most discs reach into the panel that the one before them does, and no other */
     r->place_count = r->touch_count = 0;
     if (r->slot_count)
         memset(r->slots, 0, r->slot_count * sizeof *r->slots);
     for (size_t m = 0; m < g->group->count; m++) {
         struct spl_panel_disc d = spl_panel_grid_disc(g, g->group->members[m]);
-        int32_t low[2], high[2];
+        int32_t low[2], high[2], from[2], to[2], own[2];
         spl_panel_disc_range(&d, low, high);
-        for (int32_t row = spl_panel_of_cell(g, 1, low[1]); row <= spl_panel_of_cell(g, 1, high[1]); row++)
-            for (int32_t column = spl_panel_of_cell(g, 0, low[0]); column <= spl_panel_of_cell(g, 0, high[0]); column++)
-                if (!touch(r, column, row, g->group->members[m]))
+        for (int a = 0; a < 2; a++) {
+            from[a] = spl_panel_of_cell(g, a, low[a]);
+            to[a] = spl_panel_of_cell(g, a, high[a]);
+            own[a] = spl_panel_of_cell(g, a, spl_panel_floor(a ? d.y : d.x));
+        }
+        for (int32_t row = from[1]; row <= to[1]; row++)
+            for (int32_t column = from[0]; column <= to[0]; column++) {
+                if (last == UINT32_MAX || r->places[last].column != column || r->places[last].row != row)
+                    last = place_of(r, column, row);
+                if (last == UINT32_MAX || (r->touch_count == r->touch_capacity &&
+                                           spl_array_reserve(r->touches, r->touch_capacity, r->touch_count + 1, NULL)))
                     return false;
+                r->places[last].touches++;
+                r->touches[r->touch_count++] = (struct spl_panel_touch){
+                    .place = last, .own = column == own[0] && row == own[1], .member = g->group->members[m]};
+            }
     }
     return true;
 }
@@ -116,21 +126,27 @@ static bool sort_touches(struct spl_panel_raster *r)
     }
     for (size_t i = 0; i < r->touch_count; i++) {
         uint32_t place = r->slots[r->touches[i].place];
-        r->sorted[r->places[place].touches++] = (struct spl_panel_touch){place, r->touches[i].member};
+        r->sorted[r->places[place].touches] = r->touches[i];
+        r->sorted[r->places[place].touches++].place = place;
     }
     return true;
-}
-
-bool spl_panel_touch_is_own(const struct spl_panel_raster *r, const struct spl_panel_grid *g,
-                            const struct spl_panel_touch *touch)
-{
-    const struct spl_panel_place *p = &r->places[touch->place];
-    struct spl_panel_disc d = spl_panel_grid_disc(g, touch->member);
-    return spl_panel_of_cell(g, 0, (int32_t)floor(d.x)) == p->column &&
-           spl_panel_of_cell(g, 1, (int32_t)floor(d.y)) == p->row;
 }
 
 bool spl_panel_places_find(struct spl_panel_raster *r, const struct spl_panel_grid *g)
 {
     return find_places(r, g) && sort_touches(r);
+}
+
+size_t spl_panel_place_find(const struct spl_panel_raster *r, int32_t column, int32_t row)
+{
+    uint64_t order = spread((uint32_t)column) | spread((uint32_t)row) << 1;
+    size_t low = 0, high = r->place_count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (r->places[middle].order < order)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < r->place_count && r->places[low].order == order ? low : SIZE_MAX;
 }

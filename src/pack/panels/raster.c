@@ -1,6 +1,7 @@
 /* Discs of a plane into cells. The panels that discs reach into are found first (a hash), then put in Morton order, so
- * that runs of them are compact chunks, then filled one by one from the discs that reach into each: so no more than one
- * panel's sums are held at a time, however the points lie.
+ * that runs of them are compact chunks, then filled one by one from the discs that reach into each (fill.c): so no more
+ * than one panel's sums are held at a time, however the points lie. Of a group all panels are held, since slits are
+ * closed by what lies around them (slits.c).
  *
  * Cells are counted from the plane's own origin: those of one plane and one size lie on one grid in all nodes, though
  * panels, the squares of 16, begin where a node's cells do.
@@ -15,13 +16,6 @@
 #include "base/memory.h"
 
 enum { side = SPL_PANEL_SIDE, no_level = 255 };
-/* A point's weight in a cell beside its own, whose middle its disc covers, where no point is nearer. */
-static const float aside = 1e-3f;
-
-struct sums {
-    float color[side][side][3], weight[side][side];
-    uint16_t covered[side];
-};
 
 /* What is known of a chunk's points. */
 struct distances {
@@ -42,65 +36,6 @@ void spl_node_panels_finish(struct spl_node_panels *panels)
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static float tent(double x)
-{
-    return x < 1 && x > -1 ? (float)(1 - fabs(x)) : 0;
-}
-
-/* What a disc gives a cell whose middle lies (dx, dy) from its own. In a leaf colours are interpolated between points,
- * which lie a spacing apart, and sharper than drawing cells interpolates once more; in an inner node a cell has the
- * mean of what lies in it. */
-static float weigh(const struct spl_panel_grid *g, const struct spl_panel_disc *d, double dx, double dy, bool own)
-{
-    float within = (float)fmax(0, 1 - spl_panel_disc_squared(d, dx, dy) / (d->radius * d->radius));
-    double apart = d->radius / (double)SPL_RADIUS_SPACING;
-    float near = tent(dx / apart) * tent(dy / apart);
-    if (g->group->leaf)
-        return near * near + aside * within;
-    return (float)(d->radius * d->radius) * (own ? 1 : aside * within);
-}
-
-/* Adds what a disc covers of the panel whose first cell is (column, row). */
-static void add_disc(const struct spl_panel_grid *g, uint32_t member, int32_t column, int32_t row, struct sums *s)
-{
-    struct spl_panel_disc d = spl_panel_grid_disc(g, member);
-    uint32_t color = g->group->points->color_class[g->group->first + member];
-    int32_t low[2], high[2], own_x = (int32_t)floor(d.x), own_y = (int32_t)floor(d.y);
-    spl_panel_disc_range(&d, low, high);
-    for (int32_t y = low[1] > row ? low[1] : row; y <= high[1] && y < row + side; y++)
-        for (int32_t x = low[0] > column ? low[0] : column; x <= high[0] && x < column + side; x++) {
-            double dx = x + 0.5 - d.x, dy = y + 0.5 - d.y;
-            bool own = x == own_x && y == own_y;
-            if (!own && (spl_panel_disc_squared(&d, dx, dy) > d.radius * d.radius ||
-                         d.clip[0] * dx + d.clip[1] * dy > d.clip_offset))
-                continue;
-            float weight = weigh(g, &d, dx, dy, own) + 1e-9f;
-            for (int c = 0; c < 3; c++)
-                s->color[y - row][x - column][c] += weight * (float)(color >> 8 * c & 255);
-            s->weight[y - row][x - column] += weight;
-            s->covered[y - row] |= (uint16_t)(1u << (x - column));
-        }
-}
-
-/* The panel of the touches [begin, end); false: no cell is there. */
-static bool fill_panel(const struct spl_panel_raster *r, const struct spl_panel_grid *g, size_t place,
-                       struct spl_panel *panel)
-{
-    struct sums s = {0};
-    uint32_t any = 0;
-    const struct spl_panel_place *p = &r->places[place];
-    for (uint32_t t = spl_panel_first_touch(r, place); t < p->touches; t++)
-        add_disc(g, r->sorted[t].member, g->first[0] + side * p->column, g->first[1] + side * p->row, &s);
-    for (int y = 0; y < side; y++) {
-        panel->cells[y] = s.covered[y];
-        any |= s.covered[y];
-        for (int x = 0; x < side; x++)
-            for (int c = 0; c < 3; c++)
-                panel->color[y][x][c] = s.covered[y] >> x & 1 ? (uint8_t)(s.color[y][x][c] / s.weight[y][x] + 0.5f) : 0;
-    }
-    return any;
 }
 
 /* A chunk while it is made. */
@@ -140,16 +75,17 @@ static struct distances measure(const struct making *m, const struct spl_panel_p
              t++) {
             const struct spl_panel_touch *touch = &m->raster->sorted[t];
             double off[3];
-            if (!spl_panel_touch_is_own(m->raster, g, touch))
+            if (!touch->own)
                 continue;
             for (int c = 0; c < 3; c++)
                 off[c] = group->points->axis[c][group->first + touch->member] - group->node_origin[c] -
                          (double)(float)plane->origin[c];
             double height = 0;
             if (group->plane->heights) {
-                struct spl_panel_disc d = spl_panel_grid_disc(g, touch->member);
-                double x = d.x - g->first[0] - side * m->raster->places[m->order[k]].column;
-                double y = d.y - g->first[1] - side * m->raster->places[m->order[k]].row;
+                double at[2];
+                spl_panel_grid_middle(g, group->first + touch->member, at);
+                double x = at[0] - g->first[0] - side * m->raster->places[m->order[k]].column;
+                double y = at[1] - g->first[1] - side * m->raster->places[m->order[k]].row;
                 height = (double)spl_relief_height(&m->reliefs[k], (float)x, (float)y, NULL);
             }
             double distance = fabs(dot(off, g->normal) - height);
@@ -219,7 +155,7 @@ static bool fill_panels(struct making *m, struct spl_node_panels *out)
     for (size_t k = 0; k < m->count; k++) {
         const struct spl_panel_place *p = &r->places[m->order[k]];
         struct spl_panel_relief made;
-        fill_panel(r, g, m->order[k], &m->panels[k]);
+        m->panels[k] = r->filled[m->order[k]].panel;
         m->panels[k].column = (uint8_t)(p->column - m->column);
         m->panels[k].row = (uint8_t)(p->row - m->row);
         if (g->group->plane->heights) {
@@ -274,6 +210,22 @@ static bool add_chunk(const struct spl_panel_raster *r, const struct spl_panel_g
     return true;
 }
 
+/* Fills the panels of all places. False: no memory. */
+static bool fill_places(struct spl_panel_raster *r, const struct spl_panel_grid *g)
+{
+    if (spl_array_reserve(r->filled, r->filled_capacity, r->place_count, NULL))
+        return false;
+    for (size_t i = 0; i < r->place_count; i++) {
+        struct spl_panel_filled *f = &r->filled[i];
+        spl_panel_fill(r, g, i, &f->panel);
+        memcpy(f->covered, f->panel.cells, sizeof f->covered);
+        memset(f->claimed, 0, sizeof f->claimed);
+    }
+    if (!g->group->plane->heights)
+        spl_panel_slits_close(r, g);
+    return true;
+}
+
 /* Lists the places that have cells; those with relief by their levels, which takes their meshes. False: no memory. */
 static bool list_places(struct spl_panel_raster *r, const struct spl_panel_grid *g, size_t *count)
 {
@@ -283,14 +235,14 @@ static bool list_places(struct spl_panel_raster *r, const struct spl_panel_grid 
         return false;
     for (size_t i = 0; i < r->place_count; i++) {
         struct spl_panel_place *p = &r->places[i];
-        struct spl_panel panel;
+        const struct spl_panel *panel = &r->filled[i].panel;
         struct spl_panel_relief made;
-        bool any = fill_panel(r, g, i, &panel);
+        bool any = count_cells(panel);
         p->level = any ? 0 : no_level;
         p->low = p->high = 0;
         if (!relief || !any)
             continue;
-        spl_panel_relief_choose(g, &panel, g->first[0] + side * p->column, g->first[1] + side * p->row, &made);
+        spl_panel_relief_choose(g, panel, g->first[0] + side * p->column, g->first[1] + side * p->row, &made);
         p->level = (uint8_t)made.relief.level;
         p->low = made.low;
         p->high = made.high;
@@ -333,7 +285,7 @@ int spl_panel_raster_add(struct spl_panel_raster *r, const struct spl_panel_grou
     size_t count;
     if (!spl_panel_grid_init(&g, group))
         return SPL_E_LIMIT;
-    if (!spl_panel_places_find(r, &g) || !list_places(r, &g, &count))
+    if (!spl_panel_places_find(r, &g) || !fill_places(r, &g) || !list_places(r, &g, &count))
         return SPL_E_NOMEM;
     if (!out->chunk_count)
         for (int c = 0; c < 3; c++) {

@@ -12,6 +12,8 @@ struct spl_panel_raster {
     size_t slot_count;
     struct spl_panel_touch *touches, *sorted; /* which point reaches into which panel */
     size_t touch_count, touch_capacity, sorted_capacity;
+    struct spl_panel_filled *filled; /* by place */
+    size_t filled_capacity;
     uint32_t *order; /* of places, as chunks have them */
     size_t order_capacity;
 };

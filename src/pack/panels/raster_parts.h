@@ -1,5 +1,5 @@
-/* The parts of rasterising: where a group's cells lie (grid.c), which panels its discs reach into (places.c), what they
- * are then (raster.c, values.c). One worker's. */
+/* The parts of rasterising: where a group's cells lie (grid.c), which panels its discs reach into (places.c), which cells
+ * these cover there (fill.c), what panels are then (raster.c, values.c). One worker's. */
 #ifndef SPL_PACK_PANELS_RASTER_PARTS_H
 #define SPL_PACK_PANELS_RASTER_PARTS_H
 
@@ -18,7 +18,16 @@ struct spl_panel_place {
 };
 
 struct spl_panel_touch {
-    uint32_t place, member;
+    uint32_t place : 31;
+    uint32_t own : 1; /* the member lies in the place: each does in one */
+    uint32_t member;
+};
+
+/* The panel of a place. */
+struct spl_panel_filled {
+    struct spl_panel panel;
+    uint16_t covered[SPL_PANEL_SIDE];              /* its cells before slits were closed */
+    float claimed[SPL_PANEL_SIDE][SPL_PANEL_SIDE]; /* what points that lie in a cell stand for, in cells */
 };
 
 /* Where the group's cells lie. */
@@ -27,6 +36,7 @@ struct spl_panel_grid {
     double u[3], v[3], normal[3];
     float normal_f[3];
     double inverse;
+    bool round; /* its discs are: none of them is tilted, or has a line at which it ends */
     int32_t first[2]; /* cell that panel (0, 0) begins with: those of a node begin where its cells do */
 };
 
@@ -36,6 +46,19 @@ struct spl_panel_disc {
     double reach;                /* along clip, how far off the crease is that it goes on to; 0: none */
     double tilt[2];              /* how it rises along u and v; 0 on what is flat */
 };
+
+/* floor() and ceil() of what an int32_t can hold: both take a call where a processor's own must not be asked for. */
+static inline int32_t spl_panel_floor(double x)
+{
+    int32_t i = (int32_t)x;
+    return i - (x < i);
+}
+
+static inline int32_t spl_panel_ceil(double x)
+{
+    int32_t i = (int32_t)x;
+    return i + (x > i);
+}
 
 /* The square of how far the place (dx, dy) cells from the disc's middle is from it, along the disc; or, if that is
  * less, from what lies between it and its crease. */
@@ -50,10 +73,47 @@ static inline double spl_panel_disc_squared(const struct spl_panel_disc *disc, d
 
 /* False: its cells cannot be counted. */
 bool spl_panel_grid_init(struct spl_panel_grid *grid, const struct spl_panel_group *group);
-struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *grid, uint32_t member);
+
+/* Adds to the disc of point `i` how it is tilted, and where it ends. */
+void spl_panel_grid_shape(const struct spl_panel_grid *grid, size_t i, struct spl_panel_disc *disc);
+
+/* Where the middle of point `i` lies, in cells along u and v. */
+static inline void spl_panel_grid_middle(const struct spl_panel_grid *grid, size_t i, double at[2])
+{
+    double off[3];
+    for (int c = 0; c < 3; c++)
+        off[c] = grid->group->points->axis[c][i] - grid->group->plane->origin[c];
+    at[0] = (off[0] * grid->u[0] + off[1] * grid->u[1] + off[2] * grid->u[2]) * grid->inverse;
+    at[1] = (off[0] * grid->v[0] + off[1] * grid->v[1] + off[2] * grid->v[2]) * grid->inverse;
+}
+
+static inline struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_grid *grid, uint32_t member)
+{
+    size_t i = grid->group->first + member;
+    double at[2];
+    spl_panel_grid_middle(grid, i, at);
+    struct spl_panel_disc disc = {.x = at[0],
+                                  .y = at[1],
+                                  .radius = (double)grid->group->points->radius[i] * grid->inverse,
+                                  .clip_offset = INFINITY};
+    if (!grid->round)
+        spl_panel_grid_shape(grid, i, &disc);
+    return disc;
+}
 
 /* The cells whose middles a disc, or what lies between it and its crease, can cover, and its own. */
-void spl_panel_disc_range(const struct spl_panel_disc *disc, int32_t low[2], int32_t high[2]);
+static inline void spl_panel_disc_range(const struct spl_panel_disc *disc, int32_t low[2], int32_t high[2])
+{
+    const double at[2] = {disc->x, disc->y};
+    for (int a = 0; a < 2; a++) {
+        int32_t own = spl_panel_floor(at[a]);
+        double end = at[a] + (disc->reach > 0 ? disc->reach * disc->clip[a] : 0);
+        low[a] = spl_panel_ceil((at[a] < end ? at[a] : end) - disc->radius - 0.5);
+        high[a] = spl_panel_floor((at[a] > end ? at[a] : end) + disc->radius - 0.5);
+        low[a] = low[a] < own ? low[a] : own;
+        high[a] = high[a] > own ? high[a] : own;
+    }
+}
 
 /* The column, axis 0, or row of the panel that has a cell, counted from the grid's first on. */
 static inline int32_t spl_panel_of_cell(const struct spl_panel_grid *grid, int axis, int32_t cell)
@@ -70,9 +130,15 @@ static inline uint32_t spl_panel_first_touch(const struct spl_panel_raster *rast
     return place ? raster->places[place - 1].touches : 0;
 }
 
-/* Whether the touch's member lies in its place: each does in one. */
-bool spl_panel_touch_is_own(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid,
-                            const struct spl_panel_touch *touch);
+/* Fills the panel of a place, cells and colours, from the discs that reach into it. */
+void spl_panel_fill(const struct spl_panel_raster *raster, const struct spl_panel_grid *grid, size_t place,
+                    struct spl_panel *panel);
+
+/* The place of a column and row of panels; SIZE_MAX: there is none. */
+size_t spl_panel_place_find(const struct spl_panel_raster *raster, int32_t column, int32_t row);
+
+/* Closes slits between scan lines in raster->filled (slits.c). */
+void spl_panel_slits_close(struct spl_panel_raster *raster, const struct spl_panel_grid *grid);
 
 /* The mesh of a panel (relief.c). */
 struct spl_panel_relief {

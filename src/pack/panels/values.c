@@ -32,7 +32,7 @@ bool spl_panel_values_add(const struct spl_panel_raster *r, const struct spl_pan
     struct mix mix = {0};
     for (int own = 1; own >= 0 && !(mix.weight > 0); own--)
         for (uint32_t t = spl_panel_first_touch(r, place); t < r->places[place].touches; t++)
-            if (!own || spl_panel_touch_is_own(r, g, &r->sorted[t]))
+            if (!own || r->sorted[t].own)
                 add_point(p, g->group->first + r->sorted[t].member, scalars, scalar_count, &mix);
     size_t at = out->panel_count;
     if (spl_array_reserve(out->values, out->value_capacity, at + 1, NULL) ||

@@ -282,6 +282,52 @@ static void windows_stay_open(void **state)
     free(samples);
 }
 
+enum { lengthwise = 4, slit = 60 }; /* points along a line, of a spacing; the line from which on nothing is seen */
+
+/* Lines that are `dense` times as dense along as they lie apart, without those of a gap; its middle's cell, or NULL. */
+static const uint8_t *find_in_gap(int dense, double gap, int depth)
+{
+    struct sample *samples = calloc((size_t)wide * lengthwise * high, sizeof *samples);
+    static uint8_t found[3];
+    size_t count = 0;
+    for (int y = 0; y < high; y++)
+        for (int x = 0; x < wide * dense; x++) {
+            double up = y < slit ? y : y - 1 + gap;
+            on_wall(spacing * x / dense, spacing * up, samples[count].position);
+            samples[count++].color = y < slit ? 0x204060 : 0x406080;
+        }
+    struct scene s;
+    double at[3];
+    make_sorted(&s, samples, count, &slant, 1);
+    build(&s, 1);
+    unsigned there = 0;
+    for (int i = 0; i < 40; i++) { /* where one node ends it need not be closed */
+        on_wall(spacing * (20 + 3.5 * i), spacing * (slit - 1 + gap / 2), at);
+        const uint8_t *cell = find_anywhere(&s, depth, at, 1);
+        there += cell != NULL;
+        if (cell)
+            memcpy(found, cell, sizeof found);
+    }
+    done(&s);
+    free(samples);
+    assert_true(there == 0 || there > 30);
+    return there ? found : NULL;
+}
+
+static void slits_between_scan_lines_are_closed(void **state)
+{
+    (void)state;
+    for (int depth = 0; depth >= -1; depth--) {
+        const uint8_t *closed = find_in_gap(lengthwise, 5, depth);
+        assert_non_null(closed); /* halfway between both sides' colours */
+        assert_in_range(closed[0], 0x6c, 0x74);
+        assert_in_range(closed[1], 0x4c, 0x54);
+        assert_in_range(closed[2], 0x2c, 0x34);
+    }
+    assert_null(find_in_gap(1, 5, -1));      /* points of an even sampling: a slot */
+    assert_null(find_in_gap(lengthwise, 10, -1)); /* wider than lines lie apart */
+}
+
 static uint32_t checker(int x, int y)
 {
     return (x / 8 + y / 8) % 2 ? 0x30c0e0 : 0xd05020;
@@ -622,6 +668,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_are_covered_once_at_all_levels),
         cmocka_unit_test(windows_stay_open),
+        cmocka_unit_test(slits_between_scan_lines_are_closed),
         cmocka_unit_test(colours_are_those_of_the_points),
         cmocka_unit_test(planes_are_kept_apart),
         cmocka_unit_test(planes_end_where_they_meet),
