@@ -9,6 +9,8 @@
 #include "dataset/panel_texels.h"
 
 enum { side = SPL_PANEL_SIDE, blocks = 16, levels = SPL_PANEL_EVEN + 1 };
+/* Texels whose cells are off by so many times the error are not coded: they would be no nearer. */
+static const double far_off = 2;
 
 bool spl_panel_mean_color(const struct spl_panel *panel, unsigned x0, unsigned y0, unsigned wide, float color[3])
 {
@@ -44,8 +46,40 @@ static uint8_t to_byte(float value)
     return (uint8_t)(value + 0.5f);
 }
 
-/* Writes the panel's colours at `level`; returns the words. */
-static uint32_t encode(const struct spl_panel *panel, unsigned level, uint32_t there, uint32_t *words)
+/* Mean squared difference of the colours of a block's cells to what texels, not of level 0, show of them; 0: it has no
+ * cells. */
+static double measure_block(const struct spl_panel *panel, const struct spl_panel_texels *texels,
+                            const struct spl_panel_between between[side], unsigned b)
+{
+    unsigned sum = 0, count = 0, left = b % 4 * 4;
+    for (unsigned y = b / 4 * 4; y < b / 4 * 4 + 4; y++)
+        for (unsigned cells = panel->cells[y] >> left & 15; cells; cells &= cells - 1) {
+            unsigned x = left + (unsigned)__builtin_ctz(cells);
+            spl_panel_texel color = spl_panel_texels_at(texels, &between[x], &between[y]);
+            for (int c = 0; c < 3; c++) {
+                int d = to_byte(color[c]) - panel->color[y][x][c];
+                sum += (unsigned)(d * d);
+            }
+            count++;
+        }
+    return count ? (double)sum / (3 * count) : 0;
+}
+
+/* Whether the cells' colours are as near to the texels', not of level 0, in the worst block too, in which a letter or a
+ * joint of mortar is as large as it is small in its panel. */
+static bool is_within(const struct spl_panel *panel, const struct spl_panel_texels *texels, double error)
+{
+    struct spl_panel_between between[side];
+    spl_panel_texels_place(texels->level, between);
+    for (unsigned b = 0; b < blocks; b++)
+        if (measure_block(panel, texels, between, b) > error * error)
+            return false;
+    return true;
+}
+
+/* Writes the panel's colours at `level`; returns the words, or 0 where they would not come near `color_error`. */
+static uint32_t encode(const struct spl_panel *panel, unsigned level, uint32_t there, double color_error,
+                       uint32_t *words)
 {
     uint32_t used = 0;
     if (level == SPL_PANEL_EVEN) {
@@ -57,6 +91,8 @@ static uint32_t encode(const struct spl_panel *panel, unsigned level, uint32_t t
     struct spl_panel_texels texels = {.level = level};
     unsigned across = 4u >> level;
     spl_panel_texels_fit(panel, &texels);
+    if (level && !is_within(panel, &texels, far_off * color_error))
+        return 0;
     for (unsigned b = 0; b < across * across; b++)
         if (level || there >> b & 1) {
             encode_block(panel, &texels, b % across * 4, b / across * 4, words + used);
@@ -104,47 +140,17 @@ void spl_panel_colors_decode(const struct spl_panel_words *words, uint32_t at, u
         }
 }
 
-/* Mean squared difference of the colours of a block's cells to what texels, not of level 0, show of them; 0: it has no
- * cells. */
-static double measure_block(const struct spl_panel *panel, const struct spl_panel_texels *texels,
-                            const struct spl_panel_between between[side], unsigned b)
-{
-    unsigned sum = 0, count = 0, left = b % 4 * 4;
-    for (unsigned y = b / 4 * 4; y < b / 4 * 4 + 4; y++)
-        for (unsigned cells = panel->cells[y] >> left & 15; cells; cells &= cells - 1) {
-            unsigned x = left + (unsigned)__builtin_ctz(cells);
-            spl_panel_texel color = spl_panel_texels_at(texels, &between[x], &between[y]);
-            for (int c = 0; c < 3; c++) {
-                int d = to_byte(color[c]) - panel->color[y][x][c];
-                sum += (unsigned)(d * d);
-            }
-            count++;
-        }
-    return count ? (double)sum / (3 * count) : 0;
-}
-
-/* Whether the cells' colours are as near to those of `words` as they must be, in the worst block too, in which a letter
- * or a joint of mortar is as large as it is small in its panel. */
-static bool is_near(const struct spl_panel *panel, unsigned level, uint32_t there, const uint32_t *words,
-                    uint32_t count, double color_error)
-{
-    struct spl_panel_texels texels;
-    struct spl_panel_between between[side];
-    read_texels(&(struct spl_panel_words){words, count - 1}, 0, level, there, &texels);
-    spl_panel_texels_place(texels.level, between);
-    for (unsigned b = 0; b < blocks; b++)
-        if (measure_block(panel, &texels, between, b) > color_error * color_error)
-            return false;
-    return true;
-}
-
 uint32_t spl_panel_colors_encode(const struct spl_panel *panel, uint32_t there, double color_error, uint32_t *words,
                                  unsigned *level)
 {
-    uint32_t used;
-    *level = levels;
-    do {
-        used = encode(panel, --*level, there, words);
-    } while (*level && !is_near(panel, *level, there, words, used, color_error));
-    return used;
+    struct spl_panel_texels texels;
+    for (*level = levels - 1; *level; --*level) {
+        uint32_t used = encode(panel, *level, there, color_error, words);
+        if (!used)
+            continue;
+        read_texels(&(struct spl_panel_words){words, used - 1}, 0, *level, there, &texels);
+        if (is_within(panel, &texels, color_error))
+            return used;
+    }
+    return encode(panel, 0, there, color_error, words);
 }

@@ -7,6 +7,8 @@
 enum { side = SPL_PANEL_SIDE };
 /* A point's weight in a cell beside its own, whose middle its disc covers, where no point is nearer. */
 static const float aside = 1e-3f;
+/* Of a cell: what ends before it covers no middle of the next one, whatever is lost in rounding. */
+static const double alone = 1.499;
 
 typedef float four __attribute__((vector_size(16)));
 
@@ -54,12 +56,17 @@ static float tent(double x)
     return x < 1 && x > -1 ? (float)(1 - fabs(x)) : 0;
 }
 
+static four shade_of(uint32_t color)
+{
+    return (four){(float)(color & 255), (float)(color >> 8 & 255), (float)(color >> 16 & 255), 1};
+}
+
 /* Adds what a disc covers. In a leaf colours are interpolated between points, which lie a spacing apart, and sharper
  * than drawing cells interpolates once more; in an inner node a cell has the mean of what lies in it. */
 static void add_disc(const struct part *p, uint32_t color, bool leaf, struct sums *s)
 {
     const struct spl_panel_disc *d = &p->disc;
-    const four shade = {(float)(color & 255), (float)(color >> 8 & 255), (float)(color >> 16 & 255), 1};
+    const four shade = shade_of(color);
     double area = d->radius * d->radius, apart = d->radius / (double)SPL_RADIUS_SPACING;
     float beside[side];
     for (int32_t x = p->low[0]; leaf && x <= p->high[0]; x++)
@@ -80,13 +87,36 @@ static void add_disc(const struct part *p, uint32_t color, bool leaf, struct sum
     }
 }
 
+/* Adds the member of a touch to its own cell where it covers no other: most of those of inner nodes, whose cells are
+ * larger than discs. False: it is not so simple. */
+static bool add_within(const struct spl_panel_grid *g, const struct spl_panel_touch *touch, int32_t column, int32_t row,
+                       struct sums *s)
+{
+    const struct spl_points *points = g->group->points;
+    size_t i = g->group->first + touch->member;
+    double at[2], radius = (double)points->radius[i] * g->inverse;
+    spl_panel_grid_middle(g, i, at);
+    double x = at[0] - spl_panel_floor(at[0]), y = at[1] - spl_panel_floor(at[1]);
+    if (!touch->own || !(x + radius < alone && y + radius < alone && x - radius > 1 - alone && y - radius > 1 - alone))
+        return false;
+    int own_x = spl_panel_floor(at[0]) - column, own_y = spl_panel_floor(at[1]) - row;
+    s->color[own_y][own_x] += ((float)(radius * radius) + 1e-9f) * shade_of(points->color_class[i]);
+    s->covered[own_y] |= (uint16_t)(1u << own_x);
+    return true;
+}
+
 void spl_panel_fill(const struct spl_panel_raster *r, const struct spl_panel_grid *g, size_t place,
                     struct spl_panel *panel)
 {
     const struct spl_panel_group *group = g->group;
     struct sums s = {0};
+    const int32_t column = g->first[0] + side * r->places[place].column;
+    const int32_t row = g->first[1] + side * r->places[place].row;
+    const bool simple = g->round && !group->leaf;
     for (uint32_t t = spl_panel_first_touch(r, place); t < r->places[place].touches; t++) {
         struct part part;
+        if (simple && add_within(g, &r->sorted[t], column, row, &s))
+            continue;
         get_part(r, g, &r->sorted[t], &part);
         add_disc(&part, group->points->color_class[group->first + r->sorted[t].member], group->leaf, &s);
     }

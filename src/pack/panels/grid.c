@@ -18,8 +18,7 @@ static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *gr
     spl_panels_begin(&plane, &chunk);
     spl_panels_get_frame(&chunk, &frame);
     bool lines = group->leaf && (group->crease || group->points->clip);
-    *g = (struct spl_panel_grid){
-        .group = group, .inverse = 1 / group->cell, .round = !lines && !group->plane->heights};
+    *g = (struct spl_panel_grid){.group = group, .inverse = 1 / group->cell, .round = !lines && !group->plane->heights};
     for (int c = 0; c < 3; c++) {
         g->u[c] = frame.u[c];
         g->v[c] = frame.v[c];
@@ -85,15 +84,23 @@ void spl_panel_grid_shape(const struct spl_panel_grid *g, size_t i, struct spl_p
 /* Where the group's cells begin; false: they cannot be counted. */
 static bool find_first(struct spl_panel_grid *g)
 {
-    g->first[0] = g->first[1] = INT32_MAX;
+    double own[2] = {INFINITY, INFINITY},
+           reach[2] = {INFINITY, INFINITY}; /* the least of a middle, and of what it covers */
     for (size_t m = 0; m < g->group->count; m++) {
         struct spl_panel_disc d = spl_panel_grid_disc(g, g->group->members[m]);
-        int32_t low[2], high[2];
+        const double at[2] = {d.x, d.y};
         if (!(fabs(d.x) < most_cells && fabs(d.y) < most_cells && d.radius <= SPL_PANEL_RADIUS_MAX))
             return false;
-        spl_panel_disc_range(&d, low, high);
-        for (int a = 0; a < 2; a++)
-            g->first[a] = low[a] < g->first[a] ? low[a] : g->first[a];
+        for (int a = 0; a < 2; a++) {
+            double end = at[a] + (d.reach > 0 ? d.reach * d.clip[a] : 0);
+            double low = (at[a] < end ? at[a] : end) - d.radius - 0.5;
+            own[a] = at[a] < own[a] ? at[a] : own[a];
+            reach[a] = low < reach[a] ? low : reach[a];
+        }
+    }
+    for (int a = 0; a < 2; a++) { /* as spl_panel_disc_range() has it of each */
+        int32_t low = spl_panel_ceil(reach[a]), least = spl_panel_floor(own[a]);
+        g->first[a] = low < least ? low : least;
     }
     for (int a = 0; g->group->plane->heights && a < 2; a++) /* lattices of all nodes are parts of one */
         g->first[a] -= (g->first[a] % SPL_PANEL_SIDE + SPL_PANEL_SIDE) % SPL_PANEL_SIDE;

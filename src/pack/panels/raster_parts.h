@@ -1,5 +1,5 @@
-/* The parts of rasterising: where a group's cells lie (grid.c), which panels its discs reach into (places.c), which cells
- * these cover there (fill.c), what panels are then (raster.c, values.c). One worker's. */
+/* The parts of rasterising: where a group's cells lie (grid.c), which panels its discs reach into (places.c), which
+ * cells these cover there (fill.c), what panels are then (raster.c, values.c). One worker's. */
 #ifndef SPL_PACK_PANELS_RASTER_PARTS_H
 #define SPL_PACK_PANELS_RASTER_PARTS_H
 
@@ -36,7 +36,7 @@ struct spl_panel_grid {
     double u[3], v[3], normal[3];
     float normal_f[3];
     double inverse;
-    bool round; /* its discs are: none of them is tilted, or has a line at which it ends */
+    bool round;       /* its discs are: none of them is tilted, or has a line at which it ends */
     int32_t first[2]; /* cell that panel (0, 0) begins with: those of a node begin where its cells do */
 };
 
@@ -77,6 +77,15 @@ bool spl_panel_grid_init(struct spl_panel_grid *grid, const struct spl_panel_gro
 /* Adds to the disc of point `i` how it is tilted, and where it ends. */
 void spl_panel_grid_shape(const struct spl_panel_grid *grid, size_t i, struct spl_panel_disc *disc);
 
+/* Whether it does: its plane has heights, or it ends at a crease or a line. */
+static inline bool spl_panel_grid_has_shape(const struct spl_panel_grid *grid, size_t i)
+{
+    const struct spl_panel_group *group = grid->group;
+    const struct spl_point_clip *clip = group->points->clip ? &group->points->clip[i] : NULL;
+    return group->plane->heights || (group->leaf && group->crease && group->crease[i] != SPL_NO_PLANE) ||
+           (group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2]));
+}
+
 /* Where the middle of point `i` lies, in cells along u and v. */
 static inline void spl_panel_grid_middle(const struct spl_panel_grid *grid, size_t i, double at[2])
 {
@@ -96,7 +105,7 @@ static inline struct spl_panel_disc spl_panel_grid_disc(const struct spl_panel_g
                                   .y = at[1],
                                   .radius = (double)grid->group->points->radius[i] * grid->inverse,
                                   .clip_offset = INFINITY};
-    if (!grid->round)
+    if (!grid->round && spl_panel_grid_has_shape(grid, i))
         spl_panel_grid_shape(grid, i, &disc);
     return disc;
 }

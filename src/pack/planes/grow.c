@@ -10,7 +10,8 @@
  *
  * A round reads the lists that were made before it, and each cell writes its own points' labels alone, so the result
  * does not depend on threads or order. Most that is open is foliage, far from any plane: a cell is looked at only where
- * a level of cells four times as wide has labels around it, and in later rounds, where some were given in the last. */
+ * a level of cells four times as wide has labels around it, and in later rounds, where some were given in the last;
+ * lists are filled where these are read, and anew where labels were given. */
 #include "pack/planes/grow.h"
 
 #include <stdlib.h>
@@ -34,9 +35,11 @@ struct growth {
     const struct spl_stage *stage;
     const struct spl_plane_limits_list *limits;
     atomic_size_t taken;
-    const struct spl_cells *coarse; /* NULL: all cells are looked at */
-    atomic_uchar *given;            /* of each coarse cell: it has labels, new ones in later rounds */
-    uint8_t *near;                  /* it, or one around it, has */
+    const struct spl_cells *coarse;
+    atomic_uchar *given; /* of each coarse cell: it has labels of what grows, new ones in later rounds */
+    atomic_uchar *near;  /* it, or one around it, has */
+    atomic_uchar *read;  /* it, or one around it, is near, and its lists are to be filled */
+    bool *filled;        /* its lists say what labels there are */
 };
 
 struct candidate {
@@ -147,72 +150,74 @@ static void find_given(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t k = begin; k < end; k++) {
         bool given = false;
         for (size_t i = g->coarse->cells[k].begin; !given && i < g->coarse->cells[k + 1].begin; i++)
-            given = g->label[i] != SPL_NO_PLANE;
+            given = g->label[i] != SPL_NO_PLANE && !g->regions[g->label[i]].closed;
         atomic_store_explicit(&g->given[k], given, memory_order_relaxed);
     }
 }
 
-static void find_near(void *context, size_t begin, size_t end, unsigned worker)
+/* to[] of each coarse cell: whether it, or one around it, is in from[]. */
+struct ring {
+    const struct spl_cells *cells;
+    const atomic_uchar *from;
+    atomic_uchar *to;
+};
+
+static void find_ring(void *context, size_t begin, size_t end, unsigned worker)
 {
-    const struct growth *g = context;
+    const struct ring *r = context;
     (void)worker;
     for (size_t k = begin; k < end; k++) {
         int64_t at[3];
-        g->near[k] = atomic_load_explicit(&g->given[k], memory_order_relaxed);
-        spl_cells_place(g->coarse, (uint32_t)k, at);
-        for (int n = 0; n < 27 && !g->near[k]; n++) {
-            uint32_t other = spl_cells_find(g->coarse, at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
-            g->near[k] = other != UINT32_MAX && atomic_load_explicit(&g->given[other], memory_order_relaxed);
+        bool near = atomic_load_explicit(&r->from[k], memory_order_relaxed);
+        spl_cells_place(r->cells, (uint32_t)k, at);
+        for (int n = 0; n < 27 && !near; n++) {
+            uint32_t other = spl_cells_find(r->cells, at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
+            near = other != UINT32_MAX && atomic_load_explicit(&r->from[other], memory_order_relaxed);
         }
+        atomic_store_explicit(&r->to[k], near, memory_order_relaxed);
     }
-}
-
-/* The coarse cell of a point. */
-static uint32_t coarse_of(const struct spl_cells *coarse, uint32_t point)
-{
-    uint32_t low = 0, high = coarse->count;
-    while (high - low > 1) {
-        uint32_t middle = low + (high - low) / 2;
-        if (coarse->cells[middle].begin <= point)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
 }
 
 static void grow_cells(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct growth *g = context;
     size_t taken = 0;
-    uint32_t above = g->coarse ? coarse_of(g->coarse, g->cells->cells[begin].begin) : 0;
+    uint32_t above = spl_plane_cell_of(g->coarse, g->cells->cells[begin].begin);
     (void)worker;
     for (size_t k = begin; k < end && !spl_stage_is_cancelled(g->stage); k++) {
         struct candidate found[most];
-        while (g->coarse && g->coarse->cells[above + 1].begin <= g->cells->cells[k].begin)
+        while (g->coarse->cells[above + 1].begin <= g->cells->cells[k].begin)
             above++;
-        if (!(g->lists[k].open || g->lists[k].linear) || (g->coarse && !g->near[above]))
+        if (!atomic_load_explicit(&g->near[above], memory_order_relaxed) || !(g->lists[k].open || g->lists[k].linear))
             continue;
         unsigned count = find_candidates(g, (uint32_t)k, found);
         size_t some = count ? grow_cell(g, (uint32_t)k, found, count) : 0;
-        if (some && g->coarse)
+        if (some)
             atomic_store_explicit(&g->given[above], 1, memory_order_relaxed);
         taken += some;
     }
     atomic_fetch_add(&g->taken, taken);
 }
 
-/* What cells of level `k` are looked at in this round; after it, `given` says where labels were given. */
-static void find_work(struct growth *g, const struct spl_plane_levels *levels, unsigned k, int round, unsigned threads)
+/* Finds what cells of level `k` are looked at in this round, and fills the lists that are read there; after it, `given`
+ * says where labels were given. */
+static void find_work(struct growth *g, struct spl_plane_levels *levels, unsigned k, int round, unsigned threads)
 {
-    g->coarse = k + coarser < levels->count ? &levels->cells[k + coarser] : NULL;
-    if (!g->coarse)
-        return;
+    g->coarse = &levels->cells[k + coarser < levels->count ? k + coarser : levels->count - 1];
+    size_t count = g->coarse->count;
     if (round == 0)
-        spl_parallel_for(threads, g->coarse->count, grain, find_given, g);
-    spl_parallel_for(threads, g->coarse->count, grain, find_near, g);
-    for (uint32_t i = 0; i < g->coarse->count; i++)
+        spl_parallel_for(threads, count, grain, find_given, g);
+    for (size_t i = 0; i < count; i++)
+        g->filled[i] = round > 0 && g->filled[i] && !atomic_load_explicit(&g->given[i], memory_order_relaxed);
+    spl_parallel_for(threads, count, grain, find_ring, &(struct ring){g->coarse, g->given, g->near});
+    spl_parallel_for(threads, count, grain, find_ring, &(struct ring){g->coarse, g->near, g->read});
+    for (size_t i = 0; i < count; i++) {
+        bool read = atomic_load_explicit(&g->read[i], memory_order_relaxed);
+        atomic_store_explicit(&g->read[i], read && !g->filled[i], memory_order_relaxed);
         atomic_store_explicit(&g->given[i], 0, memory_order_relaxed);
+        g->filled[i] |= read;
+    }
+    spl_plane_levels_fill_part(levels, k, g->points, g->label, &(struct spl_plane_part){g->coarse, g->read}, threads);
 }
 
 int spl_planes_grow(uint32_t *label, const struct spl_regions *regions, struct spl_plane_levels *levels,
@@ -225,16 +230,17 @@ int spl_planes_grow(uint32_t *label, const struct spl_regions *regions, struct s
                        .lists = levels->lists,
                        .stage = stage,
                        .limits = limits};
-    size_t room = levels->count > coarser ? levels->cells[coarser].count : 0;
+    size_t room = levels->cells[levels->count > coarser ? coarser : levels->count - 1].count;
     g.given = spl_alloc(room, sizeof *g.given, err);
-    g.near = spl_alloc_raw(room, sizeof *g.near, err);
-    int rc = g.given && g.near ? 0 : SPL_E_NOMEM;
+    g.near = spl_alloc(room, sizeof *g.near, err);
+    g.read = spl_alloc(room, sizeof *g.read, err);
+    g.filled = spl_alloc(room, sizeof *g.filled, err);
+    int rc = g.given && g.near && g.read && g.filled ? 0 : SPL_E_NOMEM;
     for (unsigned k = 0; !rc && k < levels->count; k++) {
         g.cells = &levels->cells[k];
         atomic_store(&g.taken, 1);
         for (int round = 0; !rc && round < rounds && atomic_load(&g.taken); round++) {
             atomic_store(&g.taken, 0);
-            spl_plane_levels_fill(levels, k, points, label, stage->threads);
             find_work(&g, levels, k, round, stage->threads);
             spl_parallel_for(stage->threads, g.cells->count, grain, grow_cells, &g);
             rc = spl_stage_check(stage, err);
@@ -242,5 +248,7 @@ int spl_planes_grow(uint32_t *label, const struct spl_regions *regions, struct s
     }
     free(g.given);
     free(g.near);
+    free(g.read);
+    free(g.filled);
     return rc;
 }

@@ -17,6 +17,7 @@ struct fill {
     const struct spl_cells *cells;
     const uint32_t *label;
     struct spl_plane_list *lists;
+    const struct spl_plane_part *part; /* NULL: all cells are filled */
 };
 
 int spl_plane_levels_init(struct spl_plane_levels *levels, const struct spl_points *points, unsigned threads,
@@ -36,12 +37,31 @@ int spl_plane_levels_init(struct spl_plane_levels *levels, const struct spl_poin
     return rc;
 }
 
+uint32_t spl_plane_cell_of(const struct spl_cells *cells, size_t point)
+{
+    uint32_t low = 0, high = cells->count;
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (cells->cells[middle].begin <= point)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
 static void fill_lists(void *context, size_t begin, size_t end, unsigned worker)
 {
     const struct fill *f = context;
     const uint8_t *linear = f->points->linear;
+    const struct spl_cells *coarse = f->part ? f->part->coarse : NULL;
+    uint32_t above = coarse ? spl_plane_cell_of(coarse, f->cells->cells[begin].begin) : 0;
     (void)worker;
     for (size_t k = begin; k < end; k++) {
+        while (coarse && coarse->cells[above + 1].begin <= f->cells->cells[k].begin)
+            above++;
+        if (coarse && !atomic_load_explicit(&f->part->where[above], memory_order_relaxed))
+            continue;
         struct spl_plane_list *list = &f->lists[k];
         memset(list->label, 0xff, sizeof list->label);
         memset(list->count, 0, sizeof list->count);
@@ -69,7 +89,13 @@ static void fill_lists(void *context, size_t begin, size_t end, unsigned worker)
 void spl_plane_levels_fill(struct spl_plane_levels *levels, unsigned k, const struct spl_points *points,
                            const uint32_t *label, unsigned threads)
 {
-    struct fill fill = {points, &levels->cells[k], label, levels->lists};
+    spl_plane_levels_fill_part(levels, k, points, label, NULL, threads);
+}
+
+void spl_plane_levels_fill_part(struct spl_plane_levels *levels, unsigned k, const struct spl_points *points,
+                                const uint32_t *label, const struct spl_plane_part *part, unsigned threads)
+{
+    struct fill fill = {points, &levels->cells[k], label, levels->lists, part};
     spl_parallel_for(threads, fill.cells->count, grain, fill_lists, &fill);
 }
 
