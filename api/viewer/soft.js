@@ -8,6 +8,7 @@ import {choose, makeControl, table} from "./methods.js";
 const SVG = "http://www.w3.org/2000/svg",
   BINS = 40,
   STEPS = 200;
+const LABELS = {soft_of: "Other layers"};
 const $ = (id) => document.getElementById(id);
 
 /** From where to where an attribute's slider goes: uncertainty is asked for as a share of its 99th percentile. */
@@ -52,7 +53,7 @@ export class Soft extends EventTarget {
       control.id = label.htmlFor = `control-${parameter.name}`;
       help.id = `${control.id}-help`;
       control.setAttribute("aria-describedby", help.id);
-      label.textContent = parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
+      label.textContent = LABELS[parameter.name] ?? parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
       help.textContent = parameter.description;
       $("soft-more").append(label, control, help);
     }
@@ -150,7 +151,7 @@ export class Soft extends EventTarget {
       $("soft-terms").value = `${what}>0`;
     for (const name of ["soft-side", "soft-side-label"]) $(name).hidden = !(slider && attribute);
     for (const name of ["soft-threshold", "soft-threshold-label"]) $(name).hidden = !slider;
-    $("soft-histogram").hidden = !(slider && attribute);
+    $("soft-histogram").toggleAttribute("hidden", !(slider && attribute)); // SVG has no property of that name
     $("soft-kinds").hidden = !kinds;
     for (const name of ["control-soft_opacity", "soft-opacity-label"]) $(name).hidden = !what;
     if (slider) {

@@ -137,8 +137,8 @@ static const char *name_of_model(int model)
 static int take_soft_model(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
 {
     int model = 0;
-    int status =
-        spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model, SPL_SOFT_MODEL_COUNT, &model, err);
+    int status = spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model,
+                                   SPL_SOFT_MODEL_COUNT, &model, err);
     for (size_t i = 0; !status && i < a->soft_model_count; i++)
         if (a->soft_models[i] == (enum spl_soft_model)model)
             status = spl_fail(err, SPL_E_USAGE, "--soft-model has '%s' twice", text);

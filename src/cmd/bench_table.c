@@ -18,16 +18,20 @@ void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct s
         printf("%s = %s, %s\n", row->device.backend, row->device.name, row->device.driver);
     }
     const int soft = o->soft_count > 1 ? 11 : 0; // the column is there where it says something
-    printf("\n%-16s %-7s %-7s %*s%4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s\n", "dataset", "device",
-           "method", -soft, soft ? "soft" : "", "lod", "frame", "q1", "q3", "units", "floor", "select", "upload", "clear", "depth", "shade",
-           "resolve", "readback", "splats");
+    printf("\n%-16s %-7s %-7s %*s%4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s%s\n", "dataset", "device",
+           "method", -soft, soft ? "soft" : "", "lod", "frame", "q1", "q3", "units", "floor", "select", "upload",
+           "clear", "depth", "shade", "resolve", "readback", "splats", soft ? "  spheres" : "");
     for (size_t i = 0; i < r->row_count; i++) {
         const struct spl_bench_row *row = &r->rows[i];
-        printf(
-            "%-16.16s %-7s %-7s %*s%4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f %10.0f\n",
-            spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), -soft,
-            soft ? name_soft(row->drawn_soft) : "", row->lod, row->frame.median, row->frame.q1, row->frame.q3, row->units.median, row->floor / r->calibrator.median,
-            row->select, row->upload, row->clear, row->depth, row->shade, row->resolve, row->readback, row->splats);
+        printf("%-16.16s %-7s %-7s %*s%4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f "
+               "%10.0f",
+               spl_dataset_get_info(row->dataset)->id, row->device.backend, spl_method_name(row->method), -soft,
+               soft ? name_soft(row->drawn_soft) : "", row->lod, row->frame.median, row->frame.q1, row->frame.q3,
+               row->units.median, row->floor / r->calibrator.median, row->select, row->upload, row->clear, row->depth,
+               row->shade, row->resolve, row->readback, row->splats);
+        if (soft)
+            printf(" %8.1f", row->soft);
+        putchar('\n');
         if (row->panels || row->meshes || row->lines)
             printf("%-16s and %.0f panels, %.0f meshes, %.0f lines\n", "", row->panels, row->meshes, row->lines);
         if (row->incomplete)

@@ -153,8 +153,8 @@ void spl_cmd_print_methods(FILE *out, size_t column)
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
-                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', 'uncertainty>q0.9', "
-                          "'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', "
+                          "'uncertainty>q0.9', 'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
                           "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (SPL_PARAMS_OF_ALL >> i & 1)

@@ -15,7 +15,8 @@ const uint32_t spl_passes_caps[SPL_PASSES_CAPS] = {0, 1, 4, 8};
 static void take_stats(const struct spl_frame_stats *s, double *times, uint32_t rounds, uint32_t round)
 {
     const double ms[stages] = {s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms,
-                               s->select_ms + s->upload_ms + s->clear_ms + s->depth_ms + s->shade_ms + s->resolve_ms};
+                               s->select_ms + s->upload_ms + s->clear_ms + s->depth_ms + s->shade_ms + s->soft_ms +
+                                   s->resolve_ms};
     for (int stage = 0; stage < stages; stage++)
         times[(size_t)stage * rounds + round] = ms[stage];
 }

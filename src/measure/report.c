@@ -39,7 +39,7 @@ static double pick_ms(const struct spl_sweep_time *t)
 
 static double pick_device(const struct spl_sweep_time *t)
 {
-    return t->clear_ms + t->depth_ms + t->shade_ms + t->resolve_ms;
+    return t->clear_ms + t->depth_ms + t->shade_ms + t->soft_ms + t->resolve_ms;
 }
 
 #define STAGE(name)                                                                                                    \

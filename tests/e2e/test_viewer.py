@@ -764,6 +764,7 @@ def test_what_is_soft():
         assert term == "uncertainty>0.75", term  # three quarters of the way to the 99th percentile
         assert tab.run("document.querySelector('#soft-terms').value") == term
         bars = tab.run("[...document.querySelectorAll('#soft-histogram rect')].map(e => [+e.getAttribute('height'), e.classList.contains('on')])")
+        assert tab.run("document.querySelector('#soft-histogram').getBoundingClientRect().height") > 20, "it is seen"
         assert len(bars) == 40 and bars[0][0] == 12 and bars[5][0] < 6 and not bars[0][1] and bars[-1][1]
         tab.run("document.querySelector('#soft-threshold').focus()")
         for _ in range(3):
@@ -945,6 +946,11 @@ def test_embed():
         tab.drag((200, 150), (260, 150))
         settled(tab, digest)
         assert all(name for _, name in tab.names())
+    term = "axis:0,0,0,0,0,1<0.5 or class:3"
+    with page(f"{SITE}/embed/wall#eye=3,0,1&target=0,0,1&budget=500ms&soft={urllib.parse.quote(term)}&soft_opacity=0.5",
+              size=(400, 300)) as tab:
+        asked = [urllib.parse.unquote(name) for name, *_ in tab.run(VIEWS)]
+        assert asked and all(f"soft={term}&soft_opacity=0.5" in url for url in asked), asked
     with page(
         f"{SITE}/embed/none", ready="!document.querySelector('#notice').hidden", complaints="404", size=(400, 300)
     ) as tab:

@@ -54,6 +54,7 @@ with tempfile.TemporaryDirectory() as folder:
     rows = json.loads(must("bench", folder / "a.spld", *common, *soft, "--lod", "2,1", "--json"))["rows"]
     assert [(r["lod"], r["soft"]) for r in rows] == [(l, s) for l in (2, 1) for s in ("solid", "layer", "express")], rows
     table = must("bench", folder / "a.spld", *common, *soft)
+    assert "spheres" in table and "spheres" not in must("bench", folder / "a.spld", *common)
     assert [line.split()[3] for line in table.splitlines() if line.startswith("a ")] == ["solid", "layer", "express"], table
 
     for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out"],

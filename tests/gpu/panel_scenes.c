@@ -74,6 +74,7 @@ struct spl_dataset *random_panels(size_t planes, size_t splats, const double cen
     for (size_t i = 0; i < planes; i++) {
         struct spl_panel_plane *plane = &made[i].plane;
         made[i].panels = panels + i * most;
+        made[i].classes_vary = true;
         made[i].color_error = uniform() < 0.5 ? 3 : 12;
         plane->cell = (float)(cell * pow(4, uniform() - 0.5));
         plane->points = 100;

@@ -19,8 +19,8 @@ void random_relief(struct spl_relief *relief, unsigned level, double most);
 
 /* `planes` planes of up to 40 panels each around `center`, cells of some `cell`, and `splats` splats. Of four planes or
  * so all cells, drawn as discs, are few enough for the largest weight; with less of it depths are rounded more. Where
- * `relief` is not 0 they are meshes with heights of up to so many cells, of each level in turns. The renderer's, until
- * done(). */
+ * `relief` is not 0 they are meshes with heights of up to so many cells, of each level in turns. Panel i of a
+ * plane has class i % 3. The renderer's, until done(). */
 struct spl_dataset *random_panels(size_t planes, size_t splats, const double center[3], double cell, double relief);
 
 /* As the reference draws them: as such, where the method has them, and as cells. */

@@ -17,6 +17,7 @@
 #include "support/make_textures.h"
 #include "support/mapped_dataset.h"
 #include "support/reference.h"
+#include "support/reference_marks.h"
 #include "support/sanitised.h"
 
 static struct spl_soft_term class_of(double least, double most)
@@ -116,9 +117,11 @@ static void cells_are_cut(void **state)
         view.shapes = SPL_SHAPES_OFF;
         view.soft = (struct spl_soft_params){.count = 1, .terms = {shape_of(SPL_SOFT_PLANE, origin)}};
         same_by_all(dataset, &view, relief ? "meshes" : "panels");
-        view.soft.terms[0] = class_of(0, 0); /* all of them, as such */
         view.shapes = SPL_SHAPES_ALL;
+        view.soft.terms[0] = class_of(1, 1); /* some of a chunk, as such */
         same_by_all(dataset, &view, relief ? "class of meshes" : "class of panels");
+        view.soft.terms[0] = class_of(0, 2); /* all of them */
+        same_by_all(dataset, &view, relief ? "all meshes" : "all panels");
         done(dataset);
     }
 }
@@ -134,6 +137,48 @@ static void equal_frames(const struct spl_dataset *dataset, const struct spl_vie
     }
     spl_frame_finish(&one);
     spl_frame_finish(&other);
+}
+
+/* Of panels that a shape cuts, drawn as such otherwise, nothing is left on its soft side but by half a cell. */
+static void panels_end_where_they_are_cut(void **state)
+{
+    static const enum spl_method methods[] = {SPL_METHOD_SPLAT, SPL_METHOD_NEAREST};
+    size_t all = 0;
+    (void)state;
+    for (int i = 0; i < 8; i++) {
+        struct spl_dataset *dataset = random_panels(4, 0, origin, 0.012, i / 2 % 2 ? 3 : 0);
+        struct spl_view view = looking(origin, 3, 160, 120);
+        size_t beyond[2] = {0}, there = 0;
+        view.lod = 0;
+        view.method = methods[i % 2];
+        const struct spl_soft_term cut = shape_of(SPL_SOFT_PLANE, origin); /* soft below 0 */
+        for (int soft = 0; soft < 2; soft++) {
+            view.soft = (struct spl_soft_params){.count = (uint32_t)soft, .terms = {cut}};
+            struct spl_frame frame = render(dataset, &view);
+            const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+            for (uint32_t p = 0; p < 160 * 120; p++) {
+                const double z = (double)depth[p], x = p % 160 + 0.5, y = p / 160 + 0.5;
+                const double at[3] = {(x - view.camera.cx) / view.camera.fx * z,
+                                      (y - view.camera.cy) / view.camera.fy * z, z};
+                double world[3];
+                if (!(z > 0 && z < 100))
+                    continue;
+                for (int a = 0; a < 3; a++) {
+                    world[a] = view.camera.eye[a];
+                    for (int c = 0; c < 3; c++)
+                        world[a] += view.camera.rotation[3 * c + a] * at[c];
+                }
+                beyond[soft] += reference_distance(&cut, world) < -0.08;
+                there += (size_t)soft;
+            }
+            spl_frame_finish(&frame);
+        }
+        if (beyond[1] > 10) /* discs of the margin, seen along their edge */
+            fail_msg("%zu of %zu pixels lie beyond the cut, %zu without it", beyond[1], there, beyond[0]);
+        all += beyond[0] > 200 && there > 200;
+        done(dataset);
+    }
+    assert_true(all >= 4);
 }
 
 static void look_around(const struct make_map *map, const double d[3], double color[3], double *range)
@@ -277,6 +322,7 @@ int main(int argc, char **argv)
         frames_test(attributes_filter),
         frames_test(shapes_filter),
         frames_test(cells_are_cut),
+        frames_test(panels_end_where_they_are_cut),
         frames_test(mapped_splats_filter),
         frames_test(textured_splats_filter),
         frames_test(lines_give_way),

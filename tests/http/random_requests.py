@@ -41,6 +41,8 @@ def random_value(r, schema, depth=0):
     pattern = schema.get("pattern", "")
     if ",[^,]+" in pattern:
         return ",".join(str(r.choice([r.randint(-9, 9), r.uniform(-9, 9)])) for _ in range(3))
+    if "examples" in schema:
+        return r.choice(schema["examples"])
     return r.choice(["5ms", "ff0000", "transparent", "wall", "1"])
 
 

@@ -194,7 +194,7 @@ def test_view_headers():
         wanted = dict(fx=100, fy=101, cx=30, cy=20, width=64, height=48, near=0.5, far=9)
         headers = d.view(eye="3,0.5,1", target="0,0,1", **wanted).headers
         stages = dict(re.findall(r"(\w+);dur=([\d.]+)", headers["Server-Timing"]))
-        assert list(stages) == ["queue", "pages", "frame", "select", "depth", "shade", "resolve", "readback", "encode",
+        assert list(stages) == ["queue", "pages", "frame", "select", "depth", "shade", "soft", "resolve", "readback", "encode",
                                 "total"], headers["Server-Timing"]
         assert float(stages["total"]) >= float(stages["encode"]) > 0
         camera = json.loads(headers["Splatd-Camera"])

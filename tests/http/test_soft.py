@@ -32,6 +32,13 @@ def test_what_is_soft_comes_back():
         assert batch.status == 200 and batch.body.count(b"Splatd-Soft: ") == 1, batch.body[:2000]
 
 
+def test_a_budget_leaves_it_alone():
+    with Daemon(FAKE) as d:
+        reply = d.ask(f"{VIEW}?width=16&height=16&budget=500ms&soft={AXIS}&soft_opacity=0.9&soft_model=base")
+        assert reply.status == 200 and reply.headers["Splatd-Chosen"], reply.headers
+        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0, "soft_of": "solid"}
+
+
 def test_a_dataset_says_what_may_be_soft():
     with Daemon(REAL) as d:
         info = d.ask("/v1/datasets/wall").json()

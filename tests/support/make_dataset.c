@@ -111,8 +111,16 @@ static double add_panels(struct build *b, struct spl_node *node, const struct ma
         chunk->first_id = b->splats;
         b->splats += n;
         for (int s = 0; s < SPL_STREAM_KNOWN_COUNT; s++) {
-            b->bases[s][index] = s == SPL_STREAM_CLASS ? panels->classification : 0;
-            b->widths[s][index] = 0;
+            struct spl_stream_code code;
+            double values[SPL_PANELS_MAX];
+            for (uint32_t i = 0; i < n; i++)
+                values[i] = s == SPL_STREAM_CLASS
+                                ? (double)(panels->classification + (panels->classes_vary ? (first + i) % 3 : 0))
+                                : 0;
+            *used += spl_stream_encode(spl_stream_type_from_name(spl_streams_known[s].type), values, n, &code,
+                                       words + *used);
+            b->bases[s][index] = code.base;
+            b->widths[s][index] = code.width;
         }
         spl_panels_get_frame(chunk, &frame);
         spl_panels_get_extent(chunk, &extent[0], &extent[1]);

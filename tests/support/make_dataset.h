@@ -38,6 +38,7 @@ struct make_panels {
     size_t count;       /* a chunk for each SPL_PANELS_MAX of them; the points are those of the first */
     double color_error; /* as of spl_panels_encode() */
     uint8_t classification;
+    bool classes_vary;  /* panel i has i % 3 more */
     bool coarse;        /* of two levels: the root's; else of the octant where its origin lies */
 };
 

@@ -125,7 +125,7 @@ static json_t *describe_soft(const struct spl_dataset_info *info)
         if (values && values->kind_count)
             json_array_append_new(forms, json_sprintf("%s:%.17g", name, values->kinds[values->kind_count - 1].value));
         else if (values || !share)
-            json_array_append_new(forms, json_sprintf("%s>%.4g", name, values ? share ? 0.5 : values->quantiles[32] : 0));
+            json_array_append_new(forms, json_sprintf("%s>%.4g", name, !values ? 0 : share ? 0.5 : values->quantiles[32]));
         if (values)
             json_array_append_new(forms, json_sprintf("%s>q0.9", name));
     }

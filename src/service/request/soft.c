@@ -39,8 +39,8 @@ int spl_soft_to_world(struct spl_soft_params *soft, uint32_t crs, const struct s
         struct spl_soft_term *term = &soft->terms[i];
         if (term->measure == SPL_SOFT_BOX)
             rc = spl_fail_field(err, SPL_E_INPUT, "soft",
-                                "a box lies along the dataset's own axes and cannot be given in EPSG:%u; ask for the view "
-                                "without crs, in the dataset's coordinates", crs);
+                                "a box lies along the dataset's own axes and cannot be given in EPSG:%u; ask for the "
+                                "view without crs, in the dataset's coordinates", crs);
         else if (term->measure == SPL_SOFT_AXIS || term->measure == SPL_SOFT_PLANE)
             rc = places->to_world(places, crs, "soft", term->shape, term->shape, err);
     }

@@ -77,10 +77,9 @@ struct spl_rendering *spl_rendering_create(struct spl_job *job, const struct spl
     const struct spl_frame_stats *s = &job->stats;
     snprintf(rendering->timing, sizeof rendering->timing,
              "queue;dur=%.3f, pages;dur=%.3f, frame;dur=%.3f, select;dur=%.3f, depth;dur=%.3f, shade;dur=%.3f, "
-             "resolve;dur=%.3f, "
-             "readback;dur=%.3f, encode;dur=%.3f",
-             job->queue_ms, job->pages_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->resolve_ms,
-             s->readback_ms, job->encode_ms);
+             "soft;dur=%.3f, resolve;dur=%.3f, readback;dur=%.3f, encode;dur=%.3f",
+             job->queue_ms, job->pages_ms, s->total_ms, s->select_ms, s->depth_ms, s->shade_ms, s->soft_ms,
+             s->resolve_ms, s->readback_ms, job->encode_ms);
     rendering->references = 1;
     rendering->key = *key;
     rendering->reusable = s->complete && !job->request.planned;
