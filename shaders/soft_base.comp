@@ -6,11 +6,11 @@
  * found by looking through all spheres that may begin before it and are not over, of which none is farther from the
  * event than the largest radius of the list. So no sphere is kept, and there is no limit on those that are open. A walk
  * through the list is one event t:
- *   the integrals at t of spheres that were open before it, less those at the event before of the same: the depth of the
- *   stretch between (they are kept as one sum: `before` and `after`);
+ *   the integrals at t of spheres that were open before it, less those of the same at the event before: the depth of
+ *   the stretch between (they are kept as one sum: `before` and `after`);
  *   the colour of what is open behind it (eq. 11), and the next event.
- * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left at the last
- * event: COUNTS[progress] says how many were left, and behind it lies the depth that each invocation reached. The host
+ * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left at the
+ * last event: COUNTS[progress] says how many were left, and behind it lies the depth that each invocation reached. The host
  * runs the kernel again until none is.
  *
  * Transmittance is e to the sum of depths, in 24 bits: what a stretch hides is the difference of two of them, so that

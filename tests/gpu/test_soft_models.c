@@ -1,5 +1,5 @@
-/* Kernel soft_base against the reference in doubles: base and concentric over lists of tiles, with spheres that overlap,
- * are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds than a
+/* Kernel soft_base against the reference in doubles: base and concentric over lists of tiles, with spheres that
+ * overlap, are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds than a
  * kernel may take; and layer. Colour over black and what passes, within a level of 255. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
@@ -191,7 +191,7 @@ static int matches(struct scene *s, const char *what)
         struct soft_seen wanted =
             soft_see(&s->look, s->spheres, s->count, ray, 0.125, fmin(100, (double)s->solid[i]));
         for (int c = 0; c < 4; c++) {
-            double is = c < 3 ? got[4 * i + c] / (double)SPL_SOFT_CLEAR : 255 * (1 - got[4 * i + 3] / (double)SPL_SOFT_CLEAR);
+            double share = got[4 * i + c] / (double)SPL_SOFT_CLEAR, is = c < 3 ? share : 255 * (1 - share);
             double off = fabs(is - (c < 3 ? wanted.color[c] : 255 * wanted.transmittance));
             most = fmax(most, off);
             if (off > 1)
@@ -282,8 +282,12 @@ static void layers_match(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(crowds_match),  cmocka_unit_test(walls_cut),        cmocka_unit_test(eyes_within_and_equal_depths),
-        cmocka_unit_test(borders_match), cmocka_unit_test(long_walks_go_on), cmocka_unit_test(layers_match),
+        cmocka_unit_test(crowds_match),
+        cmocka_unit_test(walls_cut),
+        cmocka_unit_test(eyes_within_and_equal_depths),
+        cmocka_unit_test(borders_match),
+        cmocka_unit_test(long_walks_go_on),
+        cmocka_unit_test(layers_match),
     };
     return cmocka_run_group_tests(tests, open_all, close_all);
 }
