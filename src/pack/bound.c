@@ -28,27 +28,34 @@ static const char *print_length(double length, double unit_m, char text[length_t
 int spl_bound_check(const struct spl_bound *bound, const struct spl_points *points, struct spl_error *err)
 {
     char chosen[length_text_max], measured[length_text_max];
-    double longest = 0;
     if (!(bound->error > 0) || !points->count)
         return SPL_OK;
-    for (int c = 0; c < 3; c++)
-        longest = fmax(longest, points->bounds_max[c] - points->bounds_min[c]);
     float radii[1024];
     size_t sample = points->count < 1024 ? points->count : 1024;
     for (size_t i = 0; i < sample; i++)
         radii[i] = points->radius[i * points->count / sample];
     double spacing = spl_median(radii, sample) / radius_spacing;
-    print_length(bound->error, bound->unit_m, chosen);
-    if (longest > 0 && bound->error > size_share * longest)
-        return spl_fail_field(err, SPL_E_USAGE, "error",
-                              "--error %s: the whole scan is %s long, and what primitives may be off their points is "
-                              "at most a tenth of that: name some millimetres, or leave --error out",
-                              chosen, print_length(longest, bound->unit_m, measured));
     if (bound->error < spacing_share * spacing)
         return spl_fail_field(err, SPL_E_USAGE, "error",
                               "--error %s: the scan's points are %s apart, and none of them is known to a ten "
                               "thousandth of that: name some millimetres, or leave --error out",
-                              chosen, print_length(spacing, bound->unit_m, measured));
+                              print_length(bound->error, bound->unit_m, chosen),
+                              print_length(spacing, bound->unit_m, measured));
+    return SPL_OK;
+}
+
+int spl_bound_check_size(const struct spl_bound *bound, const struct spl_points *points, struct spl_error *err)
+{
+    char chosen[length_text_max], measured[length_text_max];
+    double longest = 0;
+    for (int c = 0; c < 3; c++)
+        longest = fmax(longest, points->bounds_max[c] - points->bounds_min[c]);
+    if (longest > 0 && bound->error > size_share * longest)
+        return spl_fail_field(err, SPL_E_USAGE, "error",
+                              "--error %s: the whole scan is %s long, and what primitives may be off their points is "
+                              "at most a tenth of that: name some millimetres, or leave --error out",
+                              print_length(bound->error, bound->unit_m, chosen),
+                              print_length(longest, bound->unit_m, measured));
     return SPL_OK;
 }
 

@@ -12,8 +12,10 @@ struct spl_bound {
     double unit_m; /* metres each, > 0 */
 };
 
-/* Before planes are looked for. SPL_E_USAGE, field "error": a bound as large as the scan's own things, or finer than
- * any scan says where a surface lies. */
+/* As soon as the scan's bounds are known. SPL_E_USAGE, field "error": a bound as large as the scan's own things. */
+int spl_bound_check_size(const struct spl_bound *bound, const struct spl_points *points, struct spl_error *err);
+
+/* Before planes are looked for. The same: one finer than any scan says where a surface lies. */
 int spl_bound_check(const struct spl_bound *bound, const struct spl_points *points, struct spl_error *err);
 
 /* What the user should know of a bound far from what the scan's noise asks for, once that has been measured; NULL:

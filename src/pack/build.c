@@ -95,11 +95,16 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         spl_maps_plan(p->stage, &later->pictures, 1, points);
 }
 
-static int find_planes(struct spl_build *p, struct spl_error *err)
+static struct spl_bound get_bound(const struct spl_build *p)
 {
     double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
-    const struct spl_planes_options planes = {.error = p->options->error / unit, .relief = true};
-    const struct spl_bound bound = {.error = planes.error, .unit_m = unit};
+    return (struct spl_bound){.error = p->options->error / unit, .unit_m = unit};
+}
+
+static int find_planes(struct spl_build *p, struct spl_error *err)
+{
+    const struct spl_bound bound = get_bound(p);
+    const struct spl_planes_options planes = {.error = bound.error, .relief = true};
     char doubt[SPL_BOUND_TEXT_MAX];
     if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
         return 0;
@@ -241,6 +246,9 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     p.sides_known = p.points.normal || p.points.station_count || p.points.eye_count;
     if (!rc)
         rc = spl_points_order(&p.points, stage, err);
+    const struct spl_bound bound = get_bound(&p);
+    if (!rc)
+        rc = spl_bound_check_size(&bound, &p.points, err);
     if (!rc)
         rc = spl_stage_check(stage, err);
     if (!rc && !options->no_linear)

@@ -7,6 +7,8 @@
 
 #include "pack/neighbours.h"
 
+static const double error_most = 1e6; /* metres: a tenth of the way from a pole to the equator */
+
 int spl_pack_check_primitives(const struct spl_pack_options *o, struct spl_error *err)
 {
     static const char *const field = "primitives";
@@ -15,6 +17,11 @@ int spl_pack_check_primitives(const struct spl_pack_options *o, struct spl_error
                               "%g; what primitives may be off their points is a length, 0 or "
                               "more metres",
                               o->error);
+    if (o->error > error_most) // what each scan's own size says as well, once it is read
+        return spl_fail_field(err, SPL_E_USAGE, "error",
+                              "%g m; what primitives may be off their points is at most a tenth of the scan, and %g m in "
+                              "any case: name some millimetres, or leave it out",
+                              o->error, error_most);
     if (o->primitives != SPL_PRIMITIVES_OFF && o->primitives != SPL_PRIMITIVES_ALL)
         return spl_fail_field(err, SPL_E_USAGE, field, "%d; off or all", (int)o->primitives);
     if (o->primitives == SPL_PRIMITIVES_OFF && o->export_primitives)

@@ -93,6 +93,20 @@ static void pieces_change_no_byte(void **state)
     }
     done(dataset);
     spl_renderer_set_work_a_step(renderer, UINT64_MAX);
+    /* so many on a sample that the weight is less than the largest */
+    struct spl_dataset *dense = random_cube(120000, origin, 0.02);
+    struct spl_view view = looking(origin, 12, 64, 48);
+    size_t steps;
+    view.lod = 0;
+    struct spl_frame whole = render_in_steps(dense, &view, &steps);
+    spl_renderer_set_work_a_step(renderer, 1 << 22);
+    struct spl_frame pieces = render_in_steps(dense, &view, &steps);
+    assert_true(steps > 3);
+    assert_same(&whole, &pieces, "many on a sample");
+    spl_frame_finish(&whole);
+    spl_frame_finish(&pieces);
+    done(dense);
+    spl_renderer_set_work_a_step(renderer, UINT64_MAX);
 }
 
 /* Chunks of meshes that no packer makes: panels in one place, of the finest lattice, each of whose triangles is as

@@ -285,7 +285,8 @@ static void a_bound_is_held_against_the_scan(void **state)
                 {1e-9, "", "--error 1e-06 mm: the scan's points are"},
                 {0.09, "things up to that thick are one", ""},
                 {0.2, "", "--error 200 mm: the whole scan is 1."},
-                {10, "", "--error 10 m: the whole scan is 1."}};
+                {10, "", "--error 10 m: the whole scan is 1."},
+                {1e9, "", "1e+09 m; what primitives may be off"}};
     char scan[512];
     const char *input = strcpy(scan, write_corner("bound.csv", walls, 0));
     (void)state;
