@@ -30,6 +30,8 @@ static void test_simplify(void **state)
     assert_int_equal(spl_simplify((const double(*)[3])v, 99, false, 0.01, kept, stack), 2);
     assert_true(kept[0] && kept[98]);
     assert_int_equal(spl_simplify((const double(*)[3])v, 1, false, 0.01, kept, stack), 1);
+    const double back[3][3] = {{0}, {2}, {1}}; /* what goes past its end and comes back is no straight line */
+    assert_int_equal(spl_simplify(back, 3, false, 0.01, kept, stack), 3);
     memset(v, 0, sizeof v);
     assert_true(spl_simplify((const double(*)[3])v, 50, true, 0.01, kept, stack) <= 2);
 }
