@@ -15,7 +15,7 @@ static const double noise_sigmas = 4, spacing_share = 0.2; /* that vertices may 
 /* How much lower a wire hangs on both sides of a support: tolerances as above, and a share of its length. */
 static const double zigzag = 3, dip_share = 0.002;
 static const double text_share = 0.002; /* of the scan's diagonal */
-static const double stands = 0.5; /* level part of a chord, of the whole, below which a line stands */
+static const double stands = 0.5;       /* level part of a chord, of the whole, below which a line stands */
 
 struct outlining {
     struct spl_shapes *shapes;
@@ -108,6 +108,18 @@ static void outline_planes(void *context, size_t begin, size_t end, unsigned wor
     }
 }
 
+/* Takes out pieces without a square that has points enough: nothing of them would be drawn. */
+static void drop_empty(struct spl_shapes *shapes)
+{
+    uint32_t kept = 0;
+    for (uint32_t k = 0; k < shapes->mesh_count; k++)
+        if (shapes->meshes[k].triangle_count)
+            shapes->meshes[kept++] = shapes->meshes[k];
+        else
+            spl_shape_mesh_finish(&shapes->meshes[k]);
+    shapes->mesh_count = kept;
+}
+
 static int outline_all(struct spl_shapes *shapes, const struct spl_points *points, const struct spl_planes *planes,
                        struct spl_stage *stage, struct spl_error *err)
 {
@@ -138,6 +150,8 @@ static int outline_all(struct spl_shapes *shapes, const struct spl_points *point
         if (!rc && atomic_load(&o.failed))
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the outlines of %u planes", planes->count);
     }
+    if (!rc)
+        drop_empty(shapes);
     free(first);
     free(member);
     return rc;
