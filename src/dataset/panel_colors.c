@@ -9,8 +9,6 @@
 #include "dataset/panel_texels.h"
 
 enum { side = SPL_PANEL_SIDE, blocks = 16, levels = SPL_PANEL_EVEN + 1 };
-/* A panel of one colour keeps to this share of the error: its border is a step on a wall that is all but even. */
-static const double even_error = 0.5;
 
 bool spl_panel_mean_color(const struct spl_panel *panel, unsigned x0, unsigned y0, unsigned wide, float color[3])
 {
@@ -130,13 +128,12 @@ static double measure_block(const struct spl_panel *panel, const struct spl_pane
 static bool is_near(const struct spl_panel *panel, unsigned level, uint32_t there, const uint32_t *words,
                     uint32_t count, double color_error)
 {
-    const double limit = level == SPL_PANEL_EVEN ? even_error * color_error : color_error;
     struct spl_panel_texels texels;
     struct spl_panel_between between[side];
     read_texels(&(struct spl_panel_words){words, count - 1}, 0, level, there, &texels);
     spl_panel_texels_place(texels.level, between);
     for (unsigned b = 0; b < blocks; b++)
-        if (measure_block(panel, &texels, between, b) > limit * limit)
+        if (measure_block(panel, &texels, between, b) > color_error * color_error)
             return false;
     return true;
 }
