@@ -11,8 +11,6 @@
 enum { side = SPL_PANEL_SIDE, blocks = 16, levels = SPL_PANEL_EVEN + 1 };
 /* Texels whose cells are off by so many times the error are not coded: they would be no nearer. */
 static const double far_off = 2;
-/* A panel of one colour keeps to this share of the error: its border is a step on a wall that is all but even. */
-static const double even_error = 0.5;
 
 bool spl_panel_mean_color(const struct spl_panel *panel, unsigned x0, unsigned y0, unsigned wide, float color[3])
 {
@@ -151,7 +149,7 @@ uint32_t spl_panel_colors_encode(const struct spl_panel *panel, uint32_t there, 
         if (!used)
             continue;
         read_texels(&(struct spl_panel_words){words, used - 1}, 0, *level, there, &texels);
-        if (is_within(panel, &texels, (*level == SPL_PANEL_EVEN ? even_error : 1) * color_error))
+        if (is_within(panel, &texels, color_error))
             return used;
     }
     return encode(panel, 0, there, color_error, words);

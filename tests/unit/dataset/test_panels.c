@@ -129,23 +129,6 @@ static void slopes_are_interpolated(void **state)
     assert_true(color_error_of(&m.panels[0], &out) < 3.5);
 }
 
-/* A wall that is all but even has no step from panel to panel: one colour would be off by 2.4 levels at either end. */
-static void one_color_keeps_to_half_the_error(void **state)
-{
-    (void)state;
-    static struct made m;
-    m = (struct made){.used = 0};
-    for (unsigned y = 0; y < SPL_PANEL_SIDE; y++) {
-        m.panels[0].cells[y] = 0xffff;
-        for (unsigned x = 0; x < SPL_PANEL_SIDE; x++)
-            memset(m.panels[0].color[y][x], (int)(60.5 + 0.4 * x), 3);
-    }
-    encode(&m, 1, 3);
-    assert_int_equal(m.used, 2 + 2);
-    encode(&m, 1, 6);
-    assert_int_equal(m.used, 2 + 1);
-}
-
 /* One colour costs a word, a slow gradient a block, what changes from cell to cell a texel a cell. */
 static void colors_cost_what_they_need(void **state)
 {
@@ -270,7 +253,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cells_come_back),
         cmocka_unit_test(slopes_are_interpolated),
-        cmocka_unit_test(one_color_keeps_to_half_the_error),
         cmocka_unit_test(colors_cost_what_they_need),
         cmocka_unit_test(small_features_stay),
         cmocka_unit_test(a_panel_is_a_disc_from_afar),
