@@ -90,7 +90,7 @@ def test_metrics_of_datasets_stages_and_tours():
             assert (got["splatd_datasets"], got["splatd_datasets_refused"]) == (1, 1), got
             assert 'splatd_dataset_resident_bytes{dataset="broken"}' not in got
             stages = [name for name in got if name.startswith("splatd_stage_seconds_total{")]
-            assert len(stages) == 7 and not any(got[name] for name in stages), got
+            assert len(stages) == 8 and not any(got[name] for name in stages), got
             path = {"keyframes": [{"camera": {"eye": [x, 0, 1], "target": [0, 0, 1], "fov": 60}} for x in (3, 4)]}
             reply = d.post({"path": path, "frames": 3, "settings": {"width": 32, "height": 32}}, "/v1/datasets/a/tours")
             assert reply.status == 202, reply.body
