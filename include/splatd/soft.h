@@ -23,16 +23,6 @@ enum spl_soft_model {
 SPL_API const char *spl_soft_model_name(enum spl_soft_model model);
 SPL_API int spl_soft_model_from_name(const char *name); /* -1 for an unknown name */
 
-/* What layers depth, range, normal, id, primitive and picks speak of. */
-enum spl_soft_of {
-    SPL_SOFT_OF_SOLID,  /* what is solid, as if nothing soft were there */
-    SPL_SOFT_OF_FIRST,  /* the nearest of that and any sphere whose opacity there is 1/255 or more */
-    SPL_SOFT_OF_MEDIAN, /* where half of the light is held back, else what is solid */
-    SPL_SOFT_OF_COUNT
-};
-SPL_API const char *spl_soft_of_name(enum spl_soft_of of);
-SPL_API int spl_soft_of_from_name(const char *name); /* -1 for an unknown name */
-
 /* What a term measures of a splat. */
 enum spl_soft_measure {
     SPL_SOFT_ATTRIBUTE, /* an optional attribute by name: of uncertainty its share of the dataset's 99th percentile, of
@@ -62,7 +52,6 @@ struct spl_soft_params {
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22; 0 = a
                        sharp border. Classes have none */
-    enum spl_soft_of of;
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:
