@@ -14,7 +14,7 @@ SPL_BEGIN_DECLARATIONS
 
 /* How dense a sphere of radius r is along a ray that passes its centre at distance d. */
 enum spl_soft_model {
-    SPL_SOFT_MODEL_EXPRESS,    /* a disc that faces the eye: opacity lambda (cos(pi d / r) + 1) / 2; eq. 19 */
+    SPL_SOFT_MODEL_EXPRESS,    /* a disc that faces the eye, of nearly base's opacity */
     SPL_SOFT_MODEL_CONCENTRIC, /* shells of constant density; eq. 13 to 15, whose densities add */
     SPL_SOFT_MODEL_BASE,       /* density r - distance from the centre, integrated; eq. 2 to 12 */
     SPL_SOFT_MODEL_LAYER,      /* the first soft surface alone, as discs of one opacity: for comparison */
@@ -50,8 +50,8 @@ struct spl_soft_params {
     struct spl_soft_term terms[SPL_SOFT_TERMS_MAX];
     enum spl_soft_model model;
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
-    double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22; 0 = a
-                       sharp border. Classes have none */
+    double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
+                       at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border. Classes have none */
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:
