@@ -372,10 +372,12 @@ struct spl_frame_params {
 #define SPL_SOFT_CLEAR 0xffffffu
 #define SPL_SOFT_CLEAR_LEAST 0x4000u
 #define SPL_SOFT_STATE_WORDS 4 /* a sample: sums of red, green, blue times share, share covered; 0 = nothing */
-/* What an invocation counts: items | most entries of one << 4 | entries << 16, least and greatest depth (float bits). */
-#define SPL_SOFT_SLOT_WORDS 3
+/* What an invocation counts: items | most entries of one << 4 | entries << 16, least and greatest depth, largest radius
+ * (float bits). */
+#define SPL_SOFT_SLOT_WORDS 4
 #define SPL_SOFT_SLOT_SPLATS 4 /* discs of a slot; SPL_SOFT_SLOT_CELLS cells */
 #define SPL_SOFT_SLOT_CELLS 8
+#define SPL_SOFT_STUCK 0x80000000u /* COUNTS[progress] of soft_base: a list is longer than one run may walk */
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
 
 /* Of one dispatch of it. */
@@ -388,7 +390,6 @@ struct spl_soft_step {
     SPL_U32 rects;         /* word of the items' rectangles */
     SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
     SPL_U32 first;         /* word of the lists where those of this dispatch start */
-    SPL_F32 opacity;       /* at a sphere's centre, of 65536 */
     SPL_F32 depth;         /* optical, through a sphere's centre: models with a density, and layer */
     SPL_F32 reach;         /* no sphere of the lists has a larger radius */
     SPL_F32 until;         /* view depth up to which these lists are whole */

@@ -10,8 +10,8 @@
  *   the stretch between (they are kept as one sum: `before` and `after`);
  *   the colour of what is open behind it (eq. 11), and the next event.
  * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left at the
- * last event: COUNTS[progress] says how many were left, and behind it lies the depth that each invocation reached. The host
- * runs the kernel again until none is.
+ * last event: COUNTS[progress] says that some were left, and behind it lies the depth that each invocation reached. The host
+ * runs the kernel again until none is. Where no event was reached none ever will be: SPL_SOFT_STUCK.
  *
  * Transmittance is e to the sum of depths, in 24 bits: what a stretch hides is the difference of two of them, so that
  * nothing is lost however short stretches are. */
@@ -110,11 +110,12 @@ void hide(inout walk w, float depth, vec3 color)
     w.clear = clear;
 }
 
-/* The nearest spheres within their margin, and nothing behind them. */
-void see_layer(inout walk w, soft_ray ray, uint begin, uint end, float until)
+/* The nearest spheres within their margin, and nothing behind them; false where they are more than may be walked. */
+bool see_layer(inout walk w, soft_ray ray, uint begin, uint end, float until)
 {
     float last = until, weights = 0.0;
     vec3 color = vec3(0.0);
+    bool all = true;
     uint i = begin;
     while (i < end) {
         soft_item item = load_item(i, ray);
@@ -123,10 +124,12 @@ void see_layer(inout walk w, soft_ray ray, uint begin, uint end, float until)
         float weight = there && item.center.z <= last ? 1.0 - item.q : 0.0;
         color += weight * item.color;
         weights += weight;
-        i = item.center.z > last || i - begin >= SPL_SOFT_ROUNDS ? end : i + 1u;
+        all = item.center.z > last || i + 1u >= end || i - begin < SPL_SOFT_ROUNDS;
+        i = item.center.z > last || !all ? end : i + 1u;
     }
     if (weights > 0.0)
         hide(w, job.depth, color / weights);
+    return all;
 }
 
 /* Where it is entered and left. In a function of its own: glslang follows what is precise back through a loop without
@@ -137,14 +140,26 @@ vec2 chord_of(float middle, float half_chord)
     return events;
 }
 
+/* Rounds that an invocation may take: shells are rounds, too, and no sphere of the list has more of them. */
+uint most_rounds(uint begin, soft_ray ray)
+{
+    uint rounds = SPL_SOFT_ROUNDS;
+    if (MODEL == SPL_SOFT_CONCENTRIC) {
+        float samples = frame.fx * job.reach / max(load_item(begin, ray).center.z, 1e-9);
+        float shells = clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX));
+        rounds /= 1u + (uint(shells) + 1u) * (BORDER != 0u ? 2u : 1u);
+    }
+    return rounds;
+}
+
 /* From event to event; true where it comes to its end. */
 bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float reached, float until)
 {
     float root = sqrt(ray.inverse), stretched = 1.0 / root;
     float t = reached, next = until, before = 0.0, after = 0.0, was_after = 0.0, weights = 0.0, was_weights = 1.0;
     vec3 color = vec3(0.0), was_color = vec3(0.0);
-    bool fresh = true, going = true, done = true;
-    uint first = begin, i = begin;
+    bool fresh = true, going = true, done = false;
+    uint first = begin, i = begin, most = most_rounds(begin, ray);
     for (uint rounds = 0u; going; rounds++) {
         soft_item item = load_item(i, ray);
         bool hit = item.q < 1.0;
@@ -179,8 +194,8 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
             next = until;
             i = min(first, end - 1u);
             fresh = false;
-            going = !done && rounds < SPL_SOFT_ROUNDS;
         }
+        going = !done && rounds < most;
     }
     return done;
 }
@@ -208,14 +223,18 @@ void main()
     w.clear = SPL_SOFT_CLEAR - state[own + 3u];
     w.depth = -log(max(float(w.clear), 0.5) / float(SPL_SOFT_CLEAR));
     float reached = max(uintBitsToFloat(counts[kept]), frame.near);
+    uint left = 0u;
     if (MODEL == SPL_SOFT_LAYER) {
         if (w.clear == SPL_SOFT_CLEAR)
-            see_layer(w, ray, begin, end, until);
+            left = see_layer(w, ray, begin, end, until) ? 0u : SPL_SOFT_STUCK;
     } else if (begin < end && reached < until && w.clear >= SPL_SOFT_CLEAR_LEAST) {
+        float started = reached;
         if (!see_stretches(w, ray, begin, end, reached, until))
-            atomicAdd(counts[job.progress], 1u);
+            left = reached > started ? 1u : SPL_SOFT_STUCK;
         counts[kept] = floatBitsToUint(reached);
     }
+    if (left != 0u)
+        atomicOr(counts[job.progress], left);
     state[own] = w.sums.x;
     state[own + 1u] = w.sums.y;
     state[own + 2u] = w.sums.z;

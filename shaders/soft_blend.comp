@@ -82,7 +82,7 @@ void main()
                 m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
             if (BORDER != 0u) {
                 precise float linear = 1.0 - sqrt(1.0 - m);
-                precise float mixed = linear * job.opacity * (1.0 - soft) + fall * soft;
+                precise float mixed = linear * 65536.0 * (1.0 - soft) + fall * soft;
                 fall = mixed;
             }
             precise float scaled = clamp(fall + 0.5, 0.0, 65536.0);

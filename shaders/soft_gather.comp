@@ -59,7 +59,7 @@ void main()
     uint first = run.first + id % SPL_LANES * SPL_SLOT_ITEMS, stride = 1u;
     uint slot = run.chunk.texture + first / SPL_SLOT_ITEMS;
 #endif
-    uint count = 0u, entries = 0u, most = 0u, nearest = SPL_NOTHING, farthest = 0u;
+    uint count = 0u, entries = 0u, most = 0u, nearest = SPL_NOTHING, farthest = 0u, largest = 0u;
     uint next = PHASE == 2u ? imageLoad(start_texels, int(known ? slot : 0u)).x : 0u;
     uint columns = job.columns;
     for (uint k = 0u;;) {
@@ -103,6 +103,7 @@ void main()
                 most = max(most, own);
                 nearest = min(nearest, key);
                 farthest = max(farthest, key);
+                largest = max(largest, floatBitsToUint(radius));
             }
         }
         if (++k >= SPL_SLOT_ITEMS)
@@ -112,5 +113,6 @@ void main()
         slots[SPL_SOFT_SLOT_WORDS * slot] = count | most << 4 | entries << 16;
         slots[SPL_SOFT_SLOT_WORDS * slot + 1u] = nearest;
         slots[SPL_SOFT_SLOT_WORDS * slot + 2u] = farthest;
+        slots[SPL_SOFT_SLOT_WORDS * slot + 3u] = largest;
     }
 }

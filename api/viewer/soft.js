@@ -8,7 +8,6 @@ import {choose, makeControl, table} from "./methods.js";
 const SVG = "http://www.w3.org/2000/svg",
   BINS = 40,
   STEPS = 200;
-const LABELS = {soft_of: "Other layers"};
 const $ = (id) => document.getElementById(id);
 
 /** From where to where an attribute's slider goes: uncertainty is asked for as a share of its 99th percentile. */
@@ -53,7 +52,7 @@ export class Soft extends EventTarget {
       control.id = label.htmlFor = `control-${parameter.name}`;
       help.id = `${control.id}-help`;
       control.setAttribute("aria-describedby", help.id);
-      label.textContent = LABELS[parameter.name] ?? parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
+      label.textContent = parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
       help.textContent = parameter.description;
       $("soft-more").append(label, control, help);
     }

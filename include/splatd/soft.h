@@ -14,7 +14,7 @@ SPL_BEGIN_DECLARATIONS
 
 /* How dense a sphere of radius r is along a ray that passes its centre at distance d. */
 enum spl_soft_model {
-    SPL_SOFT_MODEL_EXPRESS,    /* a disc that faces the eye: opacity lambda (cos(pi d / r) + 1) / 2; eq. 19 */
+    SPL_SOFT_MODEL_EXPRESS,    /* a disc that faces the eye, of nearly base's opacity */
     SPL_SOFT_MODEL_CONCENTRIC, /* shells of constant density; eq. 13 to 15, whose densities add */
     SPL_SOFT_MODEL_BASE,       /* density r - distance from the centre, integrated; eq. 2 to 12 */
     SPL_SOFT_MODEL_LAYER,      /* the first soft surface alone, as discs of one opacity: for comparison */
@@ -22,16 +22,6 @@ enum spl_soft_model {
 };
 SPL_API const char *spl_soft_model_name(enum spl_soft_model model);
 SPL_API int spl_soft_model_from_name(const char *name); /* -1 for an unknown name */
-
-/* What layers depth, range, normal, id, primitive and picks speak of. */
-enum spl_soft_of {
-    SPL_SOFT_OF_SOLID,  /* what is solid, as if nothing soft were there */
-    SPL_SOFT_OF_FIRST,  /* the nearest of that and any sphere whose opacity there is 1/255 or more */
-    SPL_SOFT_OF_MEDIAN, /* where half of the light is held back, else what is solid */
-    SPL_SOFT_OF_COUNT
-};
-SPL_API const char *spl_soft_of_name(enum spl_soft_of of);
-SPL_API int spl_soft_of_from_name(const char *name); /* -1 for an unknown name */
 
 /* What a term measures of a splat. */
 enum spl_soft_measure {
@@ -60,9 +50,8 @@ struct spl_soft_params {
     struct spl_soft_term terms[SPL_SOFT_TERMS_MAX];
     enum spl_soft_model model;
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
-    double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22; 0 = a
-                       sharp border. Classes have none */
-    enum spl_soft_of of;
+    double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
+                       at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border. Classes have none */
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:

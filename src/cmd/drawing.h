@@ -51,7 +51,6 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \
         {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
         {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \
-        {"soft-of", "NAME", NULL, .take = spl_cmd_take_param},                                                         \
         SPL_METHOD_PARAMS(SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW)                                     \
         {"method", "NAME", NULL, .take = spl_cmd_take_method}
 #define SPL_CMD_ENCODING_ROWS                                                                                          \

@@ -191,13 +191,13 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         if (is_too_much(job, tile))
             return SPL_FRAME_TOO_MUCH;
         struct spl_error why = {0};
-        rc = spl_soft_prepare(r, &tile->camera, &why);
+        rc = spl_soft_prepare(r, &tile->camera, job->view->soft.model, &why);
         rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
-            rc = spl_soft_prepare(r, &tile->camera, &why);
+            rc = spl_soft_prepare(r, &tile->camera, job->view->soft.model, &why);
             rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);

@@ -27,25 +27,6 @@ int spl_soft_model_from_name(const char *name)
     return -1;
 }
 
-static const char *const of_names[SPL_SOFT_OF_COUNT] = {
-    [SPL_SOFT_OF_SOLID] = "solid",
-    [SPL_SOFT_OF_FIRST] = "first",
-    [SPL_SOFT_OF_MEDIAN] = "median",
-};
-
-const char *spl_soft_of_name(enum spl_soft_of of)
-{
-    return (unsigned)of < SPL_SOFT_OF_COUNT ? of_names[of] : "unknown";
-}
-
-int spl_soft_of_from_name(const char *name)
-{
-    for (int i = 0; name && i < SPL_SOFT_OF_COUNT; i++)
-        if (!strcmp(name, of_names[i]))
-            return i;
-    return -1;
-}
-
 static bool check_shape(const struct spl_soft_term *term, char fault[SPL_SOFT_FAULT_MAX])
 {
     const double *s = term->shape, length = hypot(hypot(s[3], s[4]), s[5]);
@@ -98,8 +79,6 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "soft", "%u terms are more than %d", soft->count, SPL_SOFT_TERMS_MAX);
     if ((unsigned)soft->model >= SPL_SOFT_MODEL_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "soft_model", "soft_model %d does not exist", (int)soft->model);
-    if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)
-        return spl_fail_field(err, SPL_E_USAGE, "soft_of", "soft_of %d does not exist", (int)soft->of);
     if (!(soft->opacity >= 0 && soft->opacity <= 1))
         return spl_fail_field(err, SPL_E_USAGE, "soft_opacity", "soft_opacity %g is not within 0 and 1",
                               soft->opacity);

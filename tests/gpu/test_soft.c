@@ -12,7 +12,11 @@
 
 #include "base/clock.h"
 #include "gpu/frames.h"
+#include "dataset/chunk.h"
 #include "render/fault.h"
+#include "shared.h"
+#include "support/naive_select.h"
+#include "support/soft_rays.h"
 
 /* What lies on one side of a plane through the origin is soft. */
 static void soften(struct spl_view *view, double nx, double from, double opacity)
@@ -51,7 +55,7 @@ static void windows_change_no_byte(void **state)
         soften(&view, 1, 0, 0.4);
         spl_renderer_set_soft_items(renderer, 0);
         struct spl_frame whole = draw(renderer, dataset, &view);
-        assert_true(whole.stats.soft_drawn > 5000 && whole.stats.soft_drawn < 30000);
+        assert_true(whole.stats.soft_drawn > 5000 && whole.stats.soft_drawn < 60000);
         static const uint32_t held[] = {3000, 500};
         for (size_t i = 0; i < 2; i++) {
             spl_renderer_set_soft_items(renderer, held[i]);
@@ -154,6 +158,106 @@ static void soft_lies_over_the_solid(void **state)
     done(dataset);
 }
 
+static int by_depth(const void *a, const void *b)
+{
+    double x = ((const struct soft_sphere *)a)->center[2], y = ((const struct soft_sphere *)b)->center[2];
+    return (x > y) - (x < y);
+}
+
+/* Every splat that the view draws, as a sphere in view space, by depth. */
+static struct soft_sphere *spheres_of(const struct spl_dataset *dataset, const struct spl_view *view, size_t *count)
+{
+    const struct spl_camera *camera = &view->camera;
+    size_t chunks, made = 0, bytes;
+    uint64_t all;
+    struct naive_chunk *drawn =
+        naive_select(&(struct naive_options){.dataset = dataset, .camera = camera, .lod = view->lod}, &chunks);
+    struct soft_sphere *spheres = calloc(2 * spl_dataset_get_info(dataset)->leaf_splats + 1, sizeof *spheres);
+    assert_true(drawn && spheres);
+    for (const struct naive_chunk *c = drawn; c < drawn + chunks; c++)
+        for (uint32_t index = 0; index < c->count; index++) {
+            const struct spl_node *node = &spl_dataset_get_nodes(dataset, &all)[c->node];
+            struct spl_chunk chunk = spl_dataset_get_chunks(dataset, &all)[c->chunk];
+            struct soft_sphere *s = &spheres[made++];
+            struct spl_splat splat;
+            chunk.radius_min = (float)(chunk.radius_min * c->scale);
+            chunk.radius_step = (float)(chunk.radius_step * c->scale);
+            spl_chunk_decode(&chunk, spl_dataset_get_page(dataset, node->page, &bytes), index, &splat);
+            *s = (struct soft_sphere){.soft = 1, .color = {splat.color[0], splat.color[1], splat.color[2]}};
+            for (int i = 0; i < 3; i++)
+                for (int a = 0; a < 3; a++)
+                    s->center[i] += camera->rotation[3 * i + a] *
+                                    (node->origin[a] + (double)splat.position[a] - camera->eye[a]);
+            s->radius = fmax((double)splat.radius, SPL_LOW_PASS * s->center[2] / camera->fx);
+        }
+    free(drawn);
+    qsort(spheres, made, sizeof *spheres, by_depth);
+    *count = made;
+    return spheres;
+}
+
+/* Levels by which a frame of black background is off at most. */
+static double off_by(const struct spl_frame *frame, const struct spl_view *view, const struct soft_sphere *spheres,
+                     size_t count)
+{
+    const struct spl_camera *c = &view->camera;
+    const struct soft_look look = {view->soft.model, view->soft.opacity, c->fx, view->disc.margin, false};
+    const uint8_t *got = frame->images[SPL_LAYER_COLOR].pixels;
+    double most = 0;
+    for (uint32_t y = 0; y < c->height; y++)
+        for (uint32_t x = 0; x < c->width; x++) {
+            const double ray[2] = {(x + 0.5 - c->cx) / c->fx, (y + 0.5 - c->cy) / c->fy};
+            struct soft_seen seen = soft_see(&look, spheres, count, ray, c->near, c->far);
+            for (uint32_t k = 0; k < 3; k++)
+                most = fmax(most, fabs(got[4 * (y * c->width + x) + k] - seen.color[k]));
+        }
+    return most;
+}
+
+/* Within a level of the reference in doubles, and refused where not all of it
+ * fits at once, never drawn as something else. */
+static void models_match_the_reference(void **state)
+{
+    (void)state;
+    static const enum spl_soft_model models[] = {SPL_SOFT_MODEL_BASE, SPL_SOFT_MODEL_CONCENTRIC, SPL_SOFT_MODEL_LAYER};
+    struct spl_dataset *dataset = random_cube(600, origin, 0.05);
+    struct spl_renderer_options options = {.size = sizeof options, .device = "egl"};
+    struct spl_renderer *other = NULL;
+    struct spl_view view = looking(origin, 3, 83, 61);
+    struct spl_error err = {0};
+    struct spl_frame frame;
+    size_t count;
+    view.lod = 0;
+    view.layers = 1u << SPL_LAYER_COLOR;
+    soften(&view, 1, -100, 0.3);
+    struct soft_sphere *spheres = spheres_of(dataset, &view, &count);
+    if (spl_renderer_create(&options, &other, NULL) == SPL_OK)
+        assert_int_equal(spl_renderer_add(other, dataset, NULL), SPL_OK);
+    for (size_t m = 0; m < sizeof models / sizeof *models; m++) {
+        view.soft.model = models[m];
+        frame = draw(renderer, dataset, &view);
+        double off = off_by(&frame, &view, spheres, count);
+        print_message("%s: off by at most %.2f levels\n", spl_soft_model_name(models[m]), off);
+        assert_true(off <= 1);
+        if (other) {
+            struct spl_frame second = draw(other, dataset, &view);
+            assert_true(worst_level(&frame, &second) <= 1);
+            spl_frame_finish(&second);
+        }
+        spl_frame_finish(&frame);
+        spl_renderer_set_soft_items(renderer, 64);
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, &err), SPL_E_LIMIT);
+        assert_string_equal(err.field, "soft_model");
+        spl_renderer_set_soft_items(renderer, 0);
+    }
+    free(spheres);
+    if (other) {
+        spl_renderer_remove(other, dataset);
+        spl_renderer_destroy(other);
+    }
+    done(dataset);
+}
+
 /* A fiftieth of a degree at a time, all round: no picture differs from the one before by more than the content's own motion. */
 static void a_turn_flips_nothing(void **state)
 {
@@ -236,7 +340,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
-        frames_test(soft_lies_over_the_solid), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
+        frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);

@@ -15,17 +15,16 @@ def soft(reply):
 def test_what_is_soft_comes_back():
     with Daemon(REAL) as d:
         query = f"width=16&height=16&soft=0.25%3Cclass&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
-        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0,
-                 "soft_of": "solid"}
+        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0}
         first = d.ask(f"{VIEW}?{query}")
         assert first.status == 200 and soft(first) == whole, first.headers
         assert soft(d.ask(f"{VIEW}?{query}", "HEAD")) == whole
         again = d.post({"width": 16, "height": 16, **soft(first)})
         assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
-        pick = d.ask(f"{PICK}?x=8&y=8&{query}&soft_of=first")
-        assert pick.status == 200 and soft(pick) == {**whole, "soft_of": "first"}
+        pick = d.ask(f"{PICK}?x=8&y=8&{query}")
+        assert pick.status == 200 and soft(pick) == whole
         for text in ["class>3", "class:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
-            reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer", "soft_of": "median"})
+            reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer"})
             assert reply.status == 200 and " or ".join(soft(reply)["soft"]) == text, reply.headers
         assert d.ask(f"{VIEW}?width=16&height=16&soft_opacity=0.5").headers["Splatd-Soft"] is None
         batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "soft": AXIS, "views": [{}, {"soft": []}]}))
@@ -36,7 +35,7 @@ def test_a_budget_leaves_it_alone():
     with Daemon(FAKE) as d:
         reply = d.ask(f"{VIEW}?width=16&height=16&budget=500ms&soft={AXIS}&soft_opacity=0.9&soft_model=base")
         assert reply.status == 200 and reply.headers["Splatd-Chosen"], reply.headers
-        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0, "soft_of": "solid"}
+        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0}
 
 
 def test_a_dataset_says_what_may_be_soft():
@@ -60,9 +59,9 @@ def test_it_counts_where_something_is_soft():
     with Daemon(REAL) as d:
         def tag(query):
             return d.ask(f"{VIEW}?width=16&height=16&{query}", "HEAD").headers["ETag"]
-        assert tag("soft_opacity=0.9&soft_of=first&soft_model=layer") == tag("")
+        assert tag("soft_opacity=0.9&soft_model=layer") == tag("")
         tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_model=base",
-                                         f"soft={AXIS}&soft_of=first", f"soft={AXIS}&method=points", "soft=class>0.5")]
+                                         f"soft={AXIS}&method=points", "soft=class>0.5")]
         assert len(set(tags)) == len(tags), tags
         assert tag("soft=class>0.50") == tags[-1] and tag("soft=.5<class") == tags[-1]
 

@@ -60,7 +60,7 @@ uint32_t soft_express(const struct spl_frame_params *params, const struct soft_i
     float fall = m * (f[0] + m * (f[1] + m * (f[2] + m * (f[3] + m * f[4]))));
     if (border) {
         float soft = ((float)item->mark - 1) * (1.0f / 254);
-        fall = (1 - sqrtf(1 - m)) * (float)(opacity * 65536) * (1 - soft) + fall * soft;
+        fall = (1 - sqrtf(1 - m)) * 65536 * (1 - soft) + fall * soft;
     }
     return (uint32_t)fminf(fmaxf(fall + 0.5f, 0), 65536);
 }

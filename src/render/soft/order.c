@@ -17,7 +17,7 @@ enum {
     walked_samples = 1    // that moving an item is worth
 };
 
-static int add_work(struct spl_soft_order *order, uint64_t work, struct spl_error *err)
+int spl_soft_add_work(struct spl_soft_order *order, uint64_t work, struct spl_error *err)
 {
     return order->add_work ? order->add_work(order->context, work, err) : SPL_OK;
 }
@@ -41,14 +41,7 @@ int spl_soft_put_step(struct spl_soft_order *order, const struct spl_soft_step *
     return SPL_OK;
 }
 
-struct dispatch {
-    struct spl_kernel_key key;
-    struct spl_soft_step step;
-    enum spl_soft_buffer from, to, totals;
-    uint32_t workgroups;
-};
-
-static int dispatch(struct spl_soft_order *order, const struct dispatch *what, struct spl_error *err)
+int spl_soft_dispatch(struct spl_soft_order *order, const struct spl_soft_dispatch *what, struct spl_error *err)
 {
     struct spl_gpu_buffer *const *buffers = order->memory->buffers;
     struct spl_gpu_kernel *kernel;
@@ -84,28 +77,28 @@ static enum spl_soft_buffer other(enum spl_soft_buffer buffer)
 }
 
 /* Counts are cleared, counted, and summed up by block. */
-static int count(struct spl_soft_order *order, struct dispatch what, const char *name, struct spl_error *err)
+static int count(struct spl_soft_order *order, struct spl_soft_dispatch what, const char *name, struct spl_error *err)
 {
     spl_gpu_fill(order->gpu, order->memory->buffers[SPL_SOFT_COUNTS], 0,
                  (uint64_t)what.step.blocks * what.step.digits * sizeof(uint32_t), 0);
     spl_gpu_barrier(order->gpu);
     what.key.name = name;
-    int rc = dispatch(order, &what, err);
+    int rc = spl_soft_dispatch(order, &what, err);
     spl_gpu_barrier(order->gpu);
     return rc;
 }
 
-static int scan(struct spl_soft_order *order, struct dispatch what, bool starts, struct spl_error *err)
+static int scan(struct spl_soft_order *order, struct spl_soft_dispatch what, bool starts, struct spl_error *err)
 {
     what.key = (struct spl_kernel_key){.name = "sort_scan"};
     what.workgroups = groups(what.step.digits, SPL_LANES);
-    int rc = dispatch(order, &what, err);
+    int rc = spl_soft_dispatch(order, &what, err);
     spl_gpu_barrier(order->gpu);
     if (rc || !starts)
         return rc;
     what.key.constants[0] = 1;
     what.workgroups = 1;
-    rc = dispatch(order, &what, err);
+    rc = spl_soft_dispatch(order, &what, err);
     spl_gpu_barrier(order->gpu);
     return rc;
 }
@@ -120,21 +113,21 @@ int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, ui
     order->sorted = SPL_SOFT_PAIRS;
     for (uint32_t pass = 0; pass < passes && !rc && items; pass++) {
         const uint32_t first = bits * pass / passes, end = bits * (pass + 1) / passes;
-        struct dispatch what = {.key = {.name = "sort_move"},
-                                .step = {.count = items,
-                                         .block = block,
-                                         .blocks = groups(items, block),
-                                         .digits = 1u << (end - first),
-                                         .low = low,
-                                         .shift = first},
-                                .from = order->sorted,
-                                .to = other(order->sorted),
-                                .totals = SPL_SOFT_DIGITS};
+        struct spl_soft_dispatch what = {.key = {.name = "sort_move"},
+                                         .step = {.count = items,
+                                                  .block = block,
+                                                  .blocks = groups(items, block),
+                                                  .digits = 1u << (end - first),
+                                                  .low = low,
+                                                  .shift = first},
+                                         .from = order->sorted,
+                                         .to = other(order->sorted),
+                                         .totals = SPL_SOFT_DIGITS};
         what.workgroups = groups(what.step.blocks, SPL_LANES);
-        rc = add_work(order, (uint64_t)walked_samples * items, err);
+        rc = spl_soft_add_work(order, (uint64_t)walked_samples * items, err);
         rc = rc ? rc : count(order, what, "sort_count", err);
         rc = rc ? rc : scan(order, what, true, err);
-        rc = rc ? rc : dispatch(order, &what, err);
+        rc = rc ? rc : spl_soft_dispatch(order, &what, err);
         spl_gpu_barrier(order->gpu);
         order->sorted = what.to;
     }
@@ -153,7 +146,7 @@ static uint64_t lay_out(const uint32_t *totals, uint32_t *starts, uint32_t tiles
 }
 
 /* Walks all blocks to their ends, as many dispatches as the one with most entries may need. */
-static int walk(struct spl_soft_order *order, struct dispatch *what, uint32_t most, struct spl_error *err)
+static int walk(struct spl_soft_order *order, struct spl_soft_dispatch *what, uint32_t most, struct spl_error *err)
 {
     const uint64_t rounds = (uint64_t)what->step.block * most;
     const uint64_t kept = (uint64_t)what->step.progress * sizeof(uint32_t);
@@ -163,8 +156,8 @@ static int walk(struct spl_soft_order *order, struct dispatch *what, uint32_t mo
                  0);
     spl_gpu_barrier(order->gpu);
     for (uint64_t done = 0; done < rounds && !rc; done += SPL_SOFT_ROUNDS) {
-        rc = add_work(order, (uint64_t)what->step.blocks * SPL_SOFT_ROUNDS, err);
-        rc = rc ? rc : dispatch(order, what, err);
+        rc = spl_soft_add_work(order, (uint64_t)what->step.blocks * SPL_SOFT_ROUNDS, err);
+        rc = rc ? rc : spl_soft_dispatch(order, what, err);
         spl_gpu_barrier(order->gpu);
     }
     return rc;
@@ -180,21 +173,21 @@ int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, s
     uint32_t threads = room / tiles < memory->threads ? room / tiles : memory->threads;
     uint32_t block = groups(items, threads);
     block = block > list_block ? block : list_block;
-    struct dispatch what = {.step = {.count = items,
-                                     .block = block,
-                                     .blocks = groups(items, block),
-                                     .digits = tiles,
-                                     .columns = order->columns,
-                                     .rects = memory->sizes.items * SPL_SOFT_ITEM_WORDS,
-                                     .progress = room},
-                            .from = order->sorted,
-                            .to = other(order->sorted),
-                            .totals = SPL_SOFT_STARTS};
+    struct spl_soft_dispatch what = {.step = {.count = items,
+                                              .block = block,
+                                              .blocks = groups(items, block),
+                                              .digits = tiles,
+                                              .columns = order->columns,
+                                              .rects = memory->sizes.items * SPL_SOFT_ITEM_WORDS,
+                                              .progress = room},
+                                     .from = order->sorted,
+                                     .to = other(order->sorted),
+                                     .totals = SPL_SOFT_STARTS};
     what.workgroups = groups(what.step.blocks, SPL_LANES);
     spl_gpu_fill(order->gpu, memory->buffers[SPL_SOFT_COUNTS], 0,
                  (uint64_t)what.step.blocks * tiles * sizeof(uint32_t), 0);
     int rc = walk(order, &what, most, err);
-    struct dispatch sums = what;
+    struct spl_soft_dispatch sums = what;
     sums.totals = SPL_SOFT_TOTALS;
     rc = rc ? rc : scan(order, sums, false, err);
     rc = rc ? rc : spl_soft_run(order, err);
@@ -214,6 +207,8 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
     enum { side = SPL_SOFT_TILE, samples = side * side, lanes = samples / SPL_SOFT_SAMPLES, tile_words = 3 };
     const struct spl_soft_memory *memory = order->memory;
     const uint32_t tiles = order->columns * order->rows;
+    if (blend->model != SPL_SOFT_MODEL_EXPRESS)
+        return spl_soft_walk(order, blend, err);
     const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]);
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups * (SPL_WORKGROUP / lanes);
@@ -244,19 +239,18 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
             }
             if (listed == begun || (tile + 1 < tiles && work < blend_work && listed - begun < most))
                 continue;
-            struct dispatch what = {.key = {"soft_blend", order->wide, {blend->border, first}},
-                                    .step = {.count = listed - begun,
-                                             .first = tile_words * begun,
-                                             .opacity = (float)(blend->opacity * 65536),
-                                             .fall_0 = fall[0] * scale,
-                                             .fall_1 = fall[1] * scale,
-                                             .fall_2 = fall[2] * scale,
-                                             .fall_3 = fall[3] * scale,
-                                             .fall_4 = fall[4] * scale},
-                                    .from = other(order->sorted),
-                                    .workgroups = groups((uint64_t)(listed - begun) * lanes, SPL_WORKGROUP)};
-            rc = add_work(order, work, err);
-            rc = rc ? rc : dispatch(order, &what, err);
+            struct spl_soft_dispatch what = {.key = {"soft_blend", order->wide, {blend->border, first}},
+                                             .step = {.count = listed - begun,
+                                                      .first = tile_words * begun,
+                                                      .fall_0 = fall[0] * scale,
+                                                      .fall_1 = fall[1] * scale,
+                                                      .fall_2 = fall[2] * scale,
+                                                      .fall_3 = fall[3] * scale,
+                                                      .fall_4 = fall[4] * scale},
+                                             .from = other(order->sorted),
+                                             .workgroups = groups((uint64_t)(listed - begun) * lanes, SPL_WORKGROUP)};
+            rc = spl_soft_add_work(order, work, err);
+            rc = rc ? rc : spl_soft_dispatch(order, &what, err);
             begun = listed;
             work = 0;
         }

@@ -9,6 +9,8 @@
 #ifndef SPL_RENDER_SOFT_ORDER_H
 #define SPL_RENDER_SOFT_ORDER_H
 
+#include <splatd/soft.h>
+
 #include "gpu/gpu.h"
 #include "render/kernels.h"
 #include "shared.h"
@@ -92,11 +94,26 @@ enum { SPL_SOFT_CROWDED = 1 };
 int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, struct spl_error *err);
 
 struct spl_soft_blend {
+    enum spl_soft_model model;
     double opacity; /* at a sphere's centre, 0 to 1 */
     bool border;    /* some items are partly solid */
-    bool first;     /* nothing of this tile was blended before: the state is zero */
+    bool first;     /* nothing of this tile was blended before: the state is zero; of models but express always */
+    float reach;    /* of models but express: the largest radius */
 };
-/* Blends what was listed. */
+/* Blends what was listed. SPL_E_LIMIT: more lie behind one another than a model but express may walk through. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
+
+/* order.c for walk.c: a dispatch of one of its kernels. */
+struct spl_soft_dispatch {
+    struct spl_kernel_key key;
+    struct spl_soft_step step;
+    enum spl_soft_buffer from, to, totals;
+    uint32_t workgroups;
+};
+int spl_soft_dispatch(struct spl_soft_order *order, const struct spl_soft_dispatch *what, struct spl_error *err);
+int spl_soft_add_work(struct spl_soft_order *order, uint64_t work, struct spl_error *err);
+
+/* walk.c: spl_soft_blend() of base, concentric and layer. Runs what was recorded. */
+int spl_soft_walk(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
 
 #endif

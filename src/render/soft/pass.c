@@ -15,6 +15,7 @@
 enum {
     items_at_least = 1 << 14,
     entries_of_item = 4, // room for lists
+    entries_of_window = 1 << 24,
     memory_share = 8,
     gather_work = 8      // of a splat, in samples that are looked at
 };
@@ -72,7 +73,20 @@ static void choose_items(struct spl_soft_sizes *sizes, uint64_t wanted, uint64_t
     }
 }
 
-int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, struct spl_error *err)
+/* Models that need all in one window get longer lists where there is room: near spheres are in many tiles. */
+static void choose_entries(struct spl_soft_sizes *sizes, uint64_t bytes, uint64_t binding, bool software)
+{
+    while (sizes->entries < entries_of_window) {
+        struct spl_soft_sizes more = *sizes;
+        more.entries *= 2;
+        if ((uint64_t)more.entries * sizeof(uint32_t) > binding || spl_soft_memory_bytes(&more, software) > bytes)
+            return;
+        *sizes = more;
+    }
+}
+
+int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, enum spl_soft_model model,
+                     struct spl_error *err)
 {
     struct spl_scratch *scratch = &renderer->scratch;
     struct spl_soft_memory *memory = &scratch->soft;
@@ -101,9 +115,13 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
         sizes.entries = larger(sizes.items * entries_of_item, SPL_SOFT_SLOT_CELLS * SPL_SOFT_SPAN_MAX * SPL_SOFT_SPAN_MAX);
     } else {
         choose_items(&sizes, slots * SPL_SOFT_SLOT_SPLATS, share, limits->binding_bytes, software);
+        if (model != SPL_SOFT_MODEL_EXPRESS)
+            choose_entries(&sizes, share, limits->binding_bytes, software);
     }
-    if ((sizes.items == have->items || (sizes.items < have->items && !renderer->soft_items_most)) && sizes.slots == have->slots && sizes.tiles == have->tiles &&
-        sizes.samples == have->samples)
+    const bool exact = renderer->soft_items_most > 0;
+    const bool enough = exact ? sizes.items == have->items && sizes.entries == have->entries
+                              : sizes.items <= have->items && sizes.entries <= have->entries;
+    if (enough && sizes.slots == have->slots && sizes.tiles == have->tiles && sizes.samples == have->samples)
         return SPL_OK;
     const uint64_t bytes = spl_soft_memory_bytes(&sizes, software);
     if (bytes > left)
@@ -179,6 +197,7 @@ static int gather(struct pass *pass, enum phase phase, const struct spl_soft_ste
 struct counted {
     uint64_t items, entries;
     uint32_t most, low, high;
+    float reach; // largest radius
 };
 
 static struct counted sum_slots(struct pass *pass)
@@ -187,6 +206,7 @@ static struct counted sum_slots(struct pass *pass)
     const uint32_t *words = spl_gpu_buffer_map(buffers[SPL_SOFT_SLOTS]);
     uint32_t *firsts = spl_gpu_buffer_map(buffers[SPL_SOFT_FIRSTS]);
     struct counted sum = {.low = UINT32_MAX};
+    uint32_t reach = 0;
     for (uint32_t i = 0; i < pass->slots; i++, words += SPL_SOFT_SLOT_WORDS) {
         const uint32_t most = words[0] >> 4 & 0xfff;
         firsts[i] = (uint32_t)sum.items;
@@ -195,7 +215,9 @@ static struct counted sum_slots(struct pass *pass)
         sum.most = larger(sum.most, most);
         sum.low = words[1] < sum.low ? words[1] : sum.low;
         sum.high = larger(sum.high, words[2]);
+        reach = larger(reach, words[3]);
     }
+    memcpy(&sum.reach, &reach, sizeof reach);
     return sum;
 }
 
@@ -247,7 +269,9 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
     rc = rc ? rc : spl_soft_sort(&pass->order, items, sum->low, sum->high, err);
     rc = rc ? rc : spl_soft_list(&pass->order, items, sum->most, err);
     spl_assert(rc != SPL_SOFT_CROWDED);
-    rc = rc ? rc : spl_soft_blend(&pass->order, &(struct spl_soft_blend){.opacity = soft->opacity,
+    rc = rc ? rc : spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
+                                                                         .opacity = soft->opacity,
+                                                                         .reach = sum->reach,
                                                                          .border = soft->blend > 0,
                                                                          .first = !pass->begun}, err);
     pass->begun = true;
@@ -275,6 +299,16 @@ static int draw_windows(struct pass *pass, const struct spl_soft_range *all, str
     }
     free(pass->plan);
     return rc;
+}
+
+/* What has a thickness reaches from a window into the next. */
+static int refuse_windows(const struct spl_tile *tile, const struct counted *sum, struct spl_error *err)
+{
+    return spl_fail_field(err, SPL_E_LIMIT, "soft_model",
+                          "soft_model %s has to hold all soft spheres at once, %" PRIu64 " in %" PRIu64
+                          " places of the image, which is more than fits in an eighth of memory-limit; use soft_model "
+                          "express, raise lod, or raise memory-limit",
+                          spl_soft_model_name(tile->view->soft.model), sum->items, sum->entries);
 }
 
 /* Drops chunks that the solid hides. Where its memory is taken, as of methods that keep ids, all are drawn. */
@@ -319,6 +353,8 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     rc = rc ? rc : count(&pass, &all, &sum, err);
     if (!rc && sum.items <= sizes->items && sum.entries <= sizes->entries)
         rc = draw(&pass, &all, &sum, err);
+    else if (!rc && tile->view->soft.model != SPL_SOFT_MODEL_EXPRESS)
+        rc = refuse_windows(tile, &sum, err);
     else if (!rc)
         rc = draw_windows(&pass, &all, err);
     spl_tile_stamp(tile, SPL_STAGE_SOFT);

@@ -9,7 +9,8 @@
 /* Makes room for the list's soft spheres on a tile of such a camera, at the cost of pages that the frame has not asked
  * for, and tells chunks where their slots start; before the list is uploaded. Nothing where there are none. SPL_E_LIMIT
  * as spl_scratch_upload(). */
-int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, struct spl_error *err);
+int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, enum spl_soft_model model,
+                     struct spl_error *err);
 
 /* Is there anything soft to draw? */
 bool spl_soft_is_drawn(const struct spl_tile *tile);

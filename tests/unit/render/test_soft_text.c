@@ -219,16 +219,6 @@ static void test_there_are_bounds(void **state)
     assert_int_equal(spl_soft_parse(text, &soft, NULL), SPL_OK);
 }
 
-static void test_names_of_what_layers_speak_of(void **state)
-{
-    (void)state;
-    for (int of = 0; of < SPL_SOFT_OF_COUNT; of++)
-        assert_int_equal(spl_soft_of_from_name(spl_soft_of_name((enum spl_soft_of)of)), of);
-    assert_int_equal(spl_soft_of_from_name(NULL), -1);
-    assert_int_equal(spl_soft_of_from_name("unknown"), -1);
-    assert_string_equal(spl_soft_of_name((enum spl_soft_of)9), "unknown");
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -239,7 +229,6 @@ int main(void)
         cmocka_unit_test(test_sixteen_of_the_longest_fit),
         cmocka_unit_test(test_what_is_wrong_is_named),
         cmocka_unit_test(test_there_are_bounds),
-        cmocka_unit_test(test_names_of_what_layers_speak_of),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -39,7 +39,7 @@ static int ask(const char *text, struct spl_view_request *out, struct spl_error 
                    : spl_view_request_from_query)(text + pick, length - pick, &defaults, &limits, out, err);
 }
 
-static struct spl_soft_params soft_of(const char *text)
+static struct spl_soft_params soft_asked(const char *text)
 {
     struct spl_view_request r;
     struct spl_error err;
@@ -52,24 +52,21 @@ static void every_way_of_asking_means_the_same(void **state)
 {
     (void)state;
     static const char *const ways[] = {
-        "soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2&soft_of=median",
-        "soft=class:3..5&soft_opacity=0.7&soft=uncertainty%3Eq0.9&soft_model=base&soft_blend=2&soft_of=median",
-        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2,"
-        "\"soft_of\":\"median\"}",
-        "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2,"
-        "\"soft_of\":\"median\"}",
-        "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2&soft_of=median",
+        "soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2",
+        "soft=class:3..5&soft_opacity=0.7&soft=uncertainty%3Eq0.9&soft_model=base&soft_blend=2",
+        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
+        "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
+        "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2",
         "@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,"
-        "\"soft_blend\":2,\"soft_of\":\"median\"}",
+        "\"soft_blend\":2}",
     };
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-        struct spl_soft_params soft = soft_of(ways[i]);
+        struct spl_soft_params soft = soft_asked(ways[i]);
         assert_int_equal(soft.count, 2);
         assert_true(soft.terms[0].least == 3 && soft.terms[0].most == 5);
         assert_string_equal(soft.terms[1].name, "uncertainty");
         assert_int_equal(soft.terms[1].measure, SPL_SOFT_QUANTILE);
         assert_true(soft.model == SPL_SOFT_MODEL_BASE && soft.opacity == 0.7 && soft.blend == 2);
-        assert_int_equal(soft.of, SPL_SOFT_OF_MEDIAN);
     }
 }
 
@@ -78,7 +75,7 @@ static void nothing_is_soft_by_itself(void **state)
     (void)state;
     static const char *const ways[] = {"", "{}", "{\"soft\":[]}", "@x=1&y=1"};
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
-        struct spl_soft_params soft = soft_of(ways[i]);
+        struct spl_soft_params soft = soft_asked(ways[i]);
         assert_true(!soft.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && !soft.blend);
     }
 }
@@ -90,13 +87,13 @@ static void shapes_are_moved_into_the_world(void **state)
     struct spl_view_request r;
     struct spl_error err;
     struct spl_soft_params soft =
-        soft_of("crs=EPSG:4326&eye=1,0,0&soft=axis:1,2,3,0,0,1<4&soft=class:2&soft=plane:4,5,6,1,0,0>0");
+        soft_asked("crs=EPSG:4326&eye=1,0,0&soft=axis:1,2,3,0,0,1<4&soft=class:2&soft=plane:4,5,6,1,0,0>0");
     assert_memory_equal(soft.terms[0].shape, axis, sizeof axis);
     assert_memory_equal(soft.terms[2].shape, plane, sizeof plane);
     assert_true(soft.terms[0].most == 4);
-    soft = soft_of("@{\"x\":1,\"y\":1,\"camera\":{\"crs\":\"EPSG:4326\"},\"soft\":\"axis:1,2,3,0,0,1<4\"}");
+    soft = soft_asked("@{\"x\":1,\"y\":1,\"camera\":{\"crs\":\"EPSG:4326\"},\"soft\":\"axis:1,2,3,0,0,1<4\"}");
     assert_memory_equal(soft.terms[0].shape, axis, sizeof axis);
-    soft = soft_of("soft=box:1,2,3,4,5,6");
+    soft = soft_asked("soft=box:1,2,3,4,5,6");
     assert_true(soft.terms[0].shape[0] == 1 && soft.terms[0].shape[5] == 6);
     assert_int_equal(ask("crs=EPSG:4326&soft=box:1,2,3,4,5,6", &r, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "soft");
@@ -134,7 +131,7 @@ static void headers_say_what_a_body_would(void **state)
     struct spl_view_request r;
     struct spl_error err;
     struct spl_headers headers;
-    assert_int_equal(ask("soft=0.5<u+or+class:3-5&soft_opacity=0.1&soft_of=first", &r, &err), 0);
+    assert_int_equal(ask("soft=0.5<u+or+class:3-5&soft_opacity=0.1", &r, &err), 0);
     strcpy(r.encode.unit, "m");
     spl_headers_open(&headers);
     spl_headers_add_view(&headers, &r, NULL);
@@ -145,8 +142,8 @@ static void headers_say_what_a_body_would(void **state)
     assert_true(*at);
     at += strlen(at) + 1;
     assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.10000000000000001,"
-                            "\"soft_blend\":0,\"soft_of\":\"first\"}");
-    struct spl_soft_params again = soft_of(at);
+                            "\"soft_blend\":0}");
+    struct spl_soft_params again = soft_asked(at);
     assert_memory_equal(again.terms, r.view.soft.terms, sizeof again.terms);
     free(headers.text);
 }
