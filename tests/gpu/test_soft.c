@@ -313,6 +313,9 @@ static void nobody_waits_for_it(void **state)
     spl_renderer_set_soft_items(renderer, 0);
     frame = draw(renderer, dataset, &view);
     spl_frame_finish(&frame);
+    view.soft.model = SPL_SOFT_MODEL_BASE; /* runs of walks */
+    view.deadline_ns = spl_now_ns() + 2000000;
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_E_TIMEOUT);
     done(dataset);
 }
 

@@ -18,7 +18,7 @@
 #include "support/soft_rays.h"
 
 enum { width = 36, height = 28, columns = (width + 7) / 8, rows = (height + 7) / 8, items_max = 4000,
-       tiles = columns * rows, progress_words = 1 + 64 * tiles };
+       tiles = columns * rows, crowd = 70000, progress_words = 1 + 64 * tiles };
 static const double focal = 40;
 static struct spl_gpu *gpu;
 static struct spl_gpu_buffer *buffers[SPL_RESOURCE_COUNT], *down;
@@ -70,6 +70,7 @@ struct scene {
     size_t count;
     float solid[width * height];
     bool border;
+    bool crowded; /* one tile, whose list has its first sphere many times */
 };
 
 static int by_depth(const void *a, const void *b)
@@ -138,13 +139,19 @@ static void fill(const struct scene *s)
             entries[entry++] = i;
         lists[3 * t + 2] = entry;
     }
+    for (uint32_t i = 0; s->crowded && i < crowd; i++)
+        entries[i] = 0;
+    if (s->crowded) {
+        lists[2] = crowd;
+        step.count = 1;
+    }
     for (int i = 0; i < width * height; i++)
         depth[i] = isinf(s->solid[i]) ? SPL_NOTHING : bits((double)s->solid[i]);
     memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_FRAME]), &frame, sizeof frame);
     memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_STEP]), &step, sizeof step);
 }
 
-/* Runs until nothing is left unfinished; how often that was. */
+/* Runs until nothing is left unfinished; how often that was; 0 where it never will be. */
 static int draw(const struct scene *s)
 {
     static const uint32_t models[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
@@ -174,9 +181,9 @@ static int draw(const struct scene *s)
         if (spl_gpu_submit(gpu, &ticket, &err) || spl_gpu_wait(gpu, ticket, spl_now_ns() + 60 * SPL_NS_PER_S, &err))
             fail_msg("%s", err.message);
         assert_true(++times < 200);
-    } while (got[4 * width * height]);
+    } while (got[4 * width * height] && !(got[4 * width * height] & SPL_SOFT_STUCK));
     spl_gpu_kernel_destroy(gpu, kernel);
-    return times;
+    return got[4 * width * height] ? 0 : times;
 }
 
 /* Also says how often the kernel ran; ends the scene. */
@@ -279,6 +286,32 @@ static void layers_match(void **state)
     assert_int_equal(matches(&s, "layer"), 1);
 }
 
+/* More than a run may walk: said so, not drawn in part, nor tried for ever. */
+static void lists_too_long_are_told(void **state)
+{
+    (void)state;
+    static const enum spl_soft_model models[] = {SPL_SOFT_MODEL_BASE, SPL_SOFT_MODEL_CONCENTRIC, SPL_SOFT_MODEL_LAYER};
+    for (int m = 0; m < 3; m++) {
+        struct scene s = make_scene(models[m], 0.001, 1);
+        s.crowded = true;
+        assert_int_equal(draw(&s), 0);
+        free(s.spheres);
+    }
+}
+
+/* Shells are rounds of their own: a list that fits without them is walked in many runs. */
+static void shells_are_counted(void **state)
+{
+    (void)state;
+    struct scene s = make_scene(SPL_SOFT_MODEL_CONCENTRIC, 0.001, 200);
+    for (size_t i = 0; i < s.count; i++) {
+        s.spheres[i].center[0] *= 0.1, s.spheres[i].center[1] *= 0.1;
+        s.spheres[i].center[2] = (double)(float)between(1.5, 2);
+        s.spheres[i].radius = 1.25;
+    }
+    assert_true(matches(&s, "shells") > 3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -288,6 +321,8 @@ int main(void)
         cmocka_unit_test(borders_match),
         cmocka_unit_test(long_walks_go_on),
         cmocka_unit_test(layers_match),
+        cmocka_unit_test(lists_too_long_are_told),
+        cmocka_unit_test(shells_are_counted),
     };
     return cmocka_run_group_tests(tests, open_all, close_all);
 }
