@@ -16,7 +16,7 @@ void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work)
 
 /* How many soft spheres are held at once (render/soft/pass.h); 0 = as memory has room. */
 void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items);
-/* How much a step of a frame has, before its tile is cut. */
+/* How much a step of a frame has, before its tile is cut; then pieces may be of any size. */
 void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work);
 
 #endif

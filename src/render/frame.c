@@ -128,7 +128,7 @@ int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *c
 static uint32_t choose_weight(const struct spl_frame_job *job, const struct spl_draw_list *list)
 {
     const uint32_t own = spl_occupancy_weight(list->sample_splats, list->sample_panels), tile = job->whole.weight_max;
-    if (!tile)
+    if (!job->whole.pixels)
         return own;
     return (job->whole.complete && list->complete) || tile < own ? tile : own;
 }
@@ -155,11 +155,16 @@ static int select_tile(struct spl_frame_job *job, struct spl_tile *tile, struct 
     return SPL_OK;
 }
 
-/* As long as most of what is drawn is the tile's own, and not what lies around it. */
-static bool may_cut(const struct spl_tile *tile)
+/* As long as most of what is drawn is the tile's own, and not what lies around it; not into crumbs, since each piece
+ * selects anew and lists all chunks that may touch it, whose splats are then looked at however few fall on it; and as
+ * long as pieces have shared the work, not each done all of it, as where most of it falls on a few pixels. */
+static bool may_cut(const struct spl_frame_job *job, const struct spl_tile *tile, uint64_t work)
 {
+    const struct spl_frame_whole *whole = &job->whole;
     uint64_t side = (uint64_t)tile->view->supersample, pixels = (uint64_t)tile->width * tile->height;
-    return pixels > 1 && 2 * pixels * side * side >= tile->samples;
+    return pixels > 1 && pixels * side * side >= 2 * job->renderer->least_piece &&
+           2 * pixels * side * side >= tile->samples &&
+           (!whole->pixels || (double)work * (double)whole->pixels <= 2 * (double)whole->work * (double)pixels);
 }
 
 /* Too much for a step; then the tile is known for its pieces. */
@@ -168,11 +173,14 @@ static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
     uint32_t groups = 0;
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
         groups |= tile->view->layers >> layer & 1 ? 1u << group_of_layer[layer] : 0;
-    if (!may_cut(tile) ||
-        spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups)) <= job->renderer->work_a_step)
+    const uint64_t work = spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
+    if (work <= job->renderer->work_a_step || !may_cut(job, tile, work))
         return false;
-    if (!job->whole.weight_max)
-        job->whole = (struct spl_frame_whole){tile->params.weight_max, job->renderer->list.complete};
+    if (!job->whole.pixels)
+        job->whole = (struct spl_frame_whole){.pixels = (uint64_t)tile->width * tile->height,
+                                              .work = work,
+                                              .weight_max = tile->params.weight_max,
+                                              .complete = job->renderer->list.complete};
     return true;
 }
 

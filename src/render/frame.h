@@ -11,7 +11,9 @@
 
 /* What is known of a tile that is too much work, for its pieces. */
 struct spl_frame_whole {
-    uint32_t weight_max; /* of its sums; 0 = nothing: what is drawn is a tile itself */
+    uint64_t pixels;     /* 0 = nothing is known: what is drawn is a tile itself */
+    uint64_t work;       /* of work.c */
+    uint32_t weight_max; /* of its sums */
     bool complete;       /* its draw list was */
 };
 

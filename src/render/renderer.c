@@ -10,6 +10,7 @@
 #include "render/slot.h"
 
 enum { preload_ahead = 8 }; // pages that are asked for at once
+enum { least_piece = 64 * 64 }; // samples
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S, between_looks_ns = SPL_NS_PER_S;
 
 /* Of what a software driver takes 0.3 ns a sample for where it was scanned, and 20 where each thing hides the one
@@ -36,6 +37,7 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
     if (!rc) {
         renderer->work_at_once = spl_gpu_get_device(renderer->gpu)->software ? software_work : gpu_work;
         renderer->work_a_step = renderer->work_at_once;
+        renderer->least_piece = least_piece;
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
     }
     if (!rc) {
@@ -187,6 +189,7 @@ void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items)
 void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
 {
     renderer->work_a_step = work;
+    renderer->least_piece = 1;
 }
 
 const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer)

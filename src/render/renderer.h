@@ -56,7 +56,8 @@ struct spl_renderer {
     struct spl_draw_list list; /* reused from tile to tile */
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
     uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
-    uint64_t work_a_step;      /* that a step of a frame has, unless its piece is a few pixels; see work.c */
+    uint64_t work_a_step;      /* that a step of a frame has, unless its piece is small; see work.c */
+    uint64_t least_piece;      /* samples of a piece, at least */
 };
 
 /* One tile being recorded. */

@@ -109,6 +109,22 @@ static void pieces_change_no_byte(void **state)
     spl_renderer_set_work_a_step(renderer, UINT64_MAX);
 }
 
+/* Where all falls on a few pixels each piece that has them does all of the work: cutting ends where that shows. */
+static void cutting_ends_where_it_does_not_pay(void **state)
+{
+    (void)state;
+    struct spl_dataset *far_off = random_cube(5000, origin, 0.002);
+    struct spl_view view = looking(origin, 500, 128, 96);
+    size_t steps;
+    view.lod = 0;
+    spl_renderer_set_work_a_step(renderer, 1 << 10);
+    struct spl_frame frame = render_in_steps(far_off, &view, &steps);
+    assert_true(steps > 1 && steps <= 8);
+    spl_frame_finish(&frame);
+    done(far_off);
+    spl_renderer_set_work_a_step(renderer, UINT64_MAX);
+}
+
 /* Chunks of meshes that no packer makes: panels in one place, of the finest lattice, each of whose triangles is as
  * tall as a house. */
 static struct spl_dataset *add_forged(size_t chunks)
@@ -289,6 +305,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         frames_test(parts_change_no_byte),
         frames_test(pieces_change_no_byte),
+        frames_test(cutting_ends_where_it_does_not_pay),
         frames_test(a_step_of_too_much_work_is_a_piece),
         frames_test(too_much_work_ends_at_the_deadline),
         frames_test(work_beyond_all_bounds_is_refused),
