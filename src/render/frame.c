@@ -167,6 +167,16 @@ static bool may_cut(const struct spl_frame_job *job, const struct spl_tile *tile
            (!whole->pixels || (double)work * (double)whole->pixels <= 2 * (double)whole->work * (double)pixels);
 }
 
+static void count_drawn(const struct spl_draw_list *list, struct spl_frame_stats *stats)
+{
+    stats->splats_drawn += list->drawn[SPL_CHUNK_DISCS];
+    stats->lines_drawn += list->drawn[SPL_CHUNK_LINES];
+    stats->panels_drawn += list->drawn[SPL_CHUNK_PANELS];
+    stats->meshes_drawn += list->drawn[SPL_CHUNK_MESHES];
+    stats->chunks_drawn += list->chunk_count;
+    stats->nodes_drawn += list->nodes;
+}
+
 /* Too much for a step; then the tile is known for its pieces. */
 static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
 {
@@ -176,11 +186,13 @@ static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
     const uint64_t work = spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
     if (work <= job->renderer->work_a_step || !may_cut(job, tile, work))
         return false;
-    if (!job->whole.pixels)
+    if (!job->whole.pixels) {
         job->whole = (struct spl_frame_whole){.pixels = (uint64_t)tile->width * tile->height,
                                               .work = work,
                                               .weight_max = tile->params.weight_max,
                                               .complete = job->renderer->list.complete};
+        count_drawn(&job->renderer->list, &job->frame->stats);
+    }
     return true;
 }
 
@@ -324,13 +336,9 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     spl_readback_tile(tile, spl_gpu_buffer_map(r->scratch.readback), job->frame->images);
     stats->readback_ms += spl_since_ms(&clock);
     add_times(tile, stats);
-    stats->splats_drawn += r->list.drawn[SPL_CHUNK_DISCS];
-    stats->lines_drawn += r->list.drawn[SPL_CHUNK_LINES];
-    stats->panels_drawn += r->list.drawn[SPL_CHUNK_PANELS];
-    stats->meshes_drawn += r->list.drawn[SPL_CHUNK_MESHES];
     stats->soft_drawn += tile->soft_drawn;
-    stats->chunks_drawn += r->list.chunk_count;
-    stats->nodes_drawn += r->list.nodes;
+    if (!job->whole.pixels) // a tile is counted as a whole
+        count_drawn(&r->list, stats);
     stats->complete &= r->list.complete;
     stats->pending |= r->residency.later;
     return SPL_OK;

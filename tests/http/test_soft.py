@@ -23,6 +23,9 @@ def test_what_is_soft_comes_back():
         assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
         pick = d.ask(f"{PICK}?x=8&y=8&{query}")
         assert pick.status == 200 and soft(pick) == whole
+        asked = {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.75, "soft_blend": 0.5}
+        assert soft(d.ask(f"{PICK}?x=8&y=8&soft={AXIS}&soft_model=base&soft_opacity=0.75&soft_blend=0.5")) == asked
+        assert soft(d.post({"x": 8, "y": 8, **asked}, PICK)) == asked
         for text in ["class>3", "class:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
             reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer"})
             assert reply.status == 200 and " or ".join(soft(reply)["soft"]) == text, reply.headers
