@@ -117,7 +117,8 @@ int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, u
     int rc = grow((void **)&list->tests, &list->test_capacity, list->test_count + count, sizeof *words, err);
     if (rc)
         return rc;
-    memcpy(list->tests + list->test_count, words, count * sizeof *words);
+    if (count)
+        memcpy(list->tests + list->test_count, words, count * sizeof *words);
     *first = (uint32_t)list->test_count;
     list->test_count += count;
     return SPL_OK;
