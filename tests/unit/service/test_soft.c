@@ -57,8 +57,8 @@ static void every_way_of_asking_means_the_same(void **state)
         "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
         "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
         "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2",
-        "@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,"
-        "\"soft_blend\":2}",
+        ("@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,"
+         "\"soft_blend\":2}"),
     };
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
         struct spl_soft_params soft = soft_asked(ways[i]);
