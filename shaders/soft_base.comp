@@ -17,6 +17,7 @@
  * nothing is lost however short stretches are. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#include "common/depths.glsl"
 #include "common/soft.glsl"
 #include "common/soft_step.glsl"
 
@@ -26,19 +27,9 @@ layout(constant_id = 1) const uint BORDER = 0; /* some spheres are near the bord
 
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
 layout(std430, binding = SPL_STORAGE_COUNTS) buffer count_buffer { uint counts[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* as common/samples.glsl has it */
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
-
-uint solid_word(uint at)
-{
-#ifdef SPL_ATOMICS_64
-    return imageLoad(depth_texels, int(2u * at + 1u)).x;
-#else
-    return imageLoad(depth_texels, int(at)).x;
-#endif
-}
 
 vec3 unpack_bytes(uint word)
 {
@@ -215,7 +206,7 @@ void main()
     if (!has)
         return;
     uint index = sample_index(at), own = SPL_SOFT_STATE_WORDS * index, kept = job.progress + 1u + id;
-    uint solid = solid_word(index);
+    uint solid = depth_word(index);
     float until = min(solid == SPL_NOTHING ? frame.far : uintBitsToFloat(solid), min(frame.far, job.until));
     soft_ray ray = load_soft_ray(at + tile_corner());
     walk w;

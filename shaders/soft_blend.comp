@@ -4,7 +4,7 @@
  * items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
-#include "common/frame.glsl"
+#include "common/depths.glsl"
 #include "common/soft_step.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -14,16 +14,6 @@ layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; }
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* as common/samples.glsl has it */
-
-uint solid_word(uint at)
-{
-#ifdef SPL_ATOMICS_64
-    return imageLoad(depth_texels, int(2u * at + 1u)).x;
-#else
-    return imageLoad(depth_texels, int(at)).x;
-#endif
-}
 
 void main()
 {
@@ -56,7 +46,7 @@ void main()
             sum[k] = uvec3(state[word], state[word + 1u], state[word + 2u]);
             clear[k] -= state[word + 3u];
         }
-        solid[k] = inside && clear[k] >= SPL_SOFT_CLEAR_LEAST ? solid_word(index) : 0u;
+        solid[k] = inside && clear[k] >= SPL_SOFT_CLEAR_LEAST ? depth_word(index) : 0u;
         last = max(last, solid[k]);
     }
     for (;;) {

@@ -2,20 +2,10 @@
 #ifndef SPL_SAMPLES_GLSL
 #define SPL_SAMPLES_GLSL
 
-#include "common/frame.glsl"
+#include "common/depths.glsl"
 
-SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels; /* with 64 bit atomics payload, depth of the nearest */
 SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SUMS) sums_texels;
-
-uint depth_word(uint at)
-{
-#ifdef SPL_ATOMICS_64
-    return imageLoad(depth_texels, int(2u * at + 1u)).x;
-#else
-    return imageLoad(depth_texels, int(at)).x;
-#endif
-}
 
 uint payload(uint at)
 {

@@ -1,6 +1,6 @@
 /* Chunks against terms; see marks.h. A chunk's header has the base and the width of its codes, so the numbers that it
  * may have are a range, modulo 2^32 as codes decode; its box bounds distances to shapes. What that leaves open becomes a
- * test. W of eq. 22 is computed here and in common/marks.glsl by the same products of floats.
+ * test. W of eq. 22 is computed here and in soft_mark.comp by the same products of floats.
  *
  * A test (SPL_TEST_*): of numbers a code is soft where code + start, modulo 2^32, is at most the span; of few codes there
  * is a table of marks; of a shape its words say where it lies. Pure functions; any thread. */
