@@ -204,7 +204,7 @@ int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, s
 
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err)
 {
-    enum { side = SPL_SOFT_TILE, samples = side * side, lanes = samples / SPL_SOFT_SAMPLES, tile_words = 3 };
+    enum { samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS, lanes = samples / SPL_SOFT_SAMPLES, tile_words = 3 };
     const struct spl_soft_memory *memory = order->memory;
     const uint32_t tiles = order->columns * order->rows;
     if (blend->model != SPL_SOFT_MODEL_EXPRESS)
