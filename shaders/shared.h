@@ -359,18 +359,20 @@ struct spl_frame_params {
 };
 
 /* Soft transparency: spheres as items in the order of their ids, which are sorted by depth and listed by the tiles of
- * SPL_SOFT_TILE samples a side that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS words: x y z
+ * SPL_SOFT_TILE x SPL_SOFT_TILE_ROWS samples that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS words: x y z
  * of the centre in view space, the radius, colour | mark << 24, id. Behind all items lie their rectangles, a word each:
- * the first tile (row * columns + column) in 24 bits, columns less 1 and rows less 1 in 4 bits each. */
-#define SPL_SOFT_TILE 8
-#define SPL_SOFT_SAMPLES 8 /* of a column of a tile that an invocation blends */
+ * the first tile (row * columns + column) in 22 bits, columns less 1 and rows less 1 in 5 bits each. */
+#define SPL_SOFT_TILE 8 /* samples of a row of a tile */
+#define SPL_SOFT_TILE_ROWS 4
+#define SPL_SOFT_SAMPLES 4 /* of a column of a tile that an invocation blends */
 #define SPL_SOFT_ITEM_WORDS 6
-#define SPL_SOFT_RECT_COLUMNS 24
-#define SPL_SOFT_RECT_ROWS 28
-#define SPL_SOFT_SPAN_MAX 16 /* tiles of a rectangle's side */
+#define SPL_SOFT_RECT_COLUMNS 22
+#define SPL_SOFT_RECT_ROWS 27
+#define SPL_SOFT_SPAN_MAX 32 /* tiles of a rectangle's side */
 /* What is in front lets this much through, in fixed point, and is not looked behind where it is less than the least. */
 #define SPL_SOFT_CLEAR 0xffffffu
 #define SPL_SOFT_CLEAR_LEAST 0x4000u
+#define SPL_SOFT_FARTHEST 0x7fffffff /* what SPL_NOTHING is among depths that compare as signed numbers */
 #define SPL_SOFT_STATE_WORDS 4 /* a sample: sums of red, green, blue times share, share covered; 0 = nothing */
 /* What an invocation counts: items | most entries of one << 4 | entries << 16, least and greatest depth, largest radius
  * (float bits). */
@@ -400,7 +402,8 @@ struct spl_soft_step {
 
 #ifndef SPL_GLSL
 _Static_assert(sizeof(struct spl_soft_step) <= 256, "spl_soft_step fits its slot");
-_Static_assert(SPL_WINDOW / SPL_SOFT_TILE + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW % SPL_SOFT_TILE == 0,
+_Static_assert(SPL_WINDOW / SPL_SOFT_TILE + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW % SPL_SOFT_TILE == 0 &&
+               SPL_WINDOW / SPL_SOFT_TILE_ROWS + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW % SPL_SOFT_TILE_ROWS == 0,
                "a window is whole tiles, and any footprint that is not cut in windows fits a rectangle");
 _Static_assert(SPL_RUN_PANELS << SPL_RUN_BITS == SPL_PANELS_MAX, "runs of panels");
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");

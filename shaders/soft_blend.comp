@@ -19,15 +19,15 @@ void main()
 {
     load_frame();
     load_step();
-    const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE / SPL_SOFT_SAMPLES;
+    const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS / SPL_SOFT_SAMPLES;
     uint slot = gl_GlobalInvocationID.x / lanes, lane = gl_GlobalInvocationID.x % lanes;
     bool has = slot < job.count;
     int list = int(job.first + 3u * (has ? slot : 0u));
     uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
     uint end = has ? imageLoad(list_texels, list + 2).x : i;
-    ivec2 corner = ivec2(place & 65535u, place >> 16) * SPL_SOFT_TILE;
+    ivec2 corner = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
     corner += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE * SPL_SOFT_SAMPLES);
-    uint clear[SPL_SOFT_SAMPLES], solid[SPL_SOFT_SAMPLES], last = 0u;
+    int clear[SPL_SOFT_SAMPLES], solid[SPL_SOFT_SAMPLES], last = 0;
     uvec3 sum[SPL_SOFT_SAMPLES];
     float ry[SPL_SOFT_SAMPLES], inverse[SPL_SOFT_SAMPLES];
     precise float rx = (float(corner.x + int(frame.tile_x)) + (0.5 - frame.cx)) * frame.inverse_fx;
@@ -40,34 +40,36 @@ void main()
         ry[k] = y;
         inverse[k] = over;
         sum[k] = uvec3(0u);
-        clear[k] = SPL_SOFT_CLEAR;
+        clear[k] = int(SPL_SOFT_CLEAR);
         if (FIRST == 0u) {
             uint word = SPL_SOFT_STATE_WORDS * index;
             sum[k] = uvec3(state[word], state[word + 1u], state[word + 2u]);
-            clear[k] -= state[word + 3u];
+            clear[k] -= int(state[word + 3u]);
         }
-        solid[k] = inside && clear[k] >= SPL_SOFT_CLEAR_LEAST ? depth_word(index) : 0u;
+        bool seen = inside && clear[k] >= int(SPL_SOFT_CLEAR_LEAST);
+        solid[k] = seen ? int(min(depth_word(index), uint(SPL_SOFT_FARTHEST))) : 0;
         last = max(last, solid[k]);
     }
+    int item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
     for (;;) {
-        int item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
         float x = uintBitsToFloat(imageLoad(item_texels, item).x);
         float y = uintBitsToFloat(imageLoad(item_texels, item + 1).x);
-        uint key = imageLoad(item_texels, item + 2).x;
-        float z = uintBitsToFloat(key), radius = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
+        int key = int(imageLoad(item_texels, item + 2).x);
+        float z = intBitsToFloat(key), radius = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
         uint paint = imageLoad(item_texels, item + 4).x;
+        item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i) + 1).x); /* early: nothing waits for it */
         uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
         precise float closer = 1.0 / (radius * radius);
         precise float ox = x - rx * z;
         precise float ox_squared = ox * ox, ox_along = ox * rx;
         precise float soft = (float(paint >> 24) - 1.0) * (1.0 / 254.0);
-        key = i < end ? key : SPL_NOTHING;
-        uint left = 0u;
+        int left = 0;
         for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
             precise float oy = y - ry[k] * z;
             precise float along = ox_along + oy * ry[k];
             precise float share = (ox_squared + oy * oy - along * along * inverse[k]) * closer;
-            precise float m = max(1.0 - share, 0.0);
+            precise float inner = 1.0 - share;
+            precise float m = intBitsToFloat(max(floatBitsToInt(inner), 0));
             precise float fall =
                 m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
             if (BORDER != 0u) {
@@ -75,12 +77,12 @@ void main()
                 precise float mixed = linear * 65536.0 * (1.0 - soft) + fall * soft;
                 fall = mixed;
             }
-            precise float scaled = clamp(fall + 0.5, 0.0, 65536.0);
-            uint opacity = key <= solid[k] ? uint(int(scaled)) : 0u;
-            uint weight = ((clear[k] >> 8) * opacity) >> 8;
-            clear[k] -= weight;
+            precise float rounded = fall + 0.5;
+            int opacity = key <= solid[k] ? clamp(int(rounded), 0, 65536) : 0;
+            uint weight = (uint(clear[k] >> 8) * uint(opacity)) >> 8;
+            clear[k] -= int(weight);
             sum[k] += weight * color;
-            solid[k] = clear[k] >= SPL_SOFT_CLEAR_LEAST ? solid[k] : 0u;
+            solid[k] = clear[k] >= int(SPL_SOFT_CLEAR_LEAST) ? solid[k] : 0;
             left = max(left, solid[k]);
         }
         last = left;
@@ -94,7 +96,7 @@ void main()
             state[word] = sum[k].x;
             state[word + 1u] = sum[k].y;
             state[word + 2u] = sum[k].z;
-            state[word + 3u] = SPL_SOFT_CLEAR - clear[k];
+            state[word + 3u] = SPL_SOFT_CLEAR - uint(clear[k]);
         }
     }
 }

@@ -75,8 +75,8 @@ void main()
             bool after = key > job.low || (key == job.low && slot >= job.low_slot);
             bool before = key < job.high || (key == job.high && slot < job.high_slot);
             if (p.z >= frame.near && p.z <= frame.far && low.x <= high.x && low.y <= high.y && after && before) {
-                uvec2 from = uvec2(ivec2(low) - tile_corner()) / SPL_SOFT_TILE;
-                uvec2 span = uvec2(ivec2(high) - tile_corner()) / SPL_SOFT_TILE - from;
+                uvec2 from = uvec2(ivec2(low) - tile_corner()) / uvec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
+                uvec2 span = uvec2(ivec2(high) - tile_corner()) / uvec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) - from;
                 span = min(span, uvec2(SPL_SOFT_SPAN_MAX - 1));
                 uint own = (span.x + 1u) * (span.y + 1u);
                 if (PHASE == 2u) {

@@ -24,7 +24,7 @@ void main()
     for (uint round = 0u;;) {
         uint item = imageLoad(pair_texels, int(2u * i + 1u)).x;
         uint rect = imageLoad(item_texels, int(job.rects + item)).x;
-        uint tile = (rect & 0xffffffu) + row * job.columns + column, counter = block * job.digits + tile;
+        uint tile = (rect & (1u << SPL_SOFT_RECT_COLUMNS) - 1u) + row * job.columns + column, counter = block * job.digits + tile;
         uint start = WRITES != 0u ? imageLoad(start_texels, int(tile)).x : 0u;
         if (i < end) {
             uint before = counts[counter];
@@ -32,7 +32,7 @@ void main()
             if (WRITES != 0u)
                 entries[start + before] = item;
         }
-        bool wraps = column == bitfieldExtract(rect, SPL_SOFT_RECT_COLUMNS, 4);
+        bool wraps = column == bitfieldExtract(rect, SPL_SOFT_RECT_COLUMNS, SPL_SOFT_RECT_ROWS - SPL_SOFT_RECT_COLUMNS);
         bool ends = wraps && row == rect >> SPL_SOFT_RECT_ROWS;
         column = wraps ? 0u : column + 1u;
         row = ends ? 0u : row + uint(wraps);

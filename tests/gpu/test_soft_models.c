@@ -17,8 +17,9 @@
 #include "shared.h"
 #include "support/soft_rays.h"
 
-enum { width = 36, height = 28, columns = (width + 7) / 8, rows = (height + 7) / 8, items_max = 4000,
-       tiles = columns * rows, crowd = 70000, progress_words = 1 + 64 * tiles };
+enum { width = 36, height = 28, columns = (width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,
+       rows = (height + SPL_SOFT_TILE_ROWS - 1) / SPL_SOFT_TILE_ROWS, items_max = 4000,
+       tiles = columns * rows, crowd = 70000, progress_words = 1 + 64 * tiles /* samples, and more */ };
 static const double focal = 40;
 static struct spl_gpu *gpu;
 static struct spl_gpu_buffer *buffers[SPL_RESOURCE_COUNT], *down;

@@ -49,7 +49,7 @@ static int open_all(void **state)
 {
     (void)state;
     struct spl_soft_sizes sizes = {.items = items_max, .entries = 4 * items_max,
-                                   .tiles = (width_max / 8 + 1) * (height_max / 8 + 1),
+                                   .tiles = (width_max / SPL_SOFT_TILE + 1) * (height_max / SPL_SOFT_TILE_ROWS + 1),
                                    .samples = width_max * height_max};
     struct spl_error err = {0};
     if (spl_gpu_open(&(struct spl_gpu_options){.device = device, .debug = true, .cache_dir = ""}, &gpu, &err))
@@ -125,8 +125,8 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
                                    .memory = &memory,
                                    .frame = {.buffer = frame, .bytes = 256},
                                    .depth = depth,
-                                   .columns = (s->params.width + 7) / 8,
-                                   .rows = (s->params.height + 7) / 8};
+                                   .columns = (s->params.width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,
+                                   .rows = (s->params.height + SPL_SOFT_TILE_ROWS - 1) / SPL_SOFT_TILE_ROWS};
     uint32_t *words = spl_gpu_buffer_map(up), count = 0, low = UINT32_MAX, high = 0, most = 0;
     for (uint32_t i = first; i < end; i++)
         count += soft_rectangles(&s->params, &s->items[i], NULL);
@@ -136,7 +136,7 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
         uint32_t rects[1024], n = soft_rectangles(&s->params, &s->items[i], rects), key;
         memcpy(&key, &s->items[i].z, 4);
         for (uint32_t k = 0; k < n; k++, made++) {
-            uint32_t entries = ((rects[k] >> SPL_SOFT_RECT_COLUMNS & 15) + 1) * ((rects[k] >> SPL_SOFT_RECT_ROWS) + 1);
+            uint32_t entries = ((rects[k] >> SPL_SOFT_RECT_COLUMNS & (SPL_SOFT_SPAN_MAX - 1)) + 1) * ((rects[k] >> SPL_SOFT_RECT_ROWS) + 1);
             memcpy(item + SPL_SOFT_ITEM_WORDS * made, &s->items[i], 16);
             item[SPL_SOFT_ITEM_WORDS * made + 4] = (uint32_t)s->items[i].color[0] | (uint32_t)s->items[i].color[1] << 8 |
                                                    (uint32_t)s->items[i].color[2] << 16 | (uint32_t)s->items[i].mark << 24;

@@ -6,7 +6,7 @@
 
 #include "render/soft/models.h"
 
-enum { side = SPL_SOFT_TILE, span = SPL_SOFT_SPAN_MAX };
+enum { wide = SPL_SOFT_TILE, high = SPL_SOFT_TILE_ROWS, span = SPL_SOFT_SPAN_MAX };
 
 /* The samples along an axis that a sphere may reach: the tangents to its circle in that plane. */
 static void extent(double p, double z, double radius, double f, double c, uint32_t size, int *first, int *last)
@@ -24,14 +24,14 @@ static void extent(double p, double z, double radius, double f, double c, uint32
 uint32_t soft_rectangles(const struct spl_frame_params *params, const struct soft_item *item, uint32_t *rects)
 {
     int x0, x1, y0, y1;
-    uint32_t count = 0, columns = (params->width + side - 1) / side;
+    uint32_t count = 0, columns = (params->width + wide - 1) / wide;
     extent(item->x, item->z, item->radius, params->fx, params->cx, params->width, &x0, &x1);
     extent(item->y, item->z, item->radius, params->fy, params->cy, params->height, &y0, &y1);
     if (x0 > x1 || y0 > y1)
         return 0;
-    for (int row = y0 / side; row <= y1 / side; row += span)
-        for (int column = x0 / side; column <= x1 / side; column += span, count++) {
-            int more = x1 / side - column, down = y1 / side - row;
+    for (int row = y0 / high; row <= y1 / high; row += span)
+        for (int column = x0 / wide; column <= x1 / wide; column += span, count++) {
+            int more = x1 / wide - column, down = y1 / high - row;
             more = more < span ? more : span - 1;
             down = down < span ? down : span - 1;
             if (rects)

@@ -8,11 +8,12 @@
 #include "render/soft/models.h"
 
 enum {
-    sort_block = 1024,    // pairs that an invocation sorts at least
+    sort_block = 2048,    // pairs that an invocation sorts at least
     sort_bits = 9,        // of a digit at most
     sort_blocks_max = 1024,
     digits_max = 2048,
     list_block = 64,
+    list_blocks_least = 32, // that all cores have some
     blend_work = 1 << 25, // samples that are looked at in a dispatch
     walked_samples = 1    // that moving an item is worth
 };
@@ -170,7 +171,9 @@ int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, s
     order->entries = 0;
     if (!items)
         return SPL_OK;
-    uint32_t threads = room / tiles < memory->threads ? room / tiles : memory->threads;
+    uint32_t threads = items / tiles > list_blocks_least ? items / tiles : list_blocks_least;
+    threads = threads < memory->threads ? threads : memory->threads;
+    threads = threads < room / tiles ? threads : room / tiles;
     uint32_t block = groups(items, threads);
     block = block > list_block ? block : list_block;
     struct spl_soft_dispatch what = {.step = {.count = items,
@@ -204,7 +207,7 @@ int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, s
 
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err)
 {
-    enum { side = SPL_SOFT_TILE, samples = side * side, lanes = samples / SPL_SOFT_SAMPLES, tile_words = 3 };
+    enum { samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS, lanes = samples / SPL_SOFT_SAMPLES, tile_words = 3 };
     const struct spl_soft_memory *memory = order->memory;
     const uint32_t tiles = order->columns * order->rows;
     if (blend->model != SPL_SOFT_MODEL_EXPRESS)

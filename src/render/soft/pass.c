@@ -93,15 +93,15 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
     struct spl_draw_list *list = &renderer->list;
     const struct spl_gpu_limits *limits = spl_gpu_get_limits(renderer->gpu);
     const bool software = spl_gpu_get_device(renderer->gpu)->software;
-    const uint64_t slots = lay_out_slots(list), side = SPL_SOFT_TILE;
+    const uint64_t slots = lay_out_slots(list), columns = SPL_SOFT_TILE, rows = SPL_SOFT_TILE_ROWS;
     if (list->first_soft_chunk == list->first_mark_chunk)
         return SPL_OK;
     if (slots * SPL_SOFT_SLOT_WORDS * sizeof(uint32_t) > limits->binding_bytes)
         return spl_fail_field(err, SPL_E_LIMIT, "lod", "this view has more soft splats than it can sort; raise lod");
     const struct spl_soft_sizes *have = &memory->sizes;
     struct spl_soft_sizes sizes = {.slots = larger((uint32_t)slots, have->slots),
-                                   .tiles = (uint32_t)((camera->width + side - 1) / side *
-                                                       ((camera->height + side - 1) / side)),
+                                   .tiles = (uint32_t)((camera->width + columns - 1) / columns *
+                                                       ((camera->height + rows - 1) / rows)),
                                    .samples = (uint64_t)camera->width * camera->height};
     sizes.tiles = larger(sizes.tiles, have->tiles);
     sizes.samples = sizes.samples > have->samples ? sizes.samples : have->samples;
@@ -325,7 +325,7 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     struct spl_renderer *r = tile->renderer;
     const struct spl_soft_sizes *sizes = &r->scratch.soft.sizes;
     const struct spl_draw_list *list = &r->list;
-    const uint32_t side = SPL_SOFT_TILE;
+    const uint32_t columns = SPL_SOFT_TILE, rows = SPL_SOFT_TILE_ROWS;
     const size_t last = list->first_mark_chunk - 1;
     const bool wide = !spl_method_row(tile->view->method)->sums && spl_gpu_get_limits(r->gpu)->atomics_64;
     struct pass pass = {.tile = tile,
@@ -334,8 +334,8 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
                                   .memory = &r->scratch.soft,
                                   .depth = r->scratch.depth,
                                   .wide = wide,
-                                  .columns = (tile->camera.width + side - 1) / side,
-                                  .rows = (tile->camera.height + side - 1) / side,
+                                  .columns = (tile->camera.width + columns - 1) / columns,
+                                  .rows = (tile->camera.height + rows - 1) / rows,
                                   .add_work = tile_work,
                                   .run = tile_run},
                         .slots = list->chunks[last].texture + slots_of(list, last)};

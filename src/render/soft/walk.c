@@ -7,8 +7,7 @@
 #include "render/soft/models.h"
 
 enum {
-    side = SPL_SOFT_TILE,
-    samples = side * side,
+    samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS,
     tile_words = 3,
     groups_max = 256,      // of a batch
     group_work = 1 << 25,  // samples that are looked at in a dispatch
