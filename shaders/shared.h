@@ -381,6 +381,7 @@ struct spl_frame_params {
  * from run to run. Events are rounded: where spheres may begin and end is asked for with so much more of the depth. */
 #define SPL_SOFT_WALK_WORDS 2
 #define SPL_SOFT_KEPT_WORDS 16
+#define SPL_SOFT_MET 32 /* spheres that a ray has met, of which an invocation remembers the entries */
 #define SPL_SOFT_SLACK 1e-6f
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
 

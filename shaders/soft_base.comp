@@ -4,8 +4,9 @@
  *
  * The ray is cut where it enters and leaves spheres. From an event to the next what is open stays the same; the next is
  * found by looking through all spheres that may begin before it and are not over, of which none is farther from the
- * event than the largest radius of the list. So no sphere is kept, and there is no limit on those that are open. A walk
- * through the list is one event t:
+ * event than the largest radius of the list. An invocation remembers which of them its ray has met, SPL_SOFT_MET at most,
+ * and looks those behind up in the list again: most of a tile's spheres miss most of its samples. So there is no limit on
+ * spheres that are open. A walk is one event t:
  *   the integrals at t of spheres that were open before it, less those of the same at the event before: the depth of
  *   the stretch between (they are kept as one sum: `before` and `after`);
  *   the colour of what is open behind it (eq. 11), and the next event.
@@ -174,11 +175,16 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
     float t = reached, next = until, before = 0.0, after = 0.0, was_after = 0.0, weights = 0.0, was_weights = 1.0;
     vec3 color = vec3(0.0), was_color = vec3(0.0);
     bool fresh = true, going = true, done = false;
-    uint first = begin, i = begin, most = most_rounds(begin, ray), was = counts[kept];
+    uint most = most_rounds(begin, ray), was = counts[kept];
+    uint met[SPL_SOFT_MET], count = 0u, k = 0u, alive = 0u; /* entries; those of this walk that are not over */
+    uint tail = begin, i = begin, first = begin; /* of the list: all before are met or missed; the next; where to begin */
+    bool meets = true;
     if (was != KEPT_NOTHING) {
         fresh = was == KEPT_FRESH;
         i += counts[kept + 1u];
         first += counts[kept + 2u];
+        meets = i == first;
+        tail = i;
         t = kept_float(kept + 3u);
         next = kept_float(kept + 4u);
         before = kept_float(kept + 5u);
@@ -190,7 +196,9 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
         was_color = vec3(kept_float(kept + 13u), kept_float(kept + 14u), kept_float(kept + 15u));
     }
     for (uint rounds = 0u; going; rounds++) {
-        soft_item item = load_item(i, ray);
+        bool again = k < count;
+        uint entry = again ? met[k] : min(i, end - 1u);
+        soft_item item = load_item(entry, ray);
         bool hit = item.q < 1.0;
         float edge = sqrt(max(1.0 - item.q, 0.0)), middle = item.center.z + item.behind;
         vec2 events = chord_of(middle, edge * item.radius * root);
@@ -206,9 +214,17 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
         float event = enters > t ? enters : leaves > t ? leaves : until;
         next = hit ? min(next, event) : next;
         float reach = job.reach + SPL_SOFT_SLACK * item.center.z; /* rounded events must not be beyond it */
-        first += i == first && item.center.z + reach < t ? 1u : 0u;
-        i++;
-        if (i >= end || item.center.z - reach > next) {
+        bool stays = hit && leaves > t, follows = !again && meets && i == tail && i < end;
+        bool keeps = stays && (again || (follows && count < SPL_SOFT_MET));
+        if (keeps)
+            met[alive] = entry;
+        alive += keeps ? 1u : 0u;
+        tail += follows && (keeps || !stays) ? 1u : 0u;
+        i += again ? 0u : 1u;
+        k++;
+        count = k < count ? count : alive;
+        k = k < count ? k : count;
+        if (k == count && (i >= end || item.center.z - reach > next)) {
             if (!fresh)
                 hide(w, before - was_after, was_color / max(was_weights, 1e-12));
             reached = t;
@@ -222,15 +238,20 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
             color = vec3(0.0);
             t = next;
             next = until;
-            i = min(first, end - 1u);
+            if (!meets)
+                tail = first;
+            meets = true;
+            i = tail;
+            k = 0u;
+            alive = 0u;
             fresh = false;
         }
         going = !done && rounds < most;
     }
     counts[kept] = done ? KEPT_END : fresh ? KEPT_FRESH : KEPT_GOING;
     if (!done) {
-        counts[kept + 1u] = i - begin;
-        counts[kept + 2u] = first - begin;
+        counts[kept + 1u] = (k < count ? met[k] : i) - begin;
+        counts[kept + 2u] = (!meets ? first : count > 0u ? met[0] : min(tail, i)) - begin;
         keep_float(kept + 3u, t);
         keep_float(kept + 4u, next);
         keep_float(kept + 5u, before);
