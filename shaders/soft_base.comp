@@ -156,6 +156,18 @@ vec2 chord_of(float middle, float half_chord)
     return events;
 }
 
+/* The largest radius of a list, or of all: what is far has larger ones than what is near. */
+float find_reach(uint begin, uint end)
+{
+    float reach = 0.0;
+    uint last = min(end, begin + SPL_SOFT_ROUNDS / 16u);
+    for (uint i = begin; i < last; i++) {
+        int at = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
+        reach = max(reach, uintBitsToFloat(imageLoad(item_texels, at + 3).x));
+    }
+    return last < end ? job.reach : reach * (1.0 + SPL_SOFT_SLACK);
+}
+
 /* Rounds that an invocation may take: shells are rounds, too, and no sphere of the list has more of them. */
 uint most_rounds(uint begin, soft_ray ray)
 {
@@ -175,6 +187,7 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
     float t = reached, next = until, before = 0.0, after = 0.0, was_after = 0.0, weights = 0.0, was_weights = 1.0;
     vec3 color = vec3(0.0), was_color = vec3(0.0);
     bool fresh = true, going = true, done = false;
+    float largest = find_reach(begin, end);
     uint most = most_rounds(begin, ray), was = counts[kept];
     uint met[SPL_SOFT_MET], count = 0u, k = 0u, alive = 0u; /* entries; those of this walk that are not over */
     uint tail = begin, i = begin, first = begin; /* of the list: all before are met or missed; the next; where to begin */
@@ -213,7 +226,7 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
         weights += weight;
         float event = enters > t ? enters : leaves > t ? leaves : until;
         next = hit ? min(next, event) : next;
-        float reach = job.reach + SPL_SOFT_SLACK * item.center.z; /* rounded events must not be beyond it */
+        float reach = largest + SPL_SOFT_SLACK * item.center.z; /* rounded events must not be beyond it */
         bool stays = hit && leaves > t, follows = !again && meets && i == tail && i < end;
         bool keeps = stays && (again || (follows && count < SPL_SOFT_MET));
         if (keeps)

@@ -1,6 +1,6 @@
 /* Kernel soft_base against the reference in doubles: base and concentric over lists of tiles, with spheres that
  * overlap, are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds than a
- * kernel may take, in lists longer than that, in windows of depth; and layer. Colour over black and what passes, within a level of 255. One body for every backend. */
+ * kernel may take, in lists longer than that, 100,000 on a ray, in windows of depth; and layer. Colour over black and what passes, within a level of 255. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,8 +17,8 @@
 #include "shared.h"
 #include "support/soft_rays.h"
 
-enum { width = 36, height = 28, columns = (width + 7) / 8, rows = (height + 7) / 8, items_max = 4000,
-       tiles = columns * rows, crowd = 70000, progress_words = 1 + 64 * SPL_SOFT_KEPT_WORDS * tiles };
+enum { width = 36, height = 28, columns = (width + 7) / 8, rows = (height + 7) / 8, items_max = 100000,
+       entries_max = 100000, tiles = columns * rows, crowd = 70000, progress_words = 1 + 64 * SPL_SOFT_KEPT_WORDS * tiles };
 static const double focal = 40;
 static struct spl_gpu *gpu;
 static struct spl_gpu_buffer *buffers[SPL_RESOURCE_COUNT], *down;
@@ -40,7 +40,7 @@ static int open_all(void **state)
         {SPL_RESOURCE_WALKS, 4 * SPL_SOFT_WALK_WORDS * width * height, SPL_GPU_DEVICE},
         {SPL_RESOURCE_COUNTS, 4 * progress_words, SPL_GPU_DEVICE},
         {SPL_RESOURCE_ITEMS, 24 * items_max, SPL_GPU_UPLOAD},
-        {SPL_RESOURCE_SORT_FROM, 4 * items_max * tiles, SPL_GPU_UPLOAD},
+        {SPL_RESOURCE_SORT_FROM, 4 * entries_max, SPL_GPU_UPLOAD},
         {SPL_RESOURCE_LISTS, 12 * tiles, SPL_GPU_UPLOAD},
         {SPL_RESOURCE_DEPTH, 4 * width * height, SPL_GPU_UPLOAD}};
     struct spl_error err = {0};
@@ -72,6 +72,7 @@ struct scene {
     float solid[width * height];
     bool border;
     bool crowded; /* one tile, whose list has its first sphere many times */
+    bool alone;   /* one tile */
     int windows;  /* of depth, in which it is drawn; 0 = one */
 };
 
@@ -135,7 +136,7 @@ static void fill(const struct scene *s, double from, double to)
         items[6 * i + 5] = i;
         step.reach = fmaxf(step.reach, (float)p->radius);
     }
-    for (uint32_t t = 0; t < tiles; t++) { /* every sphere in each tile: more than must be, never less */
+    for (uint32_t t = 0; t < (s->alone ? 1 : tiles); t++) { /* every sphere in each tile: more than must be, never less */
         lists[3 * t] = t % columns | t / columns << 16;
         lists[3 * t + 1] = entry;
         for (uint32_t i = 0; i < s->count; i++) {
@@ -143,6 +144,7 @@ static void fill(const struct scene *s, double from, double to)
             bool held = p->center[2] + 1.001 * (double)step.reach >= from && p->center[2] - 1.001 * (double)step.reach <= to;
             if (s->look.model == SPL_SOFT_MODEL_LAYER)
                 held = p->center[2] >= from && p->center[2] < to;
+            assert_true(entry < entries_max);
             if (held)
                 entries[entry++] = i;
         }
@@ -152,10 +154,10 @@ static void fill(const struct scene *s, double from, double to)
     step.ends = to > 1e8;
     for (uint32_t i = 0; s->crowded && i < crowd; i++)
         entries[i] = 0;
-    if (s->crowded) {
+    if (s->crowded)
         lists[2] = crowd;
+    if (s->crowded || s->alone)
         step.count = 1;
-    }
     for (int i = 0; i < width * height; i++)
         depth[i] = isinf(s->solid[i]) ? SPL_NOTHING : bits((double)s->solid[i]);
     memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_FRAME]), &frame, sizeof frame);
@@ -328,6 +330,33 @@ static void lists_longer_than_a_run_are_walked(void **state)
     }
 }
 
+/* 100,000 on the ray of one sample, of which some two overlap: in dozens of runs, each of which ends. */
+static void a_ray_through_many_is_walked(void **state)
+{
+    (void)state;
+    enum { many = 100000, column = 3, row = 5 };
+    struct scene s = make_scene(SPL_SOFT_MODEL_BASE, 2e-5, many);
+    for (int i = 0; i < many; i++) {
+        double z = 2 + 58.0 * i / many;
+        s.spheres[i] = (struct soft_sphere){.center = {z * (column + 0.5 - width / 2.0) / focal,
+                                                       z * (row + 0.5 - height / 2.0) / focal, z},
+                                            .radius = 0.0006, .color = {250, 20, 130}, .soft = 1};
+    }
+    s.alone = true;
+    int times = draw(&s);
+    const uint32_t *got = spl_gpu_buffer_map(down);
+    const double clear = pow(1 - s.look.opacity, many), wanted[4] = {250 * (1 - clear), 20 * (1 - clear),
+                                                                     130 * (1 - clear), 255 * (1 - clear)};
+    for (int i = 0; i < width * height; i++)
+        for (int c = 0; c < 4; c++) {
+            double is = got[4 * i + c] / (double)SPL_SOFT_CLEAR * (c == 3 ? 255 : 1);
+            assert_true(fabs(is - (i == row * width + column ? wanted[c] : 0)) <= 1);
+        }
+    print_message("100,000 on a ray: %d runs\n", times);
+    assert_true(times > 5);
+    free(s.spheres);
+}
+
 /* However cut in windows of depth, every bit is the same. */
 static void windows_change_no_bit(void **state)
 {
@@ -383,6 +412,7 @@ int main(void)
         cmocka_unit_test(long_walks_go_on),
         cmocka_unit_test(layers_match),
         cmocka_unit_test(lists_longer_than_a_run_are_walked),
+        cmocka_unit_test(a_ray_through_many_is_walked),
         cmocka_unit_test(windows_change_no_bit),
         cmocka_unit_test(shells_are_counted),
     };
