@@ -379,7 +379,12 @@ struct spl_frame_params {
 #define SPL_SOFT_SLOT_WORDS 4
 #define SPL_SOFT_SLOT_SPLATS 4 /* discs of a slot; SPL_SOFT_SLOT_CELLS cells */
 #define SPL_SOFT_SLOT_CELLS 8
-#define SPL_SOFT_STUCK 0x80000000u /* COUNTS[progress] of soft_base: a list is longer than one run may walk */
+/* Models with a density and layer keep these of a sample from window to window of depth, and those of an invocation
+ * from run to run. Events are rounded: where spheres may begin and end is asked for with so much more of the depth. */
+#define SPL_SOFT_WALK_WORDS 2
+#define SPL_SOFT_KEPT_WORDS 16
+#define SPL_SOFT_MET 32 /* spheres that a ray has met, of which an invocation remembers the entries */
+#define SPL_SOFT_SLACK 1e-6f
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
 
 /* Of one dispatch of it. */
@@ -394,9 +399,10 @@ struct spl_soft_step {
     SPL_U32 first;         /* word of the lists where those of this dispatch start */
     SPL_F32 depth;         /* optical, through a sphere's centre: models with a density, and layer */
     SPL_F32 reach;         /* no sphere of the lists has a larger radius */
-    SPL_F32 until;         /* view depth up to which these lists are whole */
+    SPL_F32 until;         /* view depth up to which these lists have all that begins before it */
     SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
+    SPL_U32 ends;          /* of layer: this is its last window */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
 };
 

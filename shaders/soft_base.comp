@@ -4,14 +4,20 @@
  *
  * The ray is cut where it enters and leaves spheres. From an event to the next what is open stays the same; the next is
  * found by looking through all spheres that may begin before it and are not over, of which none is farther from the
- * event than the largest radius of the list. So no sphere is kept, and there is no limit on those that are open. A walk
- * through the list is one event t:
+ * event than the largest radius of the list. An invocation remembers which of them its ray has met, SPL_SOFT_MET at most,
+ * and looks those behind up in the list again: most of a tile's spheres miss most of its samples. So there is no limit on
+ * spheres that are open. A walk is one event t:
  *   the integrals at t of spheres that were open before it, less those of the same at the event before: the depth of
  *   the stretch between (they are kept as one sum: `before` and `after`);
  *   the colour of what is open behind it (eq. 11), and the next event.
- * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left at the
- * last event: COUNTS[progress] says that some were left, and behind it lies the depth that each invocation reached. The host
- * runs the kernel again until none is. Where no event was reached none ever will be: SPL_SOFT_STUCK.
+ * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left where it
+ * is, and kept: COUNTS[progress] says that some were left, behind it lie SPL_SOFT_KEPT_WORDS of each invocation. The host
+ * runs the kernel again until none is. So there is no limit on the list's length, either.
+ * Lists may be those of a window of depth: they have all that overlaps what lies before `until`. Where the next event
+ * lies behind that it is not known yet, and the ray ends at the last one, to which the next window comes back: what is
+ * open there it has, too. So windows cut no stretch, and change no byte. WALKS have the last event and the optical
+ * depth of every sample; of layer the depth up to which spheres count and their weights, and the state the sum of their
+ * colours until `ends` is set.
  *
  * Transmittance is e to the sum of depths, in 24 bits: what a stretch hides is the difference of two of them, so that
  * nothing is lost however short stretches are. */
@@ -27,6 +33,7 @@ layout(constant_id = 1) const uint BORDER = 0; /* some spheres are near the bord
 
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
 layout(std430, binding = SPL_STORAGE_COUNTS) buffer count_buffer { uint counts[]; };
+layout(std430, binding = SPL_STORAGE_WALKS) buffer walk_buffer { uint walks[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
@@ -101,26 +108,44 @@ void hide(inout walk w, float depth, vec3 color)
     w.clear = clear;
 }
 
-/* The nearest spheres within their margin, and nothing behind them; false where they are more than may be walked. */
-bool see_layer(inout walk w, soft_ray ray, uint begin, uint end, float until)
+/* Of COUNTS, how far an invocation came. */
+const uint KEPT_NOTHING = 0u, KEPT_FRESH = 1u, KEPT_GOING = 2u, KEPT_END = 3u;
+
+float kept_float(uint at)
 {
-    float last = until, weights = 0.0;
-    vec3 color = vec3(0.0);
-    bool all = true;
-    uint i = begin;
-    while (i < end) {
+    return uintBitsToFloat(counts[at]);
+}
+
+void keep_float(uint at, float value)
+{
+    counts[at] = floatBitsToUint(value);
+}
+
+/* What layer has seen so far. */
+struct layer {
+    vec3 color;
+    float weights, last;
+};
+
+/* The nearest spheres within their margin, and nothing behind them; false where they are more than a run may walk. */
+bool see_layer(inout layer l, soft_ray ray, uint begin, uint end, uint kept)
+{
+    uint i = begin + (counts[kept] == KEPT_GOING ? counts[kept + 1u] : 0u), stop = min(end, i + SPL_SOFT_ROUNDS);
+    bool behind = false;
+    while (i < stop && !behind) {
         soft_item item = load_item(i, ray);
         bool there = item.q < 1.0 && item.center.z >= frame.near;
-        last = there ? min(last, item.center.z + frame.margin * item.radius) : last;
-        float weight = there && item.center.z <= last ? 1.0 - item.q : 0.0;
-        color += weight * item.color;
-        weights += weight;
-        all = item.center.z > last || i + 1u >= end || i - begin < SPL_SOFT_ROUNDS;
-        i = item.center.z > last || !all ? end : i + 1u;
+        l.last = there ? min(l.last, item.center.z + frame.margin * item.radius) : l.last;
+        float weight = there && item.center.z <= l.last ? 1.0 - item.q : 0.0;
+        l.color += weight * item.color;
+        l.weights += weight;
+        behind = item.center.z > l.last;
+        i++;
     }
-    if (weights > 0.0)
-        hide(w, job.depth, color / weights);
-    return all;
+    bool done = behind || i >= end;
+    counts[kept] = done ? KEPT_END : KEPT_GOING;
+    counts[kept + 1u] = i - begin;
+    return done;
 }
 
 /* Where it is entered and left. In a function of its own: glslang follows what is precise back through a loop without
@@ -129,6 +154,18 @@ vec2 chord_of(float middle, float half_chord)
 {
     precise vec2 events = vec2(middle - half_chord, middle + half_chord);
     return events;
+}
+
+/* The largest radius of a list, or of all: what is far has larger ones than what is near. */
+float find_reach(uint begin, uint end)
+{
+    float reach = 0.0;
+    uint last = min(end, begin + SPL_SOFT_ROUNDS / 16u);
+    for (uint i = begin; i < last; i++) {
+        int at = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
+        reach = max(reach, uintBitsToFloat(imageLoad(item_texels, at + 3).x));
+    }
+    return last < end ? job.reach : reach * (1.0 + SPL_SOFT_SLACK);
 }
 
 /* Rounds that an invocation may take: shells are rounds, too, and no sphere of the list has more of them. */
@@ -143,16 +180,38 @@ uint most_rounds(uint begin, soft_ray ray)
     return rounds;
 }
 
-/* From event to event; true where it comes to its end. */
-bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float reached, float until)
+/* From event to event; true where it comes to its end, or to that of the window. */
+bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float reached, float until, uint kept)
 {
     float root = sqrt(ray.inverse), stretched = 1.0 / root;
     float t = reached, next = until, before = 0.0, after = 0.0, was_after = 0.0, weights = 0.0, was_weights = 1.0;
     vec3 color = vec3(0.0), was_color = vec3(0.0);
     bool fresh = true, going = true, done = false;
-    uint first = begin, i = begin, most = most_rounds(begin, ray);
+    float largest = find_reach(begin, end);
+    uint most = most_rounds(begin, ray), was = counts[kept];
+    uint met[SPL_SOFT_MET], count = 0u, k = 0u, alive = 0u; /* entries; those of this walk that are not over */
+    uint tail = begin, i = begin, first = begin; /* of the list: all before are met or missed; the next; where to begin */
+    bool meets = true;
+    if (was != KEPT_NOTHING) {
+        fresh = was == KEPT_FRESH;
+        i += counts[kept + 1u];
+        first += counts[kept + 2u];
+        meets = i == first;
+        tail = i;
+        t = kept_float(kept + 3u);
+        next = kept_float(kept + 4u);
+        before = kept_float(kept + 5u);
+        after = kept_float(kept + 6u);
+        was_after = kept_float(kept + 7u);
+        weights = kept_float(kept + 8u);
+        was_weights = kept_float(kept + 9u);
+        color = vec3(kept_float(kept + 10u), kept_float(kept + 11u), kept_float(kept + 12u));
+        was_color = vec3(kept_float(kept + 13u), kept_float(kept + 14u), kept_float(kept + 15u));
+    }
     for (uint rounds = 0u; going; rounds++) {
-        soft_item item = load_item(i, ray);
+        bool again = k < count;
+        uint entry = again ? met[k] : min(i, end - 1u);
+        soft_item item = load_item(entry, ray);
         bool hit = item.q < 1.0;
         float edge = sqrt(max(1.0 - item.q, 0.0)), middle = item.center.z + item.behind;
         vec2 events = chord_of(middle, edge * item.radius * root);
@@ -167,13 +226,22 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
         weights += weight;
         float event = enters > t ? enters : leaves > t ? leaves : until;
         next = hit ? min(next, event) : next;
-        first += i == first && item.center.z + job.reach < t ? 1u : 0u;
-        i++;
-        if (i >= end || item.center.z - job.reach > next) {
+        float reach = largest + SPL_SOFT_SLACK * item.center.z; /* rounded events must not be beyond it */
+        bool stays = hit && leaves > t, follows = !again && meets && i == tail && i < end;
+        bool keeps = stays && (again || (follows && count < SPL_SOFT_MET));
+        if (keeps)
+            met[alive] = entry;
+        alive += keeps ? 1u : 0u;
+        tail += follows && (keeps || !stays) ? 1u : 0u;
+        i += again ? 0u : 1u;
+        k++;
+        count = k < count ? count : alive;
+        k = k < count ? k : count;
+        if (k == count && (i >= end || item.center.z - reach > next)) {
             if (!fresh)
                 hide(w, before - was_after, was_color / max(was_weights, 1e-12));
             reached = t;
-            done = t >= until || w.clear < SPL_SOFT_CLEAR_LEAST;
+            done = t >= until || w.clear < SPL_SOFT_CLEAR_LEAST || next >= job.until;
             was_after = after;
             was_color = color;
             was_weights = weights;
@@ -183,10 +251,31 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
             color = vec3(0.0);
             t = next;
             next = until;
-            i = min(first, end - 1u);
+            if (!meets)
+                tail = first;
+            meets = true;
+            i = tail;
+            k = 0u;
+            alive = 0u;
             fresh = false;
         }
         going = !done && rounds < most;
+    }
+    counts[kept] = done ? KEPT_END : fresh ? KEPT_FRESH : KEPT_GOING;
+    if (!done) {
+        counts[kept + 1u] = (k < count ? met[k] : i) - begin;
+        counts[kept + 2u] = (!meets ? first : count > 0u ? met[0] : min(tail, i)) - begin;
+        keep_float(kept + 3u, t);
+        keep_float(kept + 4u, next);
+        keep_float(kept + 5u, before);
+        keep_float(kept + 6u, after);
+        keep_float(kept + 7u, was_after);
+        keep_float(kept + 8u, weights);
+        keep_float(kept + 9u, was_weights);
+        for (uint c = 0u; c < 3u; c++) {
+            keep_float(kept + 10u + c, color[c]);
+            keep_float(kept + 13u + c, was_color[c]);
+        }
     }
     return done;
 }
@@ -204,31 +293,49 @@ void main()
     ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) +
                ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
     has = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
-    if (!has)
+    uint kept = job.progress + 1u + SPL_SOFT_KEPT_WORDS * id;
+    if (!has || counts[kept] == KEPT_END)
         return;
-    uint index = sample_index(at), own = SPL_SOFT_STATE_WORDS * index, kept = job.progress + 1u + id;
+    uint index = sample_index(at), own = SPL_SOFT_STATE_WORDS * index, walked = SPL_SOFT_WALK_WORDS * index;
     uint solid = depth_word(index);
-    float until = min(solid == SPL_NOTHING ? frame.far : uintBitsToFloat(solid), min(frame.far, job.until));
+    float until = min(solid == SPL_NOTHING ? frame.far : uintBitsToFloat(solid), frame.far);
     soft_ray ray = load_soft_ray(at + tile_corner());
+    vec2 kept_walk = uintBitsToFloat(uvec2(walks[walked], walks[walked + 1u]));
+    uvec4 kept_state = uvec4(state[own], state[own + 1u], state[own + 2u], state[own + 3u]);
     walk w;
-    w.sums = uvec3(state[own], state[own + 1u], state[own + 2u]);
-    w.clear = SPL_SOFT_CLEAR - state[own + 3u];
-    w.depth = -log(max(float(w.clear), 0.5) / float(SPL_SOFT_CLEAR));
-    float reached = max(uintBitsToFloat(counts[kept]), frame.near);
-    uint left = 0u;
+    bool done = true;
     if (MODEL == SPL_SOFT_LAYER) {
-        if (w.clear == SPL_SOFT_CLEAR)
-            left = see_layer(w, ray, begin, end, until) ? 0u : SPL_SOFT_STUCK;
-    } else if (begin < end && reached < until && w.clear >= SPL_SOFT_CLEAR_LEAST) {
-        float started = reached;
-        if (!see_stretches(w, ray, begin, end, reached, until))
-            left = reached > started ? 1u : SPL_SOFT_STUCK;
-        counts[kept] = floatBitsToUint(reached);
+        layer l;
+        l.color = uintBitsToFloat(kept_state.xyz);
+        l.weights = kept_walk.y;
+        l.last = kept_walk.x > 0.0 ? kept_walk.x : until;
+        done = see_layer(l, ray, begin, end, kept);
+        kept_walk = vec2(l.last, l.weights);
+        kept_state.xyz = floatBitsToUint(l.color);
+        w.sums = uvec3(0u);
+        w.clear = SPL_SOFT_CLEAR;
+        w.depth = 0.0;
+        if (done && job.ends != 0u) {
+            if (l.weights > 0.0)
+                hide(w, job.depth, l.color / l.weights);
+            kept_state = uvec4(w.sums, SPL_SOFT_CLEAR - w.clear);
+        }
+    } else {
+        float reached = max(kept_walk.x, frame.near);
+        w.sums = kept_state.xyz;
+        w.clear = SPL_SOFT_CLEAR - kept_state.w;
+        w.depth = kept_walk.y;
+        if (begin < end && reached < until && w.clear >= SPL_SOFT_CLEAR_LEAST)
+            done = see_stretches(w, ray, begin, end, reached, until, kept);
+        kept_walk = vec2(reached, w.depth);
+        kept_state = uvec4(w.sums, SPL_SOFT_CLEAR - w.clear);
     }
-    if (left != 0u)
-        atomicOr(counts[job.progress], left);
-    state[own] = w.sums.x;
-    state[own + 1u] = w.sums.y;
-    state[own + 2u] = w.sums.z;
-    state[own + 3u] = SPL_SOFT_CLEAR - w.clear;
+    if (!done)
+        atomicOr(counts[job.progress], 1u);
+    walks[walked] = floatBitsToUint(kept_walk.x);
+    walks[walked + 1u] = floatBitsToUint(kept_walk.y);
+    state[own] = kept_state.x;
+    state[own + 1u] = kept_state.y;
+    state[own + 2u] = kept_state.z;
+    state[own + 3u] = kept_state.w;
 }

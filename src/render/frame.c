@@ -177,22 +177,33 @@ static void count_drawn(const struct spl_draw_list *list, struct spl_frame_stats
     stats->nodes_drawn += list->nodes;
 }
 
-/* Too much for a step; then the tile is known for its pieces. */
-static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
+/* The tile is known for its pieces. */
+static void know_whole(struct spl_frame_job *job, const struct spl_tile *tile, uint64_t work)
+{
+    if (job->whole.pixels)
+        return;
+    job->whole = (struct spl_frame_whole){.pixels = (uint64_t)tile->width * tile->height,
+                                          .work = work,
+                                          .weight_max = tile->params.weight_max,
+                                          .complete = job->renderer->list.complete};
+    count_drawn(&job->renderer->list, &job->frame->stats);
+}
+
+static uint64_t count_work(const struct spl_tile *tile)
 {
     uint32_t groups = 0;
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
         groups |= tile->view->layers >> layer & 1 ? 1u << group_of_layer[layer] : 0;
-    const uint64_t work = spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
+    return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
+}
+
+/* Too much for a step */
+static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
+{
+    const uint64_t work = count_work(tile);
     if (work <= job->renderer->work_a_step || !may_cut(job, tile, work))
         return false;
-    if (!job->whole.pixels) {
-        job->whole = (struct spl_frame_whole){.pixels = (uint64_t)tile->width * tile->height,
-                                              .work = work,
-                                              .weight_max = tile->params.weight_max,
-                                              .complete = job->renderer->list.complete};
-        count_drawn(&job->renderer->list, &job->frame->stats);
-    }
+    know_whole(job, tile, work);
     return true;
 }
 
@@ -330,6 +341,8 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
         rc = spl_frame_make_images(job->frame, job->view, err);
     if (!rc)
         rc = draw_tile(tile, err);
+    if (rc == SPL_FRAME_TOO_MUCH)
+        know_whole(job, tile, count_work(tile));
     if (rc)
         return rc;
     clock = spl_now_ns();

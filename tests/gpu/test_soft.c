@@ -214,8 +214,8 @@ static double off_by(const struct spl_frame *frame, const struct spl_view *view,
     return most;
 }
 
-/* Within a level of the reference in doubles, and refused where not all of it
- * fits at once, never drawn as something else. */
+/* Within a level of the reference in doubles; where not all of it fits at once, in windows of depth and in pieces, whose
+ * bytes are the same. */
 static void models_match_the_reference(void **state)
 {
     (void)state;
@@ -224,7 +224,6 @@ static void models_match_the_reference(void **state)
     struct spl_renderer_options options = {.size = sizeof options, .device = "egl"};
     struct spl_renderer *other = NULL;
     struct spl_view view = looking(origin, 3, 83, 61);
-    struct spl_error err = {0};
     struct spl_frame frame;
     size_t count;
     view.lod = 0;
@@ -244,10 +243,13 @@ static void models_match_the_reference(void **state)
             assert_true(worst_level(&frame, &second) <= 1);
             spl_frame_finish(&second);
         }
+        for (size_t i = 0; i < 2; i++) {
+            spl_renderer_set_soft_items(renderer, i ? 40 : 250);
+            struct spl_frame cut = draw(renderer, dataset, &view);
+            assert_same(&frame, &cut, spl_soft_model_name(models[m]));
+            spl_frame_finish(&cut);
+        }
         spl_frame_finish(&frame);
-        spl_renderer_set_soft_items(renderer, 64);
-        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, &err), SPL_E_LIMIT);
-        assert_string_equal(err.field, "soft_model");
         spl_renderer_set_soft_items(renderer, 0);
     }
     free(spheres);
@@ -255,6 +257,31 @@ static void models_match_the_reference(void **state)
         spl_renderer_remove(other, dataset);
         spl_renderer_destroy(other);
     }
+    done(dataset);
+}
+
+/* Tiles are cut until what overlaps in one fits; where a pixel has more, that is said. */
+static void crowds_are_cut_or_told(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(600, origin, 0.4);
+    struct spl_view view = looking(origin, 3, 40, 30);
+    struct spl_error err = {0};
+    struct spl_frame whole, cut;
+    view.lod = 0;
+    view.layers = 1u << SPL_LAYER_COLOR;
+    soften(&view, 1, -100, 0.02);
+    view.soft.model = SPL_SOFT_MODEL_BASE;
+    whole = draw(renderer, dataset, &view);
+    spl_renderer_set_soft_items(renderer, 300);
+    cut = draw(renderer, dataset, &view);
+    assert_same(&whole, &cut, "cut");
+    spl_frame_finish(&whole);
+    spl_frame_finish(&cut);
+    spl_renderer_set_soft_items(renderer, 8);
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &cut, &err), SPL_E_LIMIT);
+    assert_string_equal(err.field, "soft_model");
+    spl_renderer_set_soft_items(renderer, 0);
     done(dataset);
 }
 
@@ -344,7 +371,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
         frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
-        frames_test(loss_is_told),
+        frames_test(loss_is_told), frames_test(crowds_are_cut_or_told),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }

@@ -36,6 +36,7 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     bytes[SPL_SOFT_LISTS] = 3 * word * sizes->tiles;
     bytes[SPL_SOFT_STEPS_OF] = (uint64_t)SPL_SOFT_STEP_STRIDE * SPL_SOFT_STEPS;
     bytes[SPL_SOFT_STATE] = SPL_SOFT_STATE_WORDS * word * sizes->samples;
+    bytes[SPL_SOFT_WALKS] = sizes->walks ? SPL_SOFT_WALK_WORDS * word * sizes->samples : word;
 }
 
 uint64_t spl_soft_memory_bytes(const struct spl_soft_sizes *sizes, bool software)

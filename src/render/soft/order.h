@@ -24,6 +24,7 @@ struct spl_soft_sizes {
     uint32_t tiles;
     uint32_t slots;   /* that gather */
     uint64_t samples;
+    bool walks;       /* for models but express, too */
 };
 
 enum spl_soft_buffer {
@@ -39,6 +40,7 @@ enum spl_soft_buffer {
     SPL_SOFT_LISTS,   /* tiles to blend, from the host */
     SPL_SOFT_STEPS_OF,/* struct spl_soft_step[], from the host */
     SPL_SOFT_STATE,
+    SPL_SOFT_WALKS,   /* of models but express */
     SPL_SOFT_BUFFERS
 };
 
@@ -97,10 +99,13 @@ struct spl_soft_blend {
     enum spl_soft_model model;
     double opacity; /* at a sphere's centre, 0 to 1 */
     bool border;    /* some items are partly solid */
-    bool first;     /* nothing of this tile was blended before: the state is zero; of models but express always */
-    float reach;    /* of models but express: the largest radius */
+    bool first;     /* nothing of this tile was blended before: the state is zero */
+    /* Of models but express, whose walks are zero before the first window: */
+    float reach;    /* the largest radius */
+    float until;    /* what begins before this view depth is listed, of what is beyond `from` of plan.h */
+    bool ends;      /* there is no window behind this one */
 };
-/* Blends what was listed. SPL_E_LIMIT: more lie behind one another than a model but express may walk through. */
+/* Blends what was listed. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
 
 /* order.c for walk.c: a dispatch of one of its kernels. */

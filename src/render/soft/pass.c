@@ -1,6 +1,6 @@
 /* The soft stage of a tile; see pass.h. Memory for it is taken at its first use, at most an eighth of what the device may
- * give: more spheres than fit are drawn a window of depth after the other, which changes no byte. The host waits for
- * counts and for the lengths of lists; in between it asks whether anybody still waits for the frame. */
+ * give: more spheres than fit are drawn a window of depth after the other, which changes no byte; of models that cut
+ * spheres, windows overlap. Where too many overlap even so, the tile is to be cut. The host waits for counts and for the lengths of lists; in between it asks whether anybody still waits for the frame. */
 #include "render/soft/pass.h"
 
 #include <inttypes.h>
@@ -9,14 +9,16 @@
 
 #include "base/memory.h"
 #include "base/work.h"
+#include "render/frame.h"
 #include "render/method.h"
-#include "render/soft/plan.h"
+#include "render/soft/thick.h"
 
 enum {
     items_at_least = 1 << 14,
     entries_of_item = 4, // room for lists
     entries_of_window = 1 << 24,
     memory_share = 8,
+    least_share = 8,     // of the largest radius is how thin windows may be where tiles can be cut instead
     gather_work = 8      // of a splat, in samples that are looked at
 };
 
@@ -73,7 +75,7 @@ static void choose_items(struct spl_soft_sizes *sizes, uint64_t wanted, uint64_t
     }
 }
 
-/* Models that need all in one window get longer lists where there is room: near spheres are in many tiles. */
+/* Models whose windows overlap get longer lists where there is room: near spheres are in many tiles. */
 static void choose_entries(struct spl_soft_sizes *sizes, uint64_t bytes, uint64_t binding, bool software)
 {
     while (sizes->entries < entries_of_window) {
@@ -104,6 +106,7 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
                                                        ((camera->height + rows - 1) / rows)),
                                    .samples = (uint64_t)camera->width * camera->height};
     sizes.tiles = larger(sizes.tiles, have->tiles);
+    sizes.walks = model != SPL_SOFT_MODEL_EXPRESS || have->walks;
     sizes.samples = sizes.samples > have->samples ? sizes.samples : have->samples;
     uint64_t own = scratch->soft_bytes, kept = scratch->taken_bytes - own;
     kept += spl_residency_get_reserve(&renderer->residency);
@@ -121,7 +124,8 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
     const bool exact = renderer->soft_items_most > 0;
     const bool enough = exact ? sizes.items == have->items && sizes.entries == have->entries
                               : sizes.items <= have->items && sizes.entries <= have->entries;
-    if (enough && sizes.slots == have->slots && sizes.tiles == have->tiles && sizes.samples == have->samples)
+    if (enough && sizes.slots == have->slots && sizes.tiles == have->tiles && sizes.samples == have->samples &&
+        sizes.walks == have->walks)
         return SPL_OK;
     const uint64_t bytes = spl_soft_memory_bytes(&sizes, software);
     if (bytes > left)
@@ -258,8 +262,8 @@ static int measure(void *context, const struct spl_soft_range *range, uint32_t s
     return rc;
 }
 
-/* Draws a window that was counted. */
-static int draw(struct pass *pass, const struct spl_soft_range *window, const struct counted *sum,
+/* Draws a window that was counted; models but express what of it lies before `until`. */
+static int draw(struct pass *pass, const struct spl_soft_range *window, const struct counted *sum, float until,
                 struct spl_error *err)
 {
     const struct spl_soft_params *soft = &pass->tile->view->soft;
@@ -272,11 +276,24 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
     rc = rc ? rc : spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
                                                                          .opacity = soft->opacity,
                                                                          .reach = sum->reach,
+                                                                         .until = until,
                                                                          .border = soft->blend > 0,
                                                                          .first = !pass->begun}, err);
     pass->begun = true;
-    pass->tile->soft_drawn += items;
     return rc;
+}
+
+/* Layer shows what it saw once it has seen all. */
+static int end(struct pass *pass, struct spl_error *err)
+{
+    const struct spl_soft_params *soft = &pass->tile->view->soft;
+    if (soft->model != SPL_SOFT_MODEL_LAYER)
+        return SPL_OK;
+    pass->order.entries = 0;
+    return spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
+                                                                 .opacity = soft->opacity,
+                                                                 .until = SPL_SOFT_NO_END,
+                                                                 .ends = true}, err);
 }
 
 /* A window after the other. */
@@ -295,20 +312,52 @@ static int draw_windows(struct pass *pass, const struct spl_soft_range *all, str
     while (!rc && (rc = spl_soft_plan_next(pass->plan, &window, &planned, err)) == 1) {
         struct counted sum;
         rc = count(pass, &window, &sum, err);
-        rc = rc ? rc : draw(pass, &window, &sum, err);
+        rc = rc ? rc : draw(pass, &window, &sum, SPL_SOFT_NO_END, err);
     }
     free(pass->plan);
     return rc;
 }
 
-/* What has a thickness reaches from a window into the next. */
-static int refuse_windows(const struct spl_tile *tile, const struct counted *sum, struct spl_error *err)
+static int refuse(const struct pass *pass, float depth, float reach, struct spl_error *err)
 {
+    const struct spl_soft_sizes *sizes = &pass->order.memory->sizes;
     return spl_fail_field(err, SPL_E_LIMIT, "soft_model",
-                          "soft_model %s has to hold all soft spheres at once, %" PRIu64 " in %" PRIu64
-                          " places of the image, which is more than fits in an eighth of memory-limit; use soft_model "
-                          "express, raise lod, or raise memory-limit",
-                          spl_soft_model_name(tile->view->soft.model), sum->items, sum->entries);
+                          "soft_model %s has to hold all soft spheres that overlap one another: behind one pixel, at depth "
+                          "%g and up to %g around it, there are more than %" PRIu32 ", which is what fits in an eighth "
+                          "of memory-limit; use soft_model express, raise lod, or raise memory-limit",
+                          spl_soft_model_name(pass->tile->view->soft.model), (double)depth, (double)reach, sizes->items);
+}
+
+/* Windows that overlap, since a sphere reaches from one into the next. Tiles that can be cut are, before windows become
+ * much thinner than what they hold. */
+static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float reach, struct spl_error *err)
+{
+    const struct spl_soft_sizes *sizes = &pass->order.memory->sizes;
+    const bool can_cut = (uint64_t)pass->tile->width * pass->tile->height > 1;
+    struct spl_soft_thick *plan = spl_alloc(1, sizeof *plan, err);
+    struct spl_soft_window window;
+    int rc = SPL_OK, more = 1;
+    if (!plan)
+        return SPL_E_NOMEM;
+    plan->room = (struct spl_soft_sum){sizes->items, sizes->entries};
+    plan->all = *all;
+    plan->reach = reach;
+    plan->least = can_cut ? reach / least_share : 0;
+    plan->measure = measure;
+    plan->context = pass;
+    while (!rc && (more = spl_soft_thick_next(plan, &window, err)) == 1) {
+        struct counted sum;
+        rc = count(pass, &window.held, &sum, err);
+        rc = rc ? rc : draw(pass, &window.held, &sum, window.until, err);
+    }
+    if (!rc && more == SPL_SOFT_TOO_THICK && !can_cut)
+        rc = refuse(pass, plan->from, reach, err);
+    else if (!rc && more == SPL_SOFT_TOO_THICK)
+        rc = SPL_FRAME_TOO_MUCH;
+    else if (!rc)
+        rc = more;
+    free(plan);
+    return rc;
 }
 
 /* Drops chunks that the solid hides. Where its memory is taken, as of methods that keep ids, all are drawn. */
@@ -327,6 +376,7 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     const struct spl_draw_list *list = &r->list;
     const uint32_t columns = SPL_SOFT_TILE, rows = SPL_SOFT_TILE_ROWS;
     const size_t last = list->first_mark_chunk - 1;
+    const enum spl_soft_model model = tile->view->soft.model;
     const bool wide = !spl_method_row(tile->view->method)->sums && spl_gpu_get_limits(r->gpu)->atomics_64;
     struct pass pass = {.tile = tile,
                         .order = {.gpu = r->gpu,
@@ -348,15 +398,20 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     pass.order.context = &pass;
     spl_gpu_fill(r->gpu, pass.order.memory->buffers[SPL_SOFT_STATE], 0,
                  tile->samples * SPL_SOFT_STATE_WORDS * sizeof(uint32_t), 0);
+    if (model != SPL_SOFT_MODEL_EXPRESS)
+        spl_gpu_fill(r->gpu, pass.order.memory->buffers[SPL_SOFT_WALKS], 0,
+                     tile->samples * SPL_SOFT_WALK_WORDS * sizeof(uint32_t), 0);
     int rc = spl_tile_put_params(tile, &tile->params, &pass.order.frame, err);
     rc = rc ? rc : occlude(tile, wide, err);
     rc = rc ? rc : count(&pass, &all, &sum, err);
     if (!rc && sum.items <= sizes->items && sum.entries <= sizes->entries)
-        rc = draw(&pass, &all, &sum, err);
-    else if (!rc && tile->view->soft.model != SPL_SOFT_MODEL_EXPRESS)
-        rc = refuse_windows(tile, &sum, err);
+        rc = draw(&pass, &all, &sum, SPL_SOFT_NO_END, err);
+    else if (!rc && (model == SPL_SOFT_MODEL_BASE || model == SPL_SOFT_MODEL_CONCENTRIC))
+        rc = draw_thick(&pass, &all, sum.reach, err);
     else if (!rc)
         rc = draw_windows(&pass, &all, err);
+    rc = rc ? rc : end(&pass, err);
+    tile->soft_drawn += rc ? 0 : sum.items;
     spl_tile_stamp(tile, SPL_STAGE_SOFT);
     return rc;
 }

@@ -15,7 +15,9 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
 /* Is there anything soft to draw? */
 bool spl_soft_is_drawn(const struct spl_tile *tile);
 
-/* Records and runs it, once the solid depth of the colours is there. */
+/* Records and runs it, once the solid depth of the colours is there. SPL_FRAME_TOO_MUCH: the tile has more than
+ * a pixel, and more spheres overlap in it than are held at once; its pieces are to be drawn instead. SPL_E_LIMIT, field
+ * soft_model, where a pixel has so many. */
 int spl_soft_record(struct spl_tile *tile, struct spl_error *err);
 
 #endif

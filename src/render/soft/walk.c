@@ -1,7 +1,7 @@
 /* Recording of models base, concentric and layer; see order.h and shaders/soft_base.comp. An invocation walks the whole
- * list of its tile, again and again; one that takes more rounds than a kernel may goes on in the next run. Tiles are laid
- * out in groups, a dispatch each, with a word that says whether any was left and a depth that each invocation reached.
- * A run is bounded however long lists are, and between runs the host asks whether anybody still waits. */
+ * list of its tile, again and again; one that takes more rounds than a kernel may goes on in the next run, where it was.
+ * Tiles are laid out in groups, a dispatch each, with a word that says whether any was left and what each invocation
+ * keeps. A run is bounded however long lists are, and between runs the host asks whether anybody still waits. */
 #include "render/soft/order.h"
 
 #include "render/soft/models.h"
@@ -9,6 +9,7 @@
 enum {
     samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS,
     tile_words = 3,
+    kept_words = samples * SPL_SOFT_KEPT_WORDS,
     groups_max = 256,      // of a batch
     group_work = 1 << 25,  // samples that are looked at in a dispatch
     round_work = 4         // of a round, in such samples
@@ -29,8 +30,14 @@ struct batch {
 /* A walk is an event, of which every sphere has two. */
 static uint64_t work_of(const struct spl_soft_blend *blend, uint64_t length)
 {
-    uint64_t rounds = blend->model == SPL_SOFT_MODEL_LAYER ? length : 2 * (length + 1) * length;
+    uint64_t rounds = blend->model == SPL_SOFT_MODEL_LAYER ? length + 1 : 2 * (length + 1) * length;
     return (rounds < SPL_SOFT_ROUNDS ? rounds : SPL_SOFT_ROUNDS) * samples * round_work;
+}
+
+/* The last of layer: what was seen of tiles that have nothing more is shown, too. */
+static bool shows_all(const struct spl_soft_blend *blend)
+{
+    return blend->model == SPL_SOFT_MODEL_LAYER && blend->ends;
 }
 
 /* Lists tiles from `tile` on; returns the first that did not fit. */
@@ -45,11 +52,12 @@ static uint32_t lay_out(const struct spl_soft_order *order, const struct spl_sof
     struct group *group = NULL;
     batch->count = batch->words = 0;
     for (; tile < tiles; tile++) {
-        const uint32_t end = tile + 1 < tiles ? starts[tile + 1] : order->entries;
-        const uint64_t work = work_of(blend, end - starts[tile]);
-        if (end == starts[tile])
+        const uint32_t first = order->entries ? starts[tile] : 0;
+        const uint32_t end = order->entries && tile + 1 < tiles ? starts[tile + 1] : order->entries;
+        const uint64_t work = work_of(blend, end - first);
+        if (end == first && !shows_all(blend))
             continue;
-        if (batch->words + 1 + samples > memory->counters)
+        if (batch->words + 1 + kept_words > memory->counters)
             break;
         if (!group || group->work + work > group_work || group->count == most) {
             if (batch->count == groups_max)
@@ -58,12 +66,12 @@ static uint32_t lay_out(const struct spl_soft_order *order, const struct spl_sof
             *group = (struct group){.first = listed, .progress = batch->words++};
         }
         lists[tile_words * listed] = tile % order->columns | tile / order->columns << 16;
-        lists[tile_words * listed + 1] = starts[tile];
+        lists[tile_words * listed + 1] = first;
         lists[tile_words * listed + 2] = end;
         listed++;
         group->count++;
         group->work += work;
-        batch->words += samples;
+        batch->words += kept_words;
     }
     return tile;
 }
@@ -82,7 +90,8 @@ static int dispatch(struct spl_soft_order *order, const struct spl_soft_blend *b
                  .progress = group->progress,
                  .depth = (float)spl_soft_depth(blend->opacity),
                  .reach = blend->reach,
-                 .until = 1e9f},
+                 .until = blend->until,
+                 .ends = blend->ends},
         .from = lists,
         .to = order->sorted,
         .totals = SPL_SOFT_TOTALS,
@@ -110,14 +119,8 @@ static int run(struct spl_soft_order *order, const struct spl_soft_blend *blend,
     if (rc)
         return rc;
     const uint32_t *left = spl_gpu_buffer_map(buffers[SPL_SOFT_TOTALS]);
-    for (uint32_t i = 0; i < batch->count; i++) {
-        if (left[i] & SPL_SOFT_STUCK)
-            return spl_fail_field(err, SPL_E_LIMIT, "soft_model",
-                                  "more soft spheres lie behind one another than soft_model %s can walk through; use "
-                                  "soft_model express, or raise lod",
-                                  spl_soft_model_name(blend->model));
+    for (uint32_t i = 0; i < batch->count; i++)
         batch->groups[i].done = !left[i];
-    }
     return SPL_OK;
 }
 
@@ -127,7 +130,7 @@ int spl_soft_walk(struct spl_soft_order *order, const struct spl_soft_blend *ble
     struct spl_gpu_buffer *counts = order->memory->buffers[SPL_SOFT_COUNTS];
     struct batch batch;
     int rc = SPL_OK;
-    for (uint32_t tile = 0; tile < tiles && order->entries && !rc;) {
+    for (uint32_t tile = 0; tile < tiles && (order->entries || shows_all(blend)) && !rc;) {
         tile = lay_out(order, blend, tile, &batch);
         if (!batch.count)
             break;
