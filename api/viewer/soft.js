@@ -52,7 +52,8 @@ export class Soft extends EventTarget {
       control.id = label.htmlFor = `control-${parameter.name}`;
       help.id = `${control.id}-help`;
       control.setAttribute("aria-describedby", help.id);
-      label.textContent = parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
+      const name = parameter.name === "of" ? "picks and layers of" : parameter.name.replace("soft_", "");
+      label.textContent = name.replace(/^./, (c) => c.toUpperCase());
       help.textContent = parameter.description;
       $("soft-more").append(label, control, help);
     }
