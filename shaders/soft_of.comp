@@ -3,7 +3,8 @@
  * with a density are near to (SPL_SOFT_FIND_FIRST); the one with which less than half passes in express
  * (SPL_SOFT_FIND_MEDIAN); or with which what is hidden is more than job.low in base, concentric or layer
  * (SPL_SOFT_FIND_DENSE + SPL_SOFT_BASE and so on), where what a sphere hides is counted as the ray comes by its centre, up to the solid. Constant 1: some items are partly solid (eq. 22). Spheres whose centres lie behind the solid
- * are none. What was hidden so far is kept, so that lists may be walked in parts and in windows of depth. */
+ * are none. What was hidden so far is kept, so that lists may be walked in parts and in windows of depth; what is nearer than
+ * key job.high is left out, for windows that overlap. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"
@@ -127,7 +128,7 @@ void main()
         precise float soft = (float(imageLoad(item_texels, item_at + 4).x >> 24) - 1.0) * (1.0 / 254.0);
         item.q = q;
         item.soft = soft;
-        seen = key <= solid && find(item, ray, until, hidden);
+        seen = key >= job.high && key <= solid && find(item, ray, until, hidden);
         if (seen || key > solid || ++i >= end)
             break;
     }

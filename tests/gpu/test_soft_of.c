@@ -86,8 +86,8 @@ static void make_scene(struct scene *s, uint32_t count, double largest)
     }
 }
 
-/* All items for every tile; those before `cut` first, then the others. */
-static void draw(const struct scene *s, const struct spl_soft_params *soft, uint32_t cut)
+/* All items for every tile; those before `cut` first, then from `again` on the others, with those nearer left out. */
+static void draw(const struct scene *s, const struct spl_soft_params *soft, uint32_t cut, uint32_t again)
 {
     static const uint32_t dense[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE, [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
                                      [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
@@ -113,7 +113,6 @@ static void draw(const struct scene *s, const struct spl_soft_params *soft, uint
         entries[i] = at;
     }
     memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_FRAME]), &s->params, sizeof s->params);
-    memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_STEP]), &step, sizeof step);
     memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_DEPTH]), s->solid, sizeof s->solid);
     struct spl_gpu_kernel *kernel;
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {{0}};
@@ -122,7 +121,7 @@ static void draw(const struct scene *s, const struct spl_soft_params *soft, uint
     const uint32_t constants[] = {find, soft->blend > 0};
     assert_int_equal(spl_gpu_kernel_create(gpu, "soft_of", constants, 2, &kernel, NULL), 0);
     for (int window = 0; window < 2; window++) {
-        const uint32_t first = window ? cut : 0, end = window ? s->count : cut;
+        const uint32_t first = window ? again : 0, end = window ? s->count : cut;
         uint64_t ticket;
         struct spl_error err = {0};
         for (uint32_t t = 0; t < tiles; t++) {
@@ -130,6 +129,9 @@ static void draw(const struct scene *s, const struct spl_soft_params *soft, uint
             lists[3 * t + 1] = first;
             lists[3 * t + 2] = end;
         }
+        if (window && again < cut)
+            memcpy(&step.high, &s->items[cut].z, 4);
+        memcpy(spl_gpu_buffer_map(buffers[SPL_RESOURCE_STEP]), &step, sizeof step);
         assert_int_equal(spl_gpu_begin(gpu, NULL), 0);
         if (!window)
             spl_gpu_fill(gpu, buffers[SPL_RESOURCE_FOUND], 0, 16 * width * height, SPL_NOTHING);
@@ -145,11 +147,11 @@ static void draw(const struct scene *s, const struct spl_soft_params *soft, uint
 }
 
 /* How many samples found a sphere; fails where they are not those of plain C. */
-static uint32_t matches(const struct scene *s, const struct spl_soft_params *soft, uint32_t cut)
+static uint32_t matches(const struct scene *s, const struct spl_soft_params *soft, uint32_t cut, uint32_t again)
 {
     const uint32_t *got = spl_gpu_buffer_map(down);
     uint32_t found = 0, doubtful = 0;
-    draw(s, soft, cut);
+    draw(s, soft, cut, again);
     for (int i = 0; i < width * height; i++, got += SPL_SOFT_FOUND_WORDS) {
         double doubt;
         uint32_t is = soft_find(&s->params, s->items, s->count, i % width, i / width, s->solid[i], soft, &doubt), key;
@@ -182,13 +184,14 @@ static void kernels_match(void **state)
                 struct spl_soft_params soft = {.model = (enum spl_soft_model)model, .of = (enum spl_soft_of)of,
                                                .opacity = opacities[i], .blend = i % 2};
                 make_scene(&s, 300, i == 2 ? 2 : 0.5);
-                uint32_t found = matches(&s, &soft, 0);
-                assert_int_equal(matches(&s, &soft, 150), found);
+                uint32_t found = matches(&s, &soft, 0, 0);
+                assert_int_equal(matches(&s, &soft, 150, 150), found);
+                assert_int_equal(matches(&s, &soft, 152, 90), found); /* items 151 and 152 differ in depth */
                 bool none = of == SPL_SOFT_OF_MEDIAN ? model == SPL_SOFT_MODEL_LAYER ? opacities[i] <= 0.5 : i == 0 : i == 0;
                 assert_true(none ? found == 0 : found > 20);
             }
     make_scene(&s, 0, 1);
-    assert_int_equal(matches(&s, &(struct spl_soft_params){.of = SPL_SOFT_OF_FIRST, .opacity = 1}, 0), 0);
+    assert_int_equal(matches(&s, &(struct spl_soft_params){.of = SPL_SOFT_OF_FIRST, .opacity = 1}, 0, 0), 0);
     close_all();
 }
 

@@ -31,21 +31,29 @@ static uint32_t kernel_of(const struct spl_soft_params *soft)
     return soft->model == SPL_SOFT_MODEL_EXPRESS ? SPL_SOFT_FIND_MEDIAN : SPL_SOFT_FIND_DENSE + dense[soft->model];
 }
 
+/* What is looked for, and the depth that it is looked for from. */
+struct look {
+    const struct spl_soft_params *soft;
+    uint32_t from, kernel;
+};
+
 /* Tiles [first, end) of the lists. */
-static int dispatch(struct spl_soft_order *order, const struct spl_soft_params *soft, uint32_t first, uint32_t end,
+static int dispatch(struct spl_soft_order *order, const struct look *look, uint32_t first, uint32_t end,
                     struct spl_error *err)
 {
+    const struct spl_soft_params *soft = look->soft;
     const float scale = 65536;
     float fall[SPL_SOFT_FALLOFF];
     spl_soft_falloff(soft->opacity, fall);
     return spl_soft_dispatch(
         order,
         &(struct spl_soft_dispatch){
-            .key = {"soft_of", order->wide, {kernel_of(soft), soft->blend > 0}},
+            .key = {"soft_of", order->wide, {look->kernel, soft->blend > 0}},
             .step = {.count = end - first,
                      .first = tile_words * first,
                      .details = order->memory->sizes.items * (SPL_SOFT_ITEM_WORDS + 1),
                      .low = soft->of == SPL_SOFT_OF_FIRST ? SPL_SOFT_DEPTH_SEEN : SPL_SOFT_DEPTH_HALF,
+                     .high = look->from,
                      .depth = (float)spl_soft_depth(soft->opacity),
                      .fall_0 = fall[0] * scale,
                      .fall_1 = fall[1] * scale,
@@ -60,10 +68,11 @@ static int dispatch(struct spl_soft_order *order, const struct spl_soft_params *
 }
 
 /* Walks `rounds` of each list from `skipped` on; *left: some are longer. */
-static int walk(struct spl_soft_order *order, const struct spl_soft_params *soft, uint64_t skipped, uint32_t rounds,
-                bool *left, struct spl_error *err)
+static int walk(struct spl_soft_order *order, const struct look *look, uint64_t skipped, uint32_t rounds, bool *left,
+                struct spl_error *err)
 {
-    const uint32_t tiles = order->columns * order->rows, work_of_item = kernel_of(soft) < SPL_SOFT_FIND_DENSE ? 1 : dense_work;
+    const uint32_t tiles = order->columns * order->rows;
+    const uint32_t work_of_item = look->kernel < SPL_SOFT_FIND_DENSE ? 1 : dense_work;
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups / (samples / SPL_WORKGROUP);
     const uint32_t *starts = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_STARTS]);
     uint32_t *lists = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_LISTS]), listed = 0, begun = 0;
@@ -85,7 +94,7 @@ static int walk(struct spl_soft_order *order, const struct spl_soft_params *soft
         if (listed == begun || (tile + 1 < tiles && work < find_work && listed - begun < most))
             continue;
         rc = spl_soft_add_work(order, work, err);
-        rc = rc ? rc : dispatch(order, soft, begun, listed, err);
+        rc = rc ? rc : dispatch(order, look, begun, listed, err);
         begun = listed;
         work = 0;
     }
@@ -93,15 +102,17 @@ static int walk(struct spl_soft_order *order, const struct spl_soft_params *soft
     return rc;
 }
 
-int spl_soft_find(struct spl_soft_order *order, const struct spl_soft_params *soft, struct spl_error *err)
+int spl_soft_find(struct spl_soft_order *order, const struct spl_soft_params *soft, uint32_t from,
+                  struct spl_error *err)
 {
-    const bool shells = kernel_of(soft) == SPL_SOFT_FIND_DENSE + SPL_SOFT_CONCENTRIC;
+    const struct look look = {soft, from, kernel_of(soft)};
+    const bool shells = look.kernel == SPL_SOFT_FIND_DENSE + SPL_SOFT_CONCENTRIC;
     const uint32_t rounds = SPL_SOFT_ROUNDS / (shells ? SPL_SOFT_FIND_SHELLS : 1);
     bool left = order->entries > 0;
     int rc = SPL_OK;
     for (uint64_t skipped = 0; left && !rc; skipped += rounds) {
         rc = spl_soft_run(order, err); /* what was recorded reads the lists that lie there */
-        rc = rc ? rc : walk(order, soft, skipped, rounds, &left, err);
+        rc = rc ? rc : walk(order, &look, skipped, rounds, &left, err);
     }
     return rc;
 }

@@ -27,6 +27,7 @@ struct pass {
     uint32_t slots;
     struct spl_soft_plan *plan; // NULL until spheres are more than fit
     bool blends, finds;
+    uint32_t found_to;          // depth up to which spheres were looked for
     bool begun;                 // something was blended
 };
 
@@ -191,8 +192,8 @@ static int gather(struct pass *pass, enum phase phase, const struct spl_soft_ste
                                           .lanes = kinds[i].lanes,
                                           .role = SPL_ROLE_SOFT,
                                           .with = with};
-        rc = spl_tile_get_plain_kernels(pass->tile, (struct spl_kernel_key){kinds[i].name, false, {phase, details}}, &what,
-                                        &kernels, err);
+        const struct spl_kernel_key key = {kinds[i].name, false, {phase, details}};
+        rc = spl_tile_get_plain_kernels(pass->tile, key, &what, &kernels, err);
         rc = rc ? rc : spl_tile_dispatch_splats(pass->tile, &kernels, &what, err);
     }
     spl_gpu_barrier(order->gpu);
@@ -283,7 +284,8 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
                                                                    .border = soft->blend > 0,
                                                                    .first = !pass->begun}, err);
     if (!rc && pass->finds)
-        rc = spl_soft_find(&pass->order, soft, err);
+        rc = spl_soft_find(&pass->order, soft, pass->found_to, err);
+    pass->found_to = (uint32_t)(window->end >> 32);
     pass->begun = true;
     pass->tile->soft_drawn += items;
     return rc;
