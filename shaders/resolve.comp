@@ -7,7 +7,8 @@
  *   id        that of the nearest sample, the least among equals
  *   primitive the same; 0 = none
  *   coverage  float, share of the samples that hold something
- * With constant 2 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both. */
+ * With constant 2 = 1 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both; = 2: the other
+ * layers are of the sphere that was found on a sample, where there is one. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -21,6 +22,15 @@ layout(constant_id = 2) const uint SOFT = 0;
 layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_SOFT) soft_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_FOUND) found_texels;
+
+const bool OVER = SOFT == 1u, FOUND = SOFT == 2u;
+
+/* Of the sphere that was found on sample `at`, a word of SPL_SOFT_FOUND_WORDS. */
+uint found_word(uint at, int word)
+{
+    return imageLoad(found_texels, int(SPL_SOFT_FOUND_WORDS * at) + word).x;
+}
 
 /* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. */
 vec4 soft_over(uint at)
@@ -96,9 +106,25 @@ ivec2 pixel_place(ivec2 corner, uint i)
     return corner + ivec2(i & (frame.supersample - 1u), i >> findMSB(frame.supersample));
 }
 
-uint pixel_sample(ivec2 corner, uint i)
+struct pixel_sample {
+    uint at, bits; /* whose, and its depth word */
+    bool found;    /* a soft sphere, and `at` is the sample's own */
+};
+
+pixel_sample load_sample(ivec2 corner, uint i)
 {
-    return standing_for(pixel_place(corner, i));
+    pixel_sample s;
+    uint own = sample_index(pixel_place(corner, i)), z = FOUND ? found_word(own, 0) : SPL_NOTHING;
+    s.found = z != SPL_NOTHING;
+    s.at = s.found ? own : standing_for(pixel_place(corner, i));
+    s.bits = s.found ? z : depth_word(s.at);
+    return s;
+}
+
+/* Its id, or as what it is drawn. */
+uint sample_id(pixel_sample s)
+{
+    return s.found ? found_word(s.at, LAYER == SPL_RESOLVE_ID ? 1 : 3) : payload(s.at);
 }
 
 void main()
@@ -114,24 +140,25 @@ void main()
     vec4 mixed = vec4(0.0); /* with soft spheres: colour times share, share */
     vec3 normal = vec3(0.0);
     for (uint i = 0u;;) { /* the end is asked for at the end: see splat_depth.comp */
-        uint at = pixel_sample(corner, i), bits = depth_word(at);
+        pixel_sample s = load_sample(corner, i);
+        uint at = s.at, bits = s.bits;
         vec4 soft = vec4(0.0);
-        if (SOFT != 0u)
+        if (OVER)
             soft = soft_over(sample_index(pixel_place(corner, i)));
         mixed += soft;
         if (bits != SPL_NOTHING) {
-            if (SOFT != 0u && LAYER == SPL_RESOLVE_COLOR) {
+            if (OVER && LAYER == SPL_RESOLVE_COLOR) {
                 uvec3 own = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
                 mixed.rgb += (1.0 - soft.a) * vec3(own);
             }
             mixed.a += 1.0 - soft.a;
             covered++;
-            if (SOFT == 0u && LAYER == SPL_RESOLVE_COLOR)
+            if (!OVER && LAYER == SPL_RESOLVE_COLOR)
                 color += RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
             if (LAYER == SPL_RESOLVE_NORMAL)
-                normal += sample_normal(at);
+                normal += s.found ? unpack_normal(found_word(at, 2)) : sample_normal(at);
             if ((LAYER == SPL_RESOLVE_ID || LAYER == SPL_RESOLVE_PRIMITIVE) && bits <= nearest)
-                id = bits == nearest ? min(id, payload(at)) : payload(at);
+                id = bits == nearest ? min(id, sample_id(s)) : sample_id(s);
             nearest = min(nearest, bits);
         }
         if (++i >= side * side)
@@ -139,7 +166,7 @@ void main()
     }
 
     uint value = SPL_NOTHING;
-    if (SOFT != 0u && LAYER == SPL_RESOLVE_COLOR) {
+    if (OVER && LAYER == SPL_RESOLVE_COLOR) {
         float total = float(side * side), back = float(frame.background >> 24) * (1.0 / 255.0) * (total - mixed.a);
         float weight = mixed.a + back;
         vec3 sum = mixed.rgb + back * vec3((uvec3(frame.background) >> uvec3(0u, 8u, 16u)) & 255u);
@@ -155,9 +182,9 @@ void main()
         float sum = 0.0, count = 0.0;
         float limit = uintBitsToFloat(nearest) * 1.01;
         for (uint i = 0u;;) {
-            uint at = pixel_sample(corner, i), bits = depth_word(at);
-            if (bits != SPL_NOTHING && uintBitsToFloat(bits) <= limit) {
-                sum += sample_depth(at);
+            pixel_sample s = load_sample(corner, i);
+            if (s.bits != SPL_NOTHING && uintBitsToFloat(s.bits) <= limit) {
+                sum += s.found ? uintBitsToFloat(s.bits) : sample_depth(s.at);
                 count += 1.0;
             }
             if (++i >= side * side)
@@ -186,7 +213,7 @@ void main()
     } else if (LAYER == SPL_RESOLVE_PRIMITIVE) {
         value = covered != 0u ? id : 0u;
     } else {
-        value = floatBitsToUint((SOFT != 0u ? mixed.a : float(covered)) / float(side * side));
+        value = floatBitsToUint((OVER ? mixed.a : float(covered)) / float(side * side));
     }
     pixels[frame.output_word + pixel] = value;
 }

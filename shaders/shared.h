@@ -387,12 +387,26 @@ struct spl_frame_params {
 #define SPL_SOFT_SLACK 1e-6f
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
 
+/* What of soft spheres is found on a sample for layers but color and coverage (soft_of.comp; constant 0). Of models with
+ * a density optical depth is counted in units of 2^-SPL_SOFT_DEPTH_BITS. */
+#define SPL_SOFT_FOUND_WORDS 4  /* a sample: view depth (SPL_NOTHING: no sphere), id, normal, what as (SPL_DRAWN_*); while
+                                 * there is no sphere, the last is what was hidden so far, inverted */
+#define SPL_SOFT_DETAIL_WORDS 2 /* of each item, where it is looked for: normal, what as */
+#define SPL_SOFT_FIND_FIRST 0
+#define SPL_SOFT_FIND_MEDIAN 1  /* of model express; the next, of SPL_SOFT_BASE and so on */
+#define SPL_SOFT_FIND_DENSE 2
+#define SPL_SOFT_SEEN 257u      /* opacity of 65536, at least 1/255 */
+#define SPL_SOFT_DEPTH_BITS 20
+#define SPL_SOFT_DEPTH_HALF 726818u /* ln 2 of them */
+#define SPL_SOFT_DEPTH_SEEN 4120u   /* ln(255 / 254) */
+#define SPL_SOFT_FIND_SHELLS 64     /* rounds of an item that has shells, at most */
+
 /* Of one dispatch of it. */
 struct spl_soft_step {
     SPL_U32 count;         /* items to sort or to list; tiles to blend */
     SPL_U32 block, blocks; /* items an invocation walks; invocations */
     SPL_U32 digits;        /* counters of an invocation: values of a digit, or tiles */
-    SPL_U32 low, shift;    /* a digit is (key - low) >> shift & (digits - 1) */
+    SPL_U32 low, shift;    /* a digit is (key - low) >> shift & (digits - 1); soft_of: optical depth that is looked for */
     SPL_U32 columns;       /* tiles of a row */
     SPL_U32 rects;         /* word of the items' rectangles */
     SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
@@ -404,6 +418,7 @@ struct spl_soft_step {
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
     SPL_U32 ends;          /* of layer: this is its last window */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
+    SPL_U32 details;       /* word of the items' details */
 };
 
 #ifndef SPL_GLSL

@@ -5,10 +5,12 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"
+#include "common/octahedral.glsl"
 #include "common/soft_step.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint PHASE = 0;
+layout(constant_id = 1) const uint DETAILS = 0; /* 1: items get their normal, and what they are; 2: one to the eye */
 layout(constant_id = 3) const uint MARKED = 0;
 layout(std430, binding = SPL_STORAGE_SLOTS) buffer slot_buffer { uint slots[]; };
 layout(std430, binding = SPL_STORAGE_ITEMS) writeonly buffer item_buffer { uint items[]; };
@@ -90,6 +92,11 @@ void main()
                     items[at + 5u] = run.chunk.first_id + item_of(i);
                     items[job.rects + next] = from.y * columns + from.x | span.x << SPL_SOFT_RECT_COLUMNS |
                                               span.y << SPL_SOFT_RECT_ROWS;
+                    if (DETAILS != 0u) {
+                        uint detail = job.details + SPL_SOFT_DETAIL_WORDS * next;
+                        items[detail] = pack_normal(DETAILS == 1u ? load_splat(run.chunk, i, false).normal : -p);
+                        items[detail + 1u] = SPL_DRAWN;
+                    }
                     pairs[2u * next] = key;
                     pairs[2u * next + 1u] = next;
                     next++;

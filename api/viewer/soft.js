@@ -42,6 +42,7 @@ export class Soft extends EventTarget {
     super();
     this.dataset = null;
     this.params = table.parameters.filter(({soft}) => soft);
+    this.of = []; // what speaks of coordinates and layers, where something is soft
     for (const parameter of this.params) {
       if (parameter.name === "soft_opacity") continue; // has its slider
       const [label, help, control] = [
@@ -52,8 +53,10 @@ export class Soft extends EventTarget {
       control.id = label.htmlFor = `control-${parameter.name}`;
       help.id = `${control.id}-help`;
       control.setAttribute("aria-describedby", help.id);
-      label.textContent = parameter.name.replace("soft_", "").replace(/^./, (c) => c.toUpperCase());
+      const name = parameter.name === "of" ? "picks and layers of" : parameter.name.replace("soft_", "");
+      label.textContent = name.replace(/^./, (c) => c.toUpperCase());
       help.textContent = parameter.description;
+      if (parameter.name === "of") this.of = [label, control, help];
       $("soft-more").append(label, control, help);
     }
     const tell = () => this.dispatchEvent(new Event("change"));
@@ -153,6 +156,7 @@ export class Soft extends EventTarget {
     $("soft-histogram").toggleAttribute("hidden", !(slider && attribute)); // SVG has no property of that name
     $("soft-kinds").hidden = !kinds;
     for (const name of ["control-soft_opacity", "soft-opacity-label"]) $(name).hidden = !what;
+    for (const element of this.of) element.hidden = !what;
     if (slider) {
       const {low, high} = attribute
         ? spanOf(attribute)

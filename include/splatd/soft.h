@@ -23,6 +23,16 @@ enum spl_soft_model {
 SPL_API const char *spl_soft_model_name(enum spl_soft_model model);
 SPL_API int spl_soft_model_from_name(const char *name); /* -1 for an unknown name */
 
+/* Of what layers depth, range, normal, id and primitive, and picks, speak where something is soft. */
+enum spl_soft_of {
+    SPL_SOFT_OF_SOLID,  /* of what is solid, as if nothing soft were there */
+    SPL_SOFT_OF_FIRST,  /* of the nearest: the solid, or a sphere whose opacity there is 1/255 or more */
+    SPL_SOFT_OF_MEDIAN, /* of the sphere that lets less than half through, with those before it; else of the solid */
+    SPL_SOFT_OF_COUNT
+};
+SPL_API const char *spl_soft_of_name(enum spl_soft_of of);
+SPL_API int spl_soft_of_from_name(const char *name); /* -1 for an unknown name */
+
 /* What a term measures of a splat. */
 enum spl_soft_measure {
     SPL_SOFT_ATTRIBUTE, /* an optional attribute by name: of uncertainty its share of the dataset's 99th percentile, of
@@ -52,6 +62,7 @@ struct spl_soft_params {
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
                        at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border. Classes have none */
+    enum spl_soft_of of; /* depth of a sphere is that of its centre; the rest is its splat's */
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:
@@ -66,7 +77,7 @@ SPL_API int spl_soft_parse(const char *text, struct spl_soft_params *out, struct
  * spl_soft_check() is never longer than SPL_SOFT_TEXT_MAX. */
 SPL_API int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes);
 
-/* Are terms, model, opacity and blend in range? SPL_E_USAGE names the field. */
+/* Are terms, model, opacity, blend and of in range? SPL_E_USAGE names the field. */
 SPL_API int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err);
 
 SPL_END_DECLARATIONS

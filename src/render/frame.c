@@ -222,13 +222,13 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         if (is_too_much(job, tile))
             return SPL_FRAME_TOO_MUCH;
         struct spl_error why = {0};
-        rc = spl_soft_prepare(r, &tile->camera, job->view->soft.model, &why);
+        rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
         rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
-            rc = spl_soft_prepare(r, &tile->camera, job->view->soft.model, &why);
+            rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
             rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);
@@ -272,9 +272,9 @@ static int record(struct spl_tile *tile, struct spl_error *err)
         if (!layers)
             continue;
         rc = spl_method_row(tile->view->method)->record(tile, group, first, err);
+        if (!rc && first && spl_soft_is_drawn(tile))
+            rc = spl_soft_record(tile, group, err);
         first = false;
-        if (!rc && group == SPL_SUMS_COLOR && spl_soft_is_drawn(tile))
-            rc = spl_soft_record(tile, err);
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
             if (layers >> layer & 1)
                 rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);

@@ -59,6 +59,7 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_TESTS].buffer = scratch->tests;
     bindings[SPL_RESOURCE_MARKS].buffer = scratch->marks;
     bindings[SPL_RESOURCE_SOFT].buffer = scratch->soft.buffers[SPL_SOFT_STATE];
+    bindings[SPL_RESOURCE_FOUND].buffer = scratch->soft.buffers[SPL_SOFT_FOUND];
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_MAP].buffer = tile->map;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;

@@ -6,6 +6,7 @@
 #include "base/work.h"
 #include "render/method.h"
 #include "render/renderer.h"
+#include "render/soft/of.h"
 #include "render/soft/pass.h"
 
 static uint32_t ends_of(const struct spl_draw_key *key)
@@ -288,8 +289,9 @@ int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint3
     const struct spl_method_row *method = spl_method_row(tile->view->method);
     bool mapped = layer == SPL_LAYER_COLOR && spl_tile_has_map_colors(tile, SPL_SUMS_COLOR);
     uint32_t resolved = !mapped ? method->resolve : method->sums ? SPL_RESOLVED_MAPPED : SPL_RESOLVED_MAPPED_BENT;
-    bool over = spl_soft_is_drawn(tile) && (layer == SPL_LAYER_COLOR || layer == SPL_LAYER_COVERAGE);
-    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, over}};
+    bool blended = layer == SPL_LAYER_COLOR || layer == SPL_LAYER_COVERAGE;
+    uint32_t soft = !spl_soft_is_drawn(tile) ? 0 : blended ? 1 : spl_soft_is_found(tile->view) ? 2 : 0;
+    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
     return spl_tile_dispatch_items(tile, &key, &params, tile->width * tile->height, err);

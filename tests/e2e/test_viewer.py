@@ -779,9 +779,12 @@ def test_what_is_soft():
         assert next_link(tab, lambda now: "soft_opacity" in now)["soft_opacity"] == "0.31"
         tab.choose("#control-soft_model", "layer")
         next_link(tab, lambda now: now.get("soft_model") == "layer")
+        assert tab.text("label[for=control-of]") == "Picks and layers of"
+        tab.choose("#control-of", "first")
+        next_link(tab, lambda now: now.get("of") == "first")
         tab.choose("#budget", "500ms")
         kept = next_link(tab, lambda now: now.get("budget"))
-        assert kept["soft"] == less.replace(">", "<") and kept["soft_opacity"] == "0.31" and "method" not in kept
+        assert kept["soft"] == less.replace(">", "<") and kept["soft_opacity"] == "0.31" and kept["of"] == "first" and "method" not in kept
         tab.choose("#budget", "")
         tab.until(REST)
         tab.choose("#soft-what", "class")
@@ -809,7 +812,8 @@ def test_what_is_soft():
             ["uncertainty", ">", less.split(">")[1]], link(tab)
         assert tab.run("document.querySelector('#control-soft_model').value") == "layer", (now, link(tab), tab.run("document.querySelector('#control-soft_model').value"))
         tab.choose("#soft-what", "")
-        next_link(tab, lambda now: not any(name.startswith("soft") for name in now))
+        next_link(tab, lambda now: "of" not in now and not any(name.startswith("soft") for name in now))
+        assert not tab.run("document.querySelector('#control-of').offsetHeight")
 
 
 def test_a_tour_keeps_and_fades_what_is_soft():

@@ -29,6 +29,7 @@ QUERIES = [
     ("soft=uncertainty>" + "1" * 5000, "soft"), ("soft=uncertainty>1&soft=x", "soft"), ("soft", "soft"),
     ("soft_model=exact", "soft_model"), ("soft_model=", "soft_model"), ("soft_opacity=2", "soft_opacity"), ("soft_opacity=-0.1", "soft_opacity"),
     ("soft_opacity=nan", "soft_opacity"), ("soft_blend=-1", "soft_blend"), ("soft_blend=2e9", "soft_blend"), ("soft_of=first", "soft_of"),
+    ("of=second", "of"), ("of=", "of"), ("of=FIRST", "of"), ("of=1", "of"), ("of=first&of=median", "of"), ("of", "of"), ("soft=class:3&of=both", "of"),
     ("budget=0", "budget"), ("budget=-5", "budget"), ("budget=fast", "budget"), ("budget=5m", "budget"),
     ("budget=", "budget"), ("budget=1e3", "budget"), ("budget=nan", "budget"), ("budget=601s", "budget"),
     ("budget=.", "budget"), ("budget=5%20ms", "budget"), ("budget=5&budget=6", "budget"), ("psnr=101", "psnr"),
@@ -56,7 +57,7 @@ BODIES = [
     ('{"soft":5}', "soft"), ('{"soft":""}', "soft"), ('{"soft":["uncertainty>1",2]}', "soft"), ('{"soft":[""]}', "soft"),
     ('{"soft":[["uncertainty>1"]]}', "soft"), ('{"soft":["nothing>1"]}', "soft"), ('{"camera":{"soft":"uncertainty>1"}}', "soft"),
     ('{"soft":{"uncertainty":1}}', "soft"), ('{"soft_opacity":"0.5"}', "soft_opacity"), ('{"soft_model":0}', "soft_model"),
-    ('{"soft_blend":[1]}', "soft_blend"), ('{"soft":"uncertainty>\\u00fc"}', "soft"),
+    ('{"soft_blend":[1]}', "soft_blend"), ('{"of":1}', "of"), ('{"of":"none"}', "of"), ('{"of":["first"]}', "of"), ('{"camera":{"of":"first"}}', "of"), ('{"soft":"uncertainty>\\u00fc"}', "soft"),
     ('{"budget":0}', "budget"), ('{"budget":"0ms"}', "budget"), ('{"budget":[5]}', "budget"),
     ('{"budget":true}', "budget"), ('{"psnr":"38"}', "psnr"), ('{"camera":{"psnr":38}}', "psnr"), ("[" * 100000, "body"),
 ]

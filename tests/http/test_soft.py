@@ -1,6 +1,8 @@
 """What is soft over HTTP: it comes back in a header, from every route that takes it, counts in ETags only where there is
 something soft, and is refused where the dataset has nothing of it."""
 import json
+import math
+import struct
 
 from harness import FAKE, REAL, VIEW, Daemon, run
 
@@ -15,7 +17,7 @@ def soft(reply):
 def test_what_is_soft_comes_back():
     with Daemon(REAL) as d:
         query = f"width=16&height=16&soft=0.25%3Cclass&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
-        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0}
+        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0, "of": "solid"}
         first = d.ask(f"{VIEW}?{query}")
         assert first.status == 200 and soft(first) == whole, first.headers
         assert soft(d.ask(f"{VIEW}?{query}", "HEAD")) == whole
@@ -23,8 +25,8 @@ def test_what_is_soft_comes_back():
         assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
         pick = d.ask(f"{PICK}?x=8&y=8&{query}")
         assert pick.status == 200 and soft(pick) == whole
-        asked = {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.75, "soft_blend": 0.5}
-        assert soft(d.ask(f"{PICK}?x=8&y=8&soft={AXIS}&soft_model=base&soft_opacity=0.75&soft_blend=0.5")) == asked
+        asked = {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.75, "soft_blend": 0.5, "of": "median"}
+        assert soft(d.ask(f"{PICK}?x=8&y=8&soft={AXIS}&soft_model=base&soft_opacity=0.75&soft_blend=0.5&of=median")) == asked
         assert soft(d.post({"x": 8, "y": 8, **asked}, PICK)) == asked
         for text in ["class>3", "class:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
             reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer"})
@@ -34,11 +36,44 @@ def test_what_is_soft_comes_back():
         assert batch.status == 200 and batch.body.count(b"Splatd-Soft: ") == 1, batch.body[:2000]
 
 
+def test_layers_and_picks_speak_of_what_is_asked_for():
+    """The wall is x = 0.2 sin y; what is nearer than x = 0.1 becomes soft, and behind it lies nothing."""
+    near = {"eye": "3,0.8,1", "target": "0,0.8,1", "fov": 40, "width": 64, "height": 48, "soft": "plane:0.1,0,0,1,0,0>0", "soft_opacity": 0.8}
+    with Daemon(REAL) as d:
+        def pick(**more):
+            query = "&".join(f"{k}={v}" for k, v in {**near, "x": 32, "y": 24, **more}.items())
+            reply = d.ask(f"{PICK}?{query}")
+            assert reply.status == 200 and soft(reply)["of"] == more.get("of", "solid"), reply.body
+            return reply.json()
+        assert pick()["position"] is None and pick(of="solid")["position"] is None
+        first, median = pick(of="first"), pick(of="median")
+        assert first["primitive"] == "splat" and abs(first["normal"][0]) > 0.9 and first["class"] == 0, first
+        assert 0.1 < first["position"][0] < 0.2 and first["splat"] is not None and first["attributes"], first
+        assert median["position"] and first["depth"] <= median["depth"], (first, median)
+        assert pick(of="first", soft_opacity=0.05)["position"] and pick(of="median", soft_opacity=0.01)["position"] is None
+        for model in "base", "concentric", "layer":
+            assert pick(of="first", soft_model=model)["splat"] == first["splat"]
+            assert pick(of="median", soft_model=model)["position"], model
+        assert pick(of="first", soft_opacity=0)["position"] is None and pick(of="median", soft_opacity=0)["position"] is None
+        body = {"x": 32, "y": 24, "camera": {"eye": [3, 0.8, 1], "target": [0, 0.8, 1], "fov": 40}, "width": 64, "height": 48,
+                "soft": near["soft"], "soft_opacity": 0.8, "of": "first"}
+        assert d.post(body, PICK).json()["splat"] == first["splat"]
+        def depths(**more):
+            reply = d.view(**near, layer="depth", format="raw", **more)
+            return struct.unpack(f"<{64 * 48}f", reply.body)
+        solid, nearest, half = depths(), depths(of="first"), depths(of="median")
+        assert math.isnan(solid[24 * 64 + 32]) and abs(nearest[24 * 64 + 32] - first["depth"]) < 0.02
+        for a, b, c in zip(nearest, half, solid):
+            assert not a > b and not b > c and not (math.isnan(a) and not math.isnan(c)), (a, b, c)
+        assert sum(not math.isnan(z) for z in nearest) > sum(not math.isnan(z) for z in half) > sum(not math.isnan(z) for z in solid)
+        assert d.view(**near).body == d.view(**near, of="first").body, "colours stay what they are"
+
+
 def test_a_budget_leaves_it_alone():
     with Daemon(FAKE) as d:
         reply = d.ask(f"{VIEW}?width=16&height=16&budget=500ms&soft={AXIS}&soft_opacity=0.9&soft_model=base")
         assert reply.status == 200 and reply.headers["Splatd-Chosen"], reply.headers
-        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0}
+        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0, "of": "solid"}
 
 
 def test_a_dataset_says_what_may_be_soft():
@@ -62,9 +97,10 @@ def test_it_counts_where_something_is_soft():
     with Daemon(REAL) as d:
         def tag(query):
             return d.ask(f"{VIEW}?width=16&height=16&{query}", "HEAD").headers["ETag"]
-        assert tag("soft_opacity=0.9&soft_model=layer") == tag("")
+        assert tag("soft_opacity=0.9&soft_model=layer&of=first") == tag("")
         tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_model=base",
-                                         f"soft={AXIS}&method=points", "soft=class>0.5")]
+                                         f"soft={AXIS}&method=points", f"layer=id&soft={AXIS}", f"layer=id&soft={AXIS}&of=first",
+                                         f"layer=id&soft={AXIS}&of=median", "soft=class>0.5")]
         assert len(set(tags)) == len(tags), tags
         assert tag("soft=class>0.50") == tags[-1] and tag("soft=.5<class") == tags[-1]
 

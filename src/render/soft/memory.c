@@ -25,7 +25,7 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
 {
     const uint64_t word = sizeof(uint32_t);
     const uint64_t pairs = 2 * (uint64_t)sizes->items, list = pairs > sizes->entries ? pairs : sizes->entries;
-    bytes[SPL_SOFT_ITEMS] = word * (SPL_SOFT_ITEM_WORDS + 1) * sizes->items;
+    bytes[SPL_SOFT_ITEMS] = word * (SPL_SOFT_ITEM_WORDS + 1 + (sizes->found ? SPL_SOFT_DETAIL_WORDS : 0)) * sizes->items;
     bytes[SPL_SOFT_PAIRS] = bytes[SPL_SOFT_OTHERS] = word * list;
     bytes[SPL_SOFT_COUNTS] = word * counters_of(sizes, software);
     const uint64_t slots = sizes->slots, buckets = 2 * (uint64_t)SPL_SOFT_BUCKETS;
@@ -37,6 +37,7 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     bytes[SPL_SOFT_STEPS_OF] = (uint64_t)SPL_SOFT_STEP_STRIDE * SPL_SOFT_STEPS;
     bytes[SPL_SOFT_STATE] = SPL_SOFT_STATE_WORDS * word * sizes->samples;
     bytes[SPL_SOFT_WALKS] = sizes->walks ? SPL_SOFT_WALK_WORDS * word * sizes->samples : word;
+    bytes[SPL_SOFT_FOUND] = SPL_SOFT_FOUND_WORDS * word * sizes->found;
 }
 
 uint64_t spl_soft_memory_bytes(const struct spl_soft_sizes *sizes, bool software)
@@ -65,7 +66,7 @@ int spl_soft_memory_init(struct spl_soft_memory *memory, const struct spl_soft_s
                                        .counters = (uint32_t)counters_of(sizes, software),
                                        .threads = threads_of(software)};
     for (int i = 0; i < SPL_SOFT_BUFFERS; i++) {
-        int rc = make(context, kinds[i], bytes[i], &memory->buffers[i], err);
+        int rc = !bytes[i] ? SPL_OK : make(context, kinds[i], bytes[i], &memory->buffers[i], err);
         if (rc) {
             memory->buffers[i] = NULL;
             spl_soft_memory_finish(memory, gpu);

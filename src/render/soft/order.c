@@ -63,6 +63,7 @@ int spl_soft_dispatch(struct spl_soft_order *order, const struct spl_soft_dispat
         [SPL_RESOURCE_LISTS] = {.buffer = buffers[SPL_SOFT_LISTS]},
         [SPL_RESOURCE_SOFT] = {.buffer = buffers[SPL_SOFT_STATE]},
         [SPL_RESOURCE_WALKS] = {.buffer = buffers[SPL_SOFT_WALKS]},
+        [SPL_RESOURCE_FOUND] = {.buffer = buffers[SPL_SOFT_FOUND]},
     };
     spl_gpu_dispatch(order->gpu, kernel, bindings, what->workgroups);
     return SPL_OK;

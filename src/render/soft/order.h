@@ -25,6 +25,7 @@ struct spl_soft_sizes {
     uint32_t slots;   /* that gather */
     uint64_t samples;
     bool walks;       /* for models but express, too */
+    uint64_t found;   /* samples of which a sphere is found (of.h); 0 = none are, and items have no details */
 };
 
 enum spl_soft_buffer {
@@ -41,6 +42,7 @@ enum spl_soft_buffer {
     SPL_SOFT_STEPS_OF,/* struct spl_soft_step[], from the host */
     SPL_SOFT_STATE,
     SPL_SOFT_WALKS,   /* of models but express */
+    SPL_SOFT_FOUND,   /* may be NULL */
     SPL_SOFT_BUFFERS
 };
 
@@ -108,7 +110,7 @@ struct spl_soft_blend {
 /* Blends what was listed. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
 
-/* order.c for walk.c: a dispatch of one of its kernels. */
+/* order.c for walk.c and of.c: a dispatch of one of its kernels. */
 struct spl_soft_dispatch {
     struct spl_kernel_key key;
     struct spl_soft_step step;

@@ -1,4 +1,4 @@
-/* What a view says of soft transparency: names of models, and checks. Pure; any thread. */
+/* What a view says of soft transparency: names of its choices, and checks. Pure; any thread. */
 #include "render/soft_params.h"
 
 #include <math.h>
@@ -23,6 +23,25 @@ int spl_soft_model_from_name(const char *name)
 {
     for (int i = 0; name && i < SPL_SOFT_MODEL_COUNT; i++)
         if (!strcmp(name, model_names[i]))
+            return i;
+    return -1;
+}
+
+static const char *const of_names[SPL_SOFT_OF_COUNT] = {
+    [SPL_SOFT_OF_SOLID] = "solid",
+    [SPL_SOFT_OF_FIRST] = "first",
+    [SPL_SOFT_OF_MEDIAN] = "median",
+};
+
+const char *spl_soft_of_name(enum spl_soft_of of)
+{
+    return (unsigned)of < SPL_SOFT_OF_COUNT ? of_names[of] : "unknown";
+}
+
+int spl_soft_of_from_name(const char *name)
+{
+    for (int i = 0; name && i < SPL_SOFT_OF_COUNT; i++)
+        if (!strcmp(name, of_names[i]))
             return i;
     return -1;
 }
@@ -84,6 +103,8 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
                               soft->opacity);
     if (!(soft->blend >= 0 && isfinite(soft->blend)))
         return spl_fail_field(err, SPL_E_USAGE, "soft_blend", "soft_blend %g is not 0 or more", soft->blend);
+    if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)
+        return spl_fail_field(err, SPL_E_USAGE, "of", "of %d does not exist", (int)soft->of);
     for (uint32_t i = 0; i < soft->count; i++)
         if (!spl_soft_check_term(&soft->terms[i], fault))
             return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft %s", i + 1, fault);

@@ -11,6 +11,7 @@
 #include "base/work.h"
 #include "render/frame.h"
 #include "render/method.h"
+#include "render/soft/of.h"
 #include "render/soft/thick.h"
 
 enum {
@@ -27,6 +28,8 @@ struct pass {
     struct spl_soft_order order;
     uint32_t slots;
     struct spl_soft_plan *plan; // NULL until spheres are more than fit
+    bool blends, finds;
+    uint32_t found_to;          // depth up to which spheres were looked for
     bool begun;                 // something was blended
 };
 
@@ -69,7 +72,7 @@ static void choose_items(struct spl_soft_sizes *sizes, uint64_t wanted, uint64_t
     for (;; items /= 2) {
         sizes->items = (uint32_t)items;
         sizes->entries = (uint32_t)(items * entries_of_item);
-        uint64_t largest = items * (SPL_SOFT_ITEM_WORDS + 1) * sizeof(uint32_t);
+        uint64_t largest = items * (SPL_SOFT_ITEM_WORDS + 1 + SPL_SOFT_DETAIL_WORDS) * sizeof(uint32_t);
         if (items <= items_at_least || (largest <= binding && spl_soft_memory_bytes(sizes, software) <= bytes))
             return;
     }
@@ -87,7 +90,7 @@ static void choose_entries(struct spl_soft_sizes *sizes, uint64_t bytes, uint64_
     }
 }
 
-int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, enum spl_soft_model model,
+int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *camera, const struct spl_view *view,
                      struct spl_error *err)
 {
     struct spl_scratch *scratch = &renderer->scratch;
@@ -108,6 +111,7 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
     sizes.tiles = larger(sizes.tiles, have->tiles);
     sizes.walks = model != SPL_SOFT_MODEL_EXPRESS || have->walks;
     sizes.samples = sizes.samples > have->samples ? sizes.samples : have->samples;
+    sizes.found = spl_soft_is_found(view) || have->found ? sizes.samples : 0;
     uint64_t own = scratch->soft_bytes, kept = scratch->taken_bytes - own;
     kept += spl_residency_get_reserve(&renderer->residency);
     const uint64_t left = limits->memory_bytes > kept ? limits->memory_bytes - kept : 0;
@@ -118,14 +122,14 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
         sizes.entries = larger(sizes.items * entries_of_item, SPL_SOFT_SLOT_CELLS * SPL_SOFT_SPAN_MAX * SPL_SOFT_SPAN_MAX);
     } else {
         choose_items(&sizes, slots * SPL_SOFT_SLOT_SPLATS, share, limits->binding_bytes, software);
-        if (model != SPL_SOFT_MODEL_EXPRESS)
+        if (view->soft.model != SPL_SOFT_MODEL_EXPRESS)
             choose_entries(&sizes, share, limits->binding_bytes, software);
     }
     const bool exact = renderer->soft_items_most > 0;
     const bool enough = exact ? sizes.items == have->items && sizes.entries == have->entries
                               : sizes.items <= have->items && sizes.entries <= have->entries;
     if (enough && sizes.slots == have->slots && sizes.tiles == have->tiles && sizes.samples == have->samples &&
-        sizes.walks == have->walks)
+        sizes.walks == have->walks && sizes.found == have->found)
         return SPL_OK;
     const uint64_t bytes = spl_soft_memory_bytes(&sizes, software);
     if (bytes > left)
@@ -181,6 +185,8 @@ static int gather(struct pass *pass, enum phase phase, const struct spl_soft_ste
         [SPL_RESOURCE_ITEMS] = {.buffer = buffers[SPL_SOFT_ITEMS]},
         [SPL_RESOURCE_SORT_TO] = {.buffer = buffers[SPL_SOFT_PAIRS]},
     };
+    const bool surface = spl_dataset_get_info(pass->tile->resident->dataset)->has_surface;
+    const uint32_t details = phase == GATHER && pass->finds ? surface ? 1 : 2 : 0;
     int rc = spl_soft_put_step(order, step, &with[SPL_RESOURCE_STEP], err);
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds && !rc; i++) {
         struct spl_disc_kernels kernels;
@@ -189,8 +195,8 @@ static int gather(struct pass *pass, enum phase phase, const struct spl_soft_ste
                                           .lanes = kinds[i].lanes,
                                           .role = SPL_ROLE_SOFT,
                                           .with = with};
-        rc = spl_tile_get_plain_kernels(pass->tile, (struct spl_kernel_key){kinds[i].name, false, {phase}}, &what,
-                                        &kernels, err);
+        const struct spl_kernel_key key = {kinds[i].name, false, {phase, details}};
+        rc = spl_tile_get_plain_kernels(pass->tile, key, &what, &kernels, err);
         rc = rc ? rc : spl_tile_dispatch_splats(pass->tile, &kernels, &what, err);
     }
     spl_gpu_barrier(order->gpu);
@@ -232,7 +238,8 @@ static struct spl_soft_step window_step(const struct pass *pass, const struct sp
                                   .high = (uint32_t)(window->end >> 32),
                                   .high_slot = (uint32_t)window->end,
                                   .columns = pass->order.columns,
-                                  .rects = pass->order.memory->sizes.items * SPL_SOFT_ITEM_WORDS};
+                                  .rects = pass->order.memory->sizes.items * SPL_SOFT_ITEM_WORDS,
+                                  .details = pass->order.memory->sizes.items * (SPL_SOFT_ITEM_WORDS + 1)};
 }
 
 static int count(struct pass *pass, const struct spl_soft_range *window, struct counted *sum, struct spl_error *err)
@@ -273,12 +280,16 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
     rc = rc ? rc : spl_soft_sort(&pass->order, items, sum->low, sum->high, err);
     rc = rc ? rc : spl_soft_list(&pass->order, items, sum->most, err);
     spl_assert(rc != SPL_SOFT_CROWDED);
-    rc = rc ? rc : spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
-                                                                         .opacity = soft->opacity,
-                                                                         .reach = sum->reach,
-                                                                         .until = until,
-                                                                         .border = soft->blend > 0,
-                                                                         .first = !pass->begun}, err);
+    if (!rc && pass->blends)
+        rc = spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
+                                                                   .opacity = soft->opacity,
+                                                                   .reach = sum->reach,
+                                                                   .until = until,
+                                                                   .border = soft->blend > 0,
+                                                                   .first = !pass->begun}, err);
+    if (!rc && pass->finds)
+        rc = spl_soft_find(&pass->order, soft, pass->found_to, err);
+    pass->found_to = (uint32_t)(window->end >> 32);
     pass->begun = true;
     return rc;
 }
@@ -287,7 +298,7 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
 static int end(struct pass *pass, struct spl_error *err)
 {
     const struct spl_soft_params *soft = &pass->tile->view->soft;
-    if (soft->model != SPL_SOFT_MODEL_LAYER)
+    if (soft->model != SPL_SOFT_MODEL_LAYER || !pass->blends)
         return SPL_OK;
     pass->order.entries = 0;
     return spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
@@ -369,7 +380,7 @@ static int occlude(struct spl_tile *tile, bool wide, struct spl_error *err)
     return spl_tile_dispatch_occlusion(tile, list->first_soft_chunk, list->first_mark_chunk, wide, err);
 }
 
-int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
+int spl_soft_record(struct spl_tile *tile, uint32_t group, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     const struct spl_soft_sizes *sizes = &r->scratch.soft.sizes;
@@ -388,7 +399,9 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
                                   .rows = (tile->camera.height + rows - 1) / rows,
                                   .add_work = tile_work,
                                   .run = tile_run},
-                        .slots = list->chunks[last].texture + slots_of(list, last)};
+                        .slots = list->chunks[last].texture + slots_of(list, last),
+                        .blends = group == SPL_SUMS_COLOR,
+                        .finds = spl_soft_is_found(tile->view)};
     const float near = tile->params.near, far = tile->params.far;
     uint32_t low, high;
     memcpy(&low, &near, sizeof low);
@@ -396,6 +409,11 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     const struct spl_soft_range all = {(uint64_t)low << 32, (uint64_t)(high + 1) << 32};
     struct counted sum;
     pass.order.context = &pass;
+    if (!pass.blends && !pass.finds)
+        return SPL_OK;
+    if (pass.finds)
+        spl_gpu_fill(r->gpu, pass.order.memory->buffers[SPL_SOFT_FOUND], 0,
+                     tile->samples * SPL_SOFT_FOUND_WORDS * sizeof(uint32_t), SPL_NOTHING);
     spl_gpu_fill(r->gpu, pass.order.memory->buffers[SPL_SOFT_STATE], 0,
                  tile->samples * SPL_SOFT_STATE_WORDS * sizeof(uint32_t), 0);
     if (model != SPL_SOFT_MODEL_EXPRESS)
@@ -406,7 +424,7 @@ int spl_soft_record(struct spl_tile *tile, struct spl_error *err)
     rc = rc ? rc : count(&pass, &all, &sum, err);
     if (!rc && sum.items <= sizes->items && sum.entries <= sizes->entries)
         rc = draw(&pass, &all, &sum, SPL_SOFT_NO_END, err);
-    else if (!rc && (model == SPL_SOFT_MODEL_BASE || model == SPL_SOFT_MODEL_CONCENTRIC))
+    else if (!rc && pass.blends && (model == SPL_SOFT_MODEL_BASE || model == SPL_SOFT_MODEL_CONCENTRIC))
         rc = draw_thick(&pass, &all, sum.reach, err);
     else if (!rc)
         rc = draw_windows(&pass, &all, err);

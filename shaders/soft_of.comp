@@ -1,0 +1,146 @@
+/* Which soft sphere layers and picks speak of, sample by sample, over the lists of tiles that soft_blend.comp walks. An
+ * invocation is a sample. Constant 0: the first sphere that is seen at all, by its opacity in model express, which those
+ * with a density are near to (SPL_SOFT_FIND_FIRST); the one with which less than half passes in express
+ * (SPL_SOFT_FIND_MEDIAN); or with which what is hidden is more than job.low in base, concentric or layer
+ * (SPL_SOFT_FIND_DENSE + SPL_SOFT_BASE and so on), where what a sphere hides is counted as the ray comes by its centre, up
+ * to the solid. Constant 1: some items are partly solid (eq. 22). Spheres whose centres lie behind the solid are none.
+ * What was hidden so far is kept, so that lists may be walked in parts and in windows of depth; what is nearer than key
+ * job.high is left out, for windows that overlap. */
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "common/depths.glsl"
+#include "common/soft.glsl"
+#include "common/soft_step.glsl"
+
+layout(local_size_x = SPL_WORKGROUP) in;
+layout(constant_id = 0) const uint FIND = SPL_SOFT_FIND_FIRST;
+layout(constant_id = 1) const uint BORDER = 0;
+
+layout(std430, binding = SPL_STORAGE_FOUND) buffer found_buffer { uint found[]; };
+SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
+
+const bool CONCENTRIC = FIND == SPL_SOFT_FIND_DENSE + SPL_SOFT_CONCENTRIC;
+const bool LAYER = FIND == SPL_SOFT_FIND_DENSE + SPL_SOFT_LAYER;
+
+/* A sphere as a ray meets it. */
+struct met_item {
+    float z, radius, soft;
+    float q, behind; /* see soft_distance(); in radii squared, and may be a little less than 0 */
+};
+
+/* Opacity in model express, of 65536; as soft_blend.comp has it. */
+uint express(met_item item)
+{
+    precise float m = max(1.0 - item.q, 0.0);
+    precise float fall =
+        m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
+    if (BORDER != 0u) {
+        precise float linear = 1.0 - sqrt(1.0 - m);
+        precise float mixed = linear * 65536.0 * (1.0 - item.soft) + fall * item.soft;
+        fall = mixed;
+    }
+    precise float scaled = clamp(fall + 0.5, 0.0, 65536.0);
+    return uint(int(scaled));
+}
+
+float part_of(float shells, float q, float zeta)
+{
+    return CONCENTRIC ? soft_concentric_part(shells, q, zeta) : soft_base_part(q, zeta);
+}
+
+/* Optical depth of the sphere from the eye to `until`, of a model with a density. */
+float depth_of(met_item item, soft_ray ray, float until)
+{
+    float q = max(item.q, 0.0), edge = sqrt(max(1.0 - q, 0.0)), middle = item.z + item.behind;
+    float inverse = 1.0 / (item.radius * sqrt(ray.inverse));
+    float from = clamp((frame.near - middle) * inverse, -edge, edge);
+    float to = clamp((until - middle) * inverse, -edge, edge);
+    float samples = frame.fx * item.radius / max(item.z, 1e-9);
+    float shells = floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
+    float part = part_of(shells, q, to) - part_of(shells, q, from), depth = job.depth * part;
+    if (BORDER != 0u && item.soft < 1.0) {
+        float whole = part_of(shells, q, edge), opacity = 1.0 - exp(-2.0 * job.depth * whole);
+        float wanted = -log(max(1.0 - soft_modulate(opacity, q, item.soft), 1.0 / 1024.0));
+        depth = 0.5 * wanted * part / max(whole, 1e-12);
+    }
+    return depth;
+}
+
+/* With this sphere, is it found? */
+bool find(met_item item, soft_ray ray, float until, inout uint hidden)
+{
+    if (FIND == SPL_SOFT_FIND_FIRST)
+        return express(item) >= SPL_SOFT_SEEN;
+    if (FIND == SPL_SOFT_FIND_MEDIAN) {
+        uint clear = SPL_SOFT_CLEAR - hidden;
+        hidden += ((clear >> 8) * express(item)) >> 8;
+        return 2u * hidden > SPL_SOFT_CLEAR;
+    }
+    float depth = item.q < 1.0 ? LAYER ? job.depth : depth_of(item, ray, until) : 0.0;
+    uint more = uint(depth * float(1u << SPL_SOFT_DEPTH_BITS) + 0.5);
+    hidden = LAYER ? max(hidden, more) : hidden + more;
+    return hidden > job.low;
+}
+
+void main()
+{
+    load_frame();
+    load_step();
+    const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS;
+    uint id = gl_GlobalInvocationID.x, slot = id / lanes, lane = id % lanes;
+    bool has = slot < job.count;
+    int list = int(job.first + 3u * (has ? slot : 0u));
+    uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
+    uint end = imageLoad(list_texels, list + 2).x;
+    ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) +
+               ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
+    has = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
+    if (!has)
+        return;
+    uint index = sample_index(at), own = SPL_SOFT_FOUND_WORDS * index;
+    if (found[own] != SPL_NOTHING)
+        return;
+    uint solid = depth_word(index), hidden = ~found[own + 3u], key = 0u;
+    float until = solid == SPL_NOTHING ? frame.far : min(uintBitsToFloat(solid), frame.far);
+    soft_ray ray; /* and distances as soft_blend.comp has them, to the bit */
+    precise vec2 slope = vec2(at + ivec2(frame.tile_x, frame.tile_y)) + (0.5 - vec2(frame.cx, frame.cy));
+    slope *= vec2(frame.inverse_fx, frame.inverse_fy);
+    precise float inverse = 1.0 / (1.0 + slope.x * slope.x + slope.y * slope.y);
+    ray.slope = slope;
+    ray.inverse = inverse;
+    bool seen = false;
+    int entry = 0, item_at = 0;
+    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+        entry = int(imageLoad(entry_texels, int(i)).x);
+        item_at = SPL_SOFT_ITEM_WORDS * entry;
+        met_item item;
+        key = imageLoad(item_texels, item_at + 2).x;
+        item.z = uintBitsToFloat(key);
+        item.radius = uintBitsToFloat(imageLoad(item_texels, item_at + 3).x);
+        vec2 center = vec2(uintBitsToFloat(imageLoad(item_texels, item_at).x),
+                           uintBitsToFloat(imageLoad(item_texels, item_at + 1).x));
+        precise float closer = 1.0 / (item.radius * item.radius);
+        precise vec2 off = center - slope * item.z;
+        precise float along = off.x * slope.x + off.y * slope.y;
+        precise float q = (off.x * off.x + off.y * off.y - along * along * inverse) * closer;
+        precise float behind = along * inverse;
+        item.behind = behind;
+        precise float soft = (float(imageLoad(item_texels, item_at + 4).x >> 24) - 1.0) * (1.0 / 254.0);
+        item.q = q;
+        item.soft = soft;
+        seen = key >= job.high && key <= solid && find(item, ray, until, hidden);
+        if (seen || key > solid || ++i >= end)
+            break;
+    }
+    if (seen) {
+        int detail = int(job.details) + SPL_SOFT_DETAIL_WORDS * entry;
+        found[own] = key;
+        found[own + 1u] = imageLoad(item_texels, item_at + 5).x;
+        found[own + 2u] = imageLoad(item_texels, detail).x;
+        found[own + 3u] = imageLoad(item_texels, detail + 1).x;
+    } else {
+        found[own + 3u] = ~hidden;
+    }
+}
