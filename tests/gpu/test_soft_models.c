@@ -70,6 +70,7 @@ struct scene {
     size_t count;
     float solid[width * height];
     bool border;
+    bool thin; /* some are narrower than a sample */
     bool crowded; /* one tile, whose list has its first sphere many times */
 };
 
@@ -113,8 +114,10 @@ static void fill(const struct scene *s)
 {
     struct spl_frame_params frame = {.fx = (float)focal, .fy = (float)focal, .cx = width / 2.0f, .cy = height / 2.0f,
                                      .inverse_fx = (float)(1 / focal), .inverse_fy = (float)(1 / focal), .near = 0.125f,
-                                     .far = 100, .width = width, .height = height, .margin = (float)s->look.margin};
-    struct spl_soft_step step = {.count = tiles, .depth = (float)spl_soft_depth(s->look.opacity), .until = 1e9f};
+                                     .far = 100, .width = width, .height = height, .margin = (float)s->look.margin,
+                                     .low_pass = s->thin ? SPL_LOW_PASS : 0};
+    struct spl_soft_step step = {.count = tiles, .depth = (float)spl_soft_depth(s->look.opacity), .until = 1e9f,
+                                 .thin = (float)spl_soft_thin(s->look.opacity)};
     uint32_t *items = spl_gpu_buffer_map(buffers[SPL_RESOURCE_ITEMS]);
     uint32_t *entries = spl_gpu_buffer_map(buffers[SPL_RESOURCE_SORT_FROM]);
     uint32_t *lists = spl_gpu_buffer_map(buffers[SPL_RESOURCE_LISTS]), entry = 0;
@@ -127,7 +130,7 @@ static void fill(const struct scene *s)
             items[6 * i + (uint32_t)c] = bits(p->center[c]);
             paint |= (uint32_t)p->color[c] << 8 * c;
         }
-        items[6 * i + 3] = bits(p->radius);
+        items[6 * i + 3] = bits(p->radius * sqrt(1 - p->thin));
         items[6 * i + 4] = paint;
         items[6 * i + 5] = i;
         step.reach = fmaxf(step.reach, (float)p->radius);
@@ -157,7 +160,7 @@ static int draw(const struct scene *s)
     static const uint32_t models[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
                                       [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
                                       [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
-    const uint32_t constants[] = {models[s->look.model], s->border};
+    const uint32_t constants[] = {models[s->look.model], s->border, s->thin};
     struct spl_gpu_kernel *kernel;
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT] = {{0}};
     uint32_t *got = spl_gpu_buffer_map(down);
@@ -165,7 +168,7 @@ static int draw(const struct scene *s)
     fill(s);
     for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
         bindings[i].buffer = buffers[i];
-    assert_int_equal(spl_gpu_kernel_create(gpu, "soft_base", constants, 2, &kernel, NULL), 0);
+    assert_int_equal(spl_gpu_kernel_create(gpu, "soft_base", constants, 3, &kernel, NULL), 0);
     do {
         uint64_t ticket;
         struct spl_error err = {0};
@@ -267,6 +270,25 @@ static void borders_match(void **state)
     }
 }
 
+/* Narrower than a sample: as wide as one, and so much thinner. */
+static void narrow_ones_are_thin(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 4; m++) {
+        struct scene s = make_scene(dense[m % 2], 0.7, 150);
+        s.thin = true;
+        s.border = m > 1;
+        for (size_t i = 0; i < s.count; i++) {
+            struct soft_sphere *p = &s.spheres[i];
+            double own = (double)(float)(p->center[2] / focal * between(0.05, 1.5));
+            p->radius = fmax(own, (double)SPL_LOW_PASS * p->center[2] / focal);
+            p->thin = 1 - own * own / (p->radius * p->radius);
+            p->soft = s.border ? (double)(i % 5 * 63) / 254 : 1;
+        }
+        matches(&s, "thin");
+    }
+}
+
 /* So many that overlap that the walk is left and taken up again. */
 static void long_walks_go_on(void **state)
 {
@@ -319,6 +341,7 @@ int main(void)
         cmocka_unit_test(walls_cut),
         cmocka_unit_test(eyes_within_and_equal_depths),
         cmocka_unit_test(borders_match),
+        cmocka_unit_test(narrow_ones_are_thin),
         cmocka_unit_test(long_walks_go_on),
         cmocka_unit_test(layers_match),
         cmocka_unit_test(lists_too_long_are_told),

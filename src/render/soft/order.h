@@ -99,6 +99,7 @@ struct spl_soft_blend {
     bool border;    /* some items are partly solid */
     bool first;     /* nothing of this tile was blended before: the state is zero; of models but express always */
     float reach;    /* of models but express: the largest radius */
+    bool thin;      /* some items are narrower than a sample */
 };
 /* Blends what was listed. SPL_E_LIMIT: more lie behind one another than a model but express may walk through. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);

@@ -198,6 +198,7 @@ struct counted {
     uint64_t items, entries;
     uint32_t most, low, high;
     float reach; // largest radius
+    bool thin;   // some are narrower than a sample
 };
 
 static struct counted sum_slots(struct pass *pass)
@@ -208,7 +209,7 @@ static struct counted sum_slots(struct pass *pass)
     struct counted sum = {.low = UINT32_MAX};
     uint32_t reach = 0;
     for (uint32_t i = 0; i < pass->slots; i++, words += SPL_SOFT_SLOT_WORDS) {
-        const uint32_t most = words[0] >> 4 & 0xfff;
+        const uint32_t most = words[0] >> 4 & 0x7ff;
         firsts[i] = (uint32_t)sum.items;
         sum.items += words[0] & 15;
         sum.entries += words[0] >> 16;
@@ -216,6 +217,7 @@ static struct counted sum_slots(struct pass *pass)
         sum.low = words[1] < sum.low ? words[1] : sum.low;
         sum.high = larger(sum.high, words[2]);
         reach = larger(reach, words[3]);
+        sum.thin |= (words[0] & SPL_SOFT_SLOT_THIN) != 0;
     }
     memcpy(&sum.reach, &reach, sizeof reach);
     return sum;
@@ -273,6 +275,7 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
                                                                          .opacity = soft->opacity,
                                                                          .reach = sum->reach,
                                                                          .border = soft->blend > 0,
+                                                                         .thin = sum->thin,
                                                                          .first = !pass->begun}, err);
     pass->begun = true;
     pass->tile->soft_drawn += items;
