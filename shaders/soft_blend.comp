@@ -60,6 +60,7 @@ void main()
         uint paint = imageLoad(item_texels, item + 4).x;
         uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
         float radius = THIN != 0u ? soft_radius(own, z) : own, whole = soft_share(own, radius);
+        float rounding = THIN != 0u ? soft_rounding(own, radius, x, y) : 0.5;
         precise float closer = 1.0 / (radius * radius);
         precise float ox = x - rx * z;
         precise float ox_squared = ox * ox, ox_along = ox * rx;
@@ -79,7 +80,7 @@ void main()
                 fall = mixed;
             }
             precise float thinned = THIN != 0u ? fall * whole : fall;
-            precise float scaled = clamp(thinned + 0.5, 0.0, 65536.0);
+            precise float scaled = clamp(thinned + rounding, 0.0, 65536.0);
             uint opacity = key <= solid[k] ? uint(int(scaled)) : 0u;
             uint weight = ((clear[k] >> 8) * opacity) >> 8;
             clear[k] -= weight;

@@ -20,6 +20,14 @@ float soft_share(float own, float drawn)
     return own < drawn ? share : 1.0;
 }
 
+/* What is added before its opacity becomes a whole number: many whose shares are less than one are as much together as
+ * they should be, since they are not all rounded alike. */
+float soft_rounding(float own, float drawn, float x, float y)
+{
+    uint mixed = (floatBitsToUint(x) * 2654435761u) ^ (floatBitsToUint(y) * 2246822519u);
+    return own < drawn ? float(mixed >> 8) * (1.0 / 16777216.0) : 0.5;
+}
+
 struct soft_ray {
     vec2 slope;     /* the ray goes through (slope, 1) */
     float inverse;  /* 1 / |(slope, 1)|^2 */

@@ -69,9 +69,14 @@ uint32_t soft_express(const struct spl_frame_params *params, const struct soft_i
         float soft = ((float)item->mark - 1) * (1.0f / 254);
         fall = (1 - sqrtf(1 - m)) * 65536 * (1 - soft) + fall * soft;
     }
-    if (own < radius)
+    float rounding = 0.5f;
+    if (own < radius) {
+        uint32_t bits[2];
+        memcpy(bits, &item->x, sizeof bits);
+        rounding = (float)((bits[0] * 2654435761u ^ bits[1] * 2246822519u) >> 8) / 16777216;
         fall *= own * own * closer;
-    return (uint32_t)fminf(fmaxf(fall + 0.5f, 0), 65536);
+    }
+    return (uint32_t)fminf(fmaxf(fall + rounding, 0), 65536);
 }
 
 struct sorted {
