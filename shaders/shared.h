@@ -359,9 +359,10 @@ struct spl_frame_params {
 };
 
 /* Soft transparency: spheres as items in the order of their ids, which are sorted by depth and listed by the tiles of
- * SPL_SOFT_TILE x SPL_SOFT_TILE_ROWS samples that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS words: x y z
- * of the centre in view space, the radius, colour | mark << 24, id. Behind all items lie their rectangles, a word each:
- * the first tile (row * columns + column) in 22 bits, columns less 1 and rows less 1 in 5 bits each. */
+ * SPL_SOFT_TILE x SPL_SOFT_TILE_ROWS samples that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS
+ * words: x y z of the centre in view space, the radius (which may be less than a sample: soft_radius()), colour | mark << 24,
+ * id. Behind all items lie their rectangles, a word each: the first tile (row * columns + column) in 22 bits, columns less 1
+ * and rows less 1 in 5 bits each. */
 #define SPL_SOFT_TILE 8 /* samples of a row of a tile */
 #define SPL_SOFT_TILE_ROWS 4
 #define SPL_SOFT_SAMPLES 4 /* of a column of a tile that an invocation blends */
@@ -375,8 +376,9 @@ struct spl_frame_params {
 #define SPL_SOFT_FARTHEST 0x7fffffff /* what SPL_NOTHING is among depths that compare as signed numbers */
 #define SPL_SOFT_STATE_WORDS 4 /* a sample: sums of red, green, blue times share, share covered; 0 = nothing */
 /* What an invocation counts: items | most entries of one << 4 | entries << 16, least and greatest depth, largest radius
- * (float bits). */
+ * as drawn (float bits). */
 #define SPL_SOFT_SLOT_WORDS 4
+#define SPL_SOFT_SLOT_THIN 0x8000u /* bit of a slot's first word: it has spheres narrower than a sample */
 #define SPL_SOFT_SLOT_SPLATS 4 /* discs of a slot; SPL_SOFT_SLOT_CELLS cells */
 #define SPL_SOFT_SLOT_CELLS 8
 /* Models with a density and layer keep these of a sample from window to window of depth, and those of an invocation
@@ -413,6 +415,7 @@ struct spl_soft_step {
     SPL_U32 first;         /* word of the lists where those of this dispatch start */
     SPL_F32 depth;         /* optical, through a sphere's centre: models with a density, and layer */
     SPL_F32 reach;         /* no sphere of the lists has a larger radius */
+    SPL_F32 thin;          /* optical depth of the thinnest over their share of the opacity and `depth`; models.h */
     SPL_F32 until;         /* view depth up to which these lists have all that begins before it */
     SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */

@@ -30,6 +30,7 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint MODEL = SPL_SOFT_BASE;
 layout(constant_id = 1) const uint BORDER = 0; /* some spheres are near the border: eq. 22 */
+layout(constant_id = 2) const uint THIN = 0;   /* some are thin: soft_share() */
 
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
 layout(std430, binding = SPL_STORAGE_COUNTS) buffer count_buffer { uint counts[]; };
@@ -48,6 +49,7 @@ struct soft_item {
     vec3 center, color;
     float radius, inverse_radius;
     float q, behind; /* see soft_distance(); in radii squared */
+    float share;     /* of the opacity of others */
     uint mark;
 };
 
@@ -58,7 +60,9 @@ soft_item load_item(uint entry, soft_ray ray)
     item.center.x = uintBitsToFloat(imageLoad(item_texels, at).x);
     item.center.y = uintBitsToFloat(imageLoad(item_texels, at + 1).x);
     item.center.z = uintBitsToFloat(imageLoad(item_texels, at + 2).x);
-    item.radius = uintBitsToFloat(imageLoad(item_texels, at + 3).x);
+    float own = uintBitsToFloat(imageLoad(item_texels, at + 3).x);
+    item.radius = THIN != 0u ? soft_radius(own, item.center.z) : own;
+    item.share = THIN != 0u ? soft_share(own, item.radius) : 1.0;
     uint paint = imageLoad(item_texels, at + 4).x;
     item.color = unpack_bytes(paint);
     item.mark = paint >> 24;
@@ -83,9 +87,11 @@ float depth_to(soft_item item, float edge, float zeta)
             whole = soft_base_part(item.q, edge);
     }
     float depth = job.depth * part;
+    if (THIN != 0u)
+        depth *= item.share * (job.thin + (1.0 - job.thin) * item.share);
     if (BORDER != 0u && item.mark < SPL_MARK_WHOLE) {
         float opacity = 1.0 - exp(-2.0 * job.depth * whole), soft = (float(item.mark) - 1.0) * (1.0 / 254.0);
-        float wanted = -log(max(1.0 - soft_modulate(opacity, item.q, soft), 1.0 / 1024.0));
+        float wanted = -log(max(1.0 - soft_modulate(opacity, item.q, soft) * item.share, 1.0 / 1024.0));
         depth = 0.5 * wanted * part / max(whole, 1e-12);
     }
     return depth;

@@ -1,15 +1,17 @@
 /* Blends the lists of tiles front to back, model express: a disc that faces the eye, whose opacity falls with the
  * distance d of the sample's ray to the centre (eq. 19; src/render/soft/models.h). All invocations of a tile walk the same
  * list, each for SPL_SOFT_SAMPLES of a column. In fixed point, so that every driver gives the same. Constants: 0: some
- * items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile. */
+ * items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile; 2: some are thin. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"
+#include "common/soft.glsl"
 #include "common/soft_step.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint BORDER = 0;
 layout(constant_id = 1) const uint FIRST = 0;
+layout(constant_id = 2) const uint THIN = 0;
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
@@ -55,10 +57,12 @@ void main()
         float x = uintBitsToFloat(imageLoad(item_texels, item).x);
         float y = uintBitsToFloat(imageLoad(item_texels, item + 1).x);
         int key = int(imageLoad(item_texels, item + 2).x);
-        float z = intBitsToFloat(key), radius = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
+        float z = intBitsToFloat(key), own = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
         uint paint = imageLoad(item_texels, item + 4).x;
         item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i) + 1).x); /* early: nothing waits for it */
         uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
+        float radius = THIN != 0u ? soft_radius(own, z) : own, whole = soft_share(own, radius);
+        float rounding = THIN != 0u ? soft_rounding(own, radius, x, y) : 0.5;
         precise float closer = 1.0 / (radius * radius);
         precise float ox = x - rx * z;
         precise float ox_squared = ox * ox, ox_along = ox * rx;
@@ -77,7 +81,8 @@ void main()
                 precise float mixed = linear * 65536.0 * (1.0 - soft) + fall * soft;
                 fall = mixed;
             }
-            precise float rounded = fall + 0.5;
+            precise float thinned = THIN != 0u ? fall * whole : fall;
+            precise float rounded = thinned + rounding;
             int opacity = key <= solid[k] ? clamp(int(rounded), 0, 65536) : 0;
             uint weight = (uint(clear[k] >> 8) * uint(opacity)) >> 8;
             clear[k] -= int(weight);

@@ -1,11 +1,12 @@
 /* Soft spheres of the draw list, within a window of depth: counted by slots (constant 0 = 0), by buckets of depth or of
  * slots (1), or gathered as items where their slot's start (2). A slot is what an invocation walks: neighbours by id, and
  * slots rise with the chunks' first ids (chunk.texture is a chunk's first slot), so that items are in the order of ids. A
- * sphere reaches at least the sample that its centre falls on. */
+ * sphere reaches at least the sample that its centre falls on: it is drawn so wide, and the thinner (soft_share()). */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"
 #include "common/octahedral.glsl"
+#include "common/soft.glsl"
 #include "common/soft_step.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -61,7 +62,7 @@ void main()
     uint first = run.first + id % SPL_LANES * SPL_SLOT_ITEMS, stride = 1u;
     uint slot = run.chunk.texture + first / SPL_SLOT_ITEMS;
 #endif
-    uint count = 0u, entries = 0u, most = 0u, nearest = SPL_NOTHING, farthest = 0u, largest = 0u;
+    uint count = 0u, entries = 0u, most = 0u, nearest = SPL_NOTHING, farthest = 0u, largest = 0u, thin = 0u;
     uint next = PHASE == 2u ? imageLoad(start_texels, int(known ? slot : 0u)).x : 0u;
     uint columns = job.columns;
     for (uint k = 0u;;) {
@@ -69,7 +70,7 @@ void main()
         uint mark = MARKED != 0u ? mark_at(run.chunk, i) : SPL_MARK_WHOLE;
         if (known && has_splat(run, i) && mark != 0u) {
             vec3 p = load_splat(run.chunk, i, true).position;
-            precise float radius = max(load_radius(run.chunk, i), frame.low_pass * p.z * frame.inverse_fx);
+            float own_radius = load_radius(run.chunk, i), radius = soft_radius(own_radius, p.z);
             vec2 x = sphere_extent(p.x, p.z, radius, frame.fx, frame.cx);
             vec2 y = sphere_extent(p.y, p.z, radius, frame.fy, frame.cy);
             vec2 low = max(vec2(x.x, y.x), run.low), high = min(vec2(x.y, y.y), run.high);
@@ -87,7 +88,7 @@ void main()
                     items[at] = floatBitsToUint(p.x);
                     items[at + 1u] = floatBitsToUint(p.y);
                     items[at + 2u] = key;
-                    items[at + 3u] = floatBitsToUint(radius);
+                    items[at + 3u] = floatBitsToUint(own_radius);
                     items[at + 4u] = color.x | color.y << 8 | color.z << 16 | mark << 24;
                     items[at + 5u] = run.chunk.first_id + item_of(i);
                     items[job.rects + next] = from.y * columns + from.x | span.x << SPL_SOFT_RECT_COLUMNS |
@@ -108,6 +109,7 @@ void main()
                 count++;
                 entries += own;
                 most = max(most, own);
+                thin = own_radius < radius ? SPL_SOFT_SLOT_THIN : thin;
                 nearest = min(nearest, key);
                 farthest = max(farthest, key);
                 largest = max(largest, floatBitsToUint(radius));
@@ -117,7 +119,7 @@ void main()
             break;
     }
     if (PHASE == 0u && known) {
-        slots[SPL_SOFT_SLOT_WORDS * slot] = count | most << 4 | entries << 16;
+        slots[SPL_SOFT_SLOT_WORDS * slot] = count | most << 4 | thin | entries << 16;
         slots[SPL_SOFT_SLOT_WORDS * slot + 1u] = nearest;
         slots[SPL_SOFT_SLOT_WORDS * slot + 2u] = farthest;
         slots[SPL_SOFT_SLOT_WORDS * slot + 3u] = largest;

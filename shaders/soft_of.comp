@@ -3,7 +3,7 @@
  * with a density are near to (SPL_SOFT_FIND_FIRST); the one with which less than half passes in express
  * (SPL_SOFT_FIND_MEDIAN); or with which what is hidden is more than job.low in base, concentric or layer
  * (SPL_SOFT_FIND_DENSE + SPL_SOFT_BASE and so on), where what a sphere hides is counted as the ray comes by its centre, up
- * to the solid. Constant 1: some items are partly solid (eq. 22). Spheres whose centres lie behind the solid are none.
+ * to the solid. Constants 1, 2: some items are partly solid (eq. 22), or thin. Spheres whose centres lie behind the solid are none.
  * What was hidden so far is kept, so that lists may be walked in parts and in windows of depth; what is nearer than key
  * job.high is left out, for windows that overlap. */
 #version 450
@@ -15,6 +15,7 @@
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint FIND = SPL_SOFT_FIND_FIRST;
 layout(constant_id = 1) const uint BORDER = 0;
+layout(constant_id = 2) const uint THIN = 0;
 
 layout(std430, binding = SPL_STORAGE_FOUND) buffer found_buffer { uint found[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
@@ -27,6 +28,7 @@ const bool LAYER = FIND == SPL_SOFT_FIND_DENSE + SPL_SOFT_LAYER;
 /* A sphere as a ray meets it. */
 struct met_item {
     float z, radius, soft;
+    float share, rounding; /* of the opacity of others; what is added to it: soft_rounding() */
     float q, behind; /* see soft_distance(); in radii squared, and may be a little less than 0 */
 };
 
@@ -41,8 +43,9 @@ uint express(met_item item)
         precise float mixed = linear * 65536.0 * (1.0 - item.soft) + fall * item.soft;
         fall = mixed;
     }
-    precise float scaled = clamp(fall + 0.5, 0.0, 65536.0);
-    return uint(int(scaled));
+    precise float thinned = THIN != 0u ? fall * item.share : fall;
+    precise float rounded = thinned + item.rounding;
+    return uint(clamp(int(rounded), 0, 65536));
 }
 
 float part_of(float shells, float q, float zeta)
@@ -60,9 +63,11 @@ float depth_of(met_item item, soft_ray ray, float until)
     float samples = frame.fx * item.radius / max(item.z, 1e-9);
     float shells = floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
     float part = part_of(shells, q, to) - part_of(shells, q, from), depth = job.depth * part;
+    if (THIN != 0u)
+        depth *= item.share * (job.thin + (1.0 - job.thin) * item.share);
     if (BORDER != 0u && item.soft < 1.0) {
         float whole = part_of(shells, q, edge), opacity = 1.0 - exp(-2.0 * job.depth * whole);
-        float wanted = -log(max(1.0 - soft_modulate(opacity, q, item.soft), 1.0 / 1024.0));
+        float wanted = -log(max(1.0 - soft_modulate(opacity, q, item.soft) * item.share, 1.0 / 1024.0));
         depth = 0.5 * wanted * part / max(whole, 1e-12);
     }
     return depth;
@@ -118,9 +123,12 @@ void main()
         met_item item;
         key = imageLoad(item_texels, item_at + 2).x;
         item.z = uintBitsToFloat(key);
-        item.radius = uintBitsToFloat(imageLoad(item_texels, item_at + 3).x);
+        float given = uintBitsToFloat(imageLoad(item_texels, item_at + 3).x);
         vec2 center = vec2(uintBitsToFloat(imageLoad(item_texels, item_at).x),
                            uintBitsToFloat(imageLoad(item_texels, item_at + 1).x));
+        item.radius = THIN != 0u ? soft_radius(given, item.z) : given;
+        item.share = THIN != 0u ? soft_share(given, item.radius) : 1.0;
+        item.rounding = THIN != 0u ? soft_rounding(given, item.radius, center.x, center.y) : 0.5;
         precise float closer = 1.0 / (item.radius * item.radius);
         precise vec2 off = center - slope * item.z;
         precise float along = off.x * slope.x + off.y * slope.y;

@@ -6,6 +6,28 @@
 
 #include "common/frame.glsl"
 
+/* What is narrower than a sample is drawn as wide as one, and hides as much of it as it did: opacity times area stays. */
+float soft_radius(float own, float z)
+{
+    precise float least = frame.low_pass * z * frame.inverse_fx;
+    return max(own, least);
+}
+
+/* The share of its opacity that is left. */
+float soft_share(float own, float drawn)
+{
+    precise float share = own * own * (1.0 / (drawn * drawn));
+    return own < drawn ? share : 1.0;
+}
+
+/* What is added before its opacity becomes a whole number: many whose shares are less than one are as much together as
+ * they should be, since they are not all rounded alike. */
+float soft_rounding(float own, float drawn, float x, float y)
+{
+    uint mixed = (floatBitsToUint(x) * 2654435761u) ^ (floatBitsToUint(y) * 2246822519u);
+    return own < drawn ? float(mixed >> 8) * (1.0 / 16777216.0) : 0.5;
+}
+
 struct soft_ray {
     vec2 slope;     /* the ray goes through (slope, 1) */
     float inverse;  /* 1 / |(slope, 1)|^2 */

@@ -60,7 +60,8 @@ struct spl_gpu {
     uint64_t memory;             /* bytes of live buffers */
     uint32_t buffers, kernels;   /* live */
     uint64_t tickets;            /* submissions so far; a ticket is the value after its submit */
-    bool recording, lost, inject_loss;
+    bool recording, lost;
+    uint32_t inject_loss; /* with the so-manieth submit; 0 = never */
     bool settled, stuck;         /* waited for at the end; never came to one */
 };
 

@@ -278,7 +278,7 @@ void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot)
 /* What was recorded; it may have been lost half-way. */
 static int submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err)
 {
-    gpu->lost |= gpu->inject_loss;
+    gpu->lost |= gpu->inject_loss && !--gpu->inject_loss;
     if (!takes(gpu))
         return lost(gpu, err);
     int code = gpu->backend->submit(gpu, gpu->tickets + 1, err);
@@ -333,7 +333,7 @@ uint64_t spl_gpu_get_timestamp_ns(struct spl_gpu *gpu, uint32_t slot)
     return gpu->timestamps_ns[slot];
 }
 
-void spl_gpu_inject_loss(struct spl_gpu *gpu)
+void spl_gpu_inject_loss(struct spl_gpu *gpu, uint32_t submits)
 {
-    gpu->inject_loss = true;
+    gpu->inject_loss = submits + 1;
 }

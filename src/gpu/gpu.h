@@ -113,7 +113,7 @@ int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, str
  * written. */
 uint64_t spl_gpu_get_timestamp_ns(struct spl_gpu *gpu, uint32_t slot);
 
-/* Fault injection for tests: the next submit marks the device lost. */
-void spl_gpu_inject_loss(struct spl_gpu *gpu);
+/* Fault injection for tests: after so many submits the next one marks the device lost. */
+void spl_gpu_inject_loss(struct spl_gpu *gpu, uint32_t submits);
 
 #endif

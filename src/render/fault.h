@@ -6,6 +6,8 @@
 
 /* The next submit reports a lost device. */
 void spl_renderer_inject_loss(struct spl_renderer *renderer);
+/* The one after so many of them does: in the middle of a frame that has several. */
+void spl_renderer_inject_loss_after(struct spl_renderer *renderer, uint32_t submits);
 
 /* The dataset in whose page, on its way to the device, that was lost; NULL: in none. To be compared: it may have gone
  * since. */

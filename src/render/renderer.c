@@ -199,5 +199,10 @@ const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_rendere
 
 void spl_renderer_inject_loss(struct spl_renderer *renderer)
 {
-    spl_gpu_inject_loss(renderer->gpu);
+    spl_gpu_inject_loss(renderer->gpu, 0);
+}
+
+void spl_renderer_inject_loss_after(struct spl_renderer *renderer, uint32_t submits)
+{
+    spl_gpu_inject_loss(renderer->gpu, submits);
 }

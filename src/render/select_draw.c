@@ -85,9 +85,10 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
-    double radius = spl_walk_largest_radius(chunk) * scale;
+    double radius = spl_walk_largest_radius(chunk) * scale, sphere = radius / radius_share;
     box = spl_view_box_grown(box, radius);
-    if (!spl_view_box_visible(camera, &box, w->params->low_pass))
+    const struct spl_view_box spheres = spl_view_box_grown(centers, sphere);
+    if (!spl_view_box_visible(camera, w->params->marks ? &spheres : &box, w->params->low_pass))
         return SPL_OK;
     spl_walk_judge(w, chunk, &centers);
     if (!w->judged.solid && (w->covered || !w->params->draws_soft))
@@ -111,9 +112,12 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     out.texture_scale = (float)scale;
     w->list->drawn[SPL_CHUNK_DISCS] += count;
     int rc = spl_walk_list_marks(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &out, err);
+    struct spl_draw_chunk soft = out; // a cluster hides as much as its parts: it has their area
+    soft.radius_min = (float)(chunk->radius_min * scale / radius_share);
+    soft.radius_step = (float)(chunk->radius_step * scale / radius_share);
     if (!rc)
-        rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &out, &box,
-                                radius, err);
+        rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &soft, &spheres,
+                                sphere, err);
     if (rc || !w->judged.solid)
         return rc;
     out.texture = drawn_texture(w, chunk, page, reach.near);

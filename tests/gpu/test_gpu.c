@@ -374,7 +374,7 @@ static void loss_is_survived(void **state)
         assert_int_equal(spl_gpu_submit(gpu, &before, NULL), 0);
         assert_int_equal(spl_gpu_begin(gpu, NULL), 0);
         spl_gpu_fill(gpu, work, 0, 1 << 20, 2);
-        spl_gpu_inject_loss(gpu);
+        spl_gpu_inject_loss(gpu, 0);
         assert_int_equal(spl_gpu_submit(gpu, &after, &err), SPL_E_DEVICE_LOST);
         assert_non_null(strstr(err.message, spl_gpu_get_device(gpu)->name));
         assert_int_equal(spl_gpu_wait(gpu, before, SPL_NEVER, NULL), SPL_E_DEVICE_LOST);

@@ -12,11 +12,9 @@
 
 #include "base/clock.h"
 #include "gpu/frames.h"
-#include "dataset/chunk.h"
 #include "render/fault.h"
 #include "shared.h"
-#include "support/naive_select.h"
-#include "support/soft_rays.h"
+#include "support/soft_scene.h"
 
 /* What lies on one side of a plane through the origin is soft. */
 static void soften(struct spl_view *view, double nx, double from, double opacity)
@@ -158,55 +156,17 @@ static void soft_lies_over_the_solid(void **state)
     done(dataset);
 }
 
-static int by_depth(const void *a, const void *b)
-{
-    double x = ((const struct soft_sphere *)a)->center[2], y = ((const struct soft_sphere *)b)->center[2];
-    return (x > y) - (x < y);
-}
-
-/* Every splat that the view draws, as a sphere in view space, by depth. */
-static struct soft_sphere *spheres_of(const struct spl_dataset *dataset, const struct spl_view *view, size_t *count)
-{
-    const struct spl_camera *camera = &view->camera;
-    size_t chunks, made = 0, bytes;
-    uint64_t all;
-    struct naive_chunk *drawn =
-        naive_select(&(struct naive_options){.dataset = dataset, .camera = camera, .lod = view->lod}, &chunks);
-    struct soft_sphere *spheres = calloc(2 * spl_dataset_get_info(dataset)->leaf_splats + 1, sizeof *spheres);
-    assert_true(drawn && spheres);
-    for (const struct naive_chunk *c = drawn; c < drawn + chunks; c++)
-        for (uint32_t index = 0; index < c->count; index++) {
-            const struct spl_node *node = &spl_dataset_get_nodes(dataset, &all)[c->node];
-            struct spl_chunk chunk = spl_dataset_get_chunks(dataset, &all)[c->chunk];
-            struct soft_sphere *s = &spheres[made++];
-            struct spl_splat splat;
-            chunk.radius_min = (float)(chunk.radius_min * c->scale);
-            chunk.radius_step = (float)(chunk.radius_step * c->scale);
-            spl_chunk_decode(&chunk, spl_dataset_get_page(dataset, node->page, &bytes), index, &splat);
-            *s = (struct soft_sphere){.soft = 1, .color = {splat.color[0], splat.color[1], splat.color[2]}};
-            for (int i = 0; i < 3; i++)
-                for (int a = 0; a < 3; a++)
-                    s->center[i] += camera->rotation[3 * i + a] *
-                                    (node->origin[a] + (double)splat.position[a] - camera->eye[a]);
-            s->radius = fmax((double)splat.radius, SPL_LOW_PASS * s->center[2] / camera->fx);
-        }
-    free(drawn);
-    qsort(spheres, made, sizeof *spheres, by_depth);
-    *count = made;
-    return spheres;
-}
-
 /* Levels by which a frame of black background is off at most. */
 static double off_by(const struct spl_frame *frame, const struct spl_view *view, const struct soft_sphere *spheres,
                      size_t count)
 {
     const struct spl_camera *c = &view->camera;
-    const struct soft_look look = {view->soft.model, view->soft.opacity, c->fx, view->disc.margin, false};
+    const struct soft_look look = soft_look_of(view);
     const uint8_t *got = frame->images[SPL_LAYER_COLOR].pixels;
-    double most = 0;
+    double most = 0, ray[2];
     for (uint32_t y = 0; y < c->height; y++)
         for (uint32_t x = 0; x < c->width; x++) {
-            const double ray[2] = {(x + 0.5 - c->cx) / c->fx, (y + 0.5 - c->cy) / c->fy};
+            soft_ray_of(c, x, y, ray);
             struct soft_seen seen = soft_see(&look, spheres, count, ray, c->near, c->far);
             for (uint32_t k = 0; k < 3; k++)
                 most = fmax(most, fabs(got[4 * (y * c->width + x) + k] - seen.color[k]));
@@ -229,7 +189,7 @@ static void models_match_the_reference(void **state)
     view.lod = 0;
     view.layers = 1u << SPL_LAYER_COLOR;
     soften(&view, 1, -100, 0.3);
-    struct soft_sphere *spheres = spheres_of(dataset, &view, &count);
+    struct soft_sphere *spheres = soft_spheres_of(dataset, &view, -1, &count);
     if (spl_renderer_create(&options, &other, NULL) == SPL_OK)
         assert_int_equal(spl_renderer_add(other, dataset, NULL), SPL_OK);
     for (size_t m = 0; m < sizeof models / sizeof *models; m++) {
@@ -282,6 +242,39 @@ static void crowds_are_cut_or_told(void **state)
     assert_int_equal(spl_renderer_render(renderer, dataset, &view, &cut, &err), SPL_E_LIMIT);
     assert_string_equal(err.field, "soft_model");
     spl_renderer_set_soft_items(renderer, 0);
+    done(dataset);
+}
+
+/* What hides how much of the image, with coarser levels as with the finest, and on a few samples as on many. */
+static void levels_hide_as_much(void **state)
+{
+    (void)state;
+    enum { count = 20000 };
+    struct make_splat *splats = random_splats(count, origin, 0.02);
+    for (size_t i = 0; i < count; i++)
+        splats[i].radius = 0.02f;
+    struct spl_dataset *dataset = make_dataset_levels(splats, count, 2);
+    double fine = 0;
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int i = 0; i < 12; i++) {
+        const double lods[] = {0, 1, 20}, size = i / 6 ? 1 : 8;
+        struct spl_view view = looking(origin, 3, (uint32_t)(24 * size), (uint32_t)(18 * size));
+        view.lod = lods[i % 3];
+        view.layers = 1u << SPL_LAYER_COVERAGE;
+        soften(&view, 1, -100, 0.1);
+        view.soft.model = i / 3 % 2 ? SPL_SOFT_MODEL_BASE : SPL_SOFT_MODEL_EXPRESS;
+        struct spl_frame frame = draw(renderer, dataset, &view);
+        const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
+        double sum = 0;
+        for (size_t k = 0; k < (size_t)view.camera.width * view.camera.height; k++)
+            sum += (double)coverage[k] / view.camera.width / view.camera.height;
+        fine = i ? fine : sum;
+        print_message("size %g, lod %g: %zu spheres, %.4f of the image is hidden\n", size, view.lod,
+                      (size_t)frame.stats.soft_drawn, sum);
+        assert_true(fabs(sum / fine - 1) < 0.05); /* chance has its part in 639 of them */
+        spl_frame_finish(&frame);
+    }
+    free(splats);
     done(dataset);
 }
 
@@ -346,23 +339,41 @@ static void nobody_waits_for_it(void **state)
     done(dataset);
 }
 
+/* In whichever of the parts that a frame is run in: it is told, never drawn in part, and the device's next life draws the
+ * same. */
 static void loss_is_told(void **state)
 {
     (void)state;
     struct spl_renderer_options options = {.size = sizeof options, .device = device};
-    struct spl_renderer *mortal;
-    assert_int_equal(spl_renderer_create(&options, &mortal, NULL), SPL_OK);
-    struct spl_dataset *dataset = random_cube(5000, origin, 0.03);
-    assert_int_equal(spl_renderer_add(mortal, dataset, NULL), SPL_OK);
-    struct spl_view view = looking(origin, 3, 203, 151);
-    struct spl_frame frame;
+    struct spl_dataset *dataset = random_cube(600, origin, 0.05);
+    struct spl_view view = looking(origin, 3, 83, 61);
+    uint32_t parts = 0;
     soften(&view, 1, -100, 0.3);
-    frame = draw(mortal, dataset, &view);
-    spl_frame_finish(&frame);
-    spl_renderer_inject_loss(mortal); /* the first part to be run is the counting of what is soft */
-    assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_E_DEVICE_LOST);
-    assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_E_DEVICE_LOST);
-    spl_renderer_destroy(mortal);
+    view.soft.model = SPL_SOFT_MODEL_BASE;
+    struct spl_frame wanted = draw(renderer, dataset, &view);
+    for (bool lost = true; lost; parts++) {
+        struct spl_renderer *mortal;
+        struct spl_frame frame;
+        assert_int_equal(spl_renderer_create(&options, &mortal, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_add(mortal, dataset, NULL), SPL_OK);
+        frame = draw(mortal, dataset, &view);
+        assert_same(&wanted, &frame, "before the loss");
+        spl_frame_finish(&frame);
+        spl_renderer_inject_loss_after(mortal, parts);
+        int rc = spl_renderer_render(mortal, dataset, &view, &frame, NULL);
+        lost = rc == SPL_E_DEVICE_LOST;
+        if (lost) {
+            assert_int_equal(spl_renderer_render(mortal, dataset, &view, &frame, NULL), SPL_E_DEVICE_LOST);
+        } else {
+            assert_int_equal(rc, SPL_OK);
+            assert_same(&wanted, &frame, "not lost");
+            spl_frame_finish(&frame);
+        }
+        spl_renderer_destroy(mortal);
+    }
+    print_message("lost in %u parts of a frame\n", parts - 1);
+    assert_true(parts > 3); /* counts, lists, runs of the walk, and what is read back */
+    spl_frame_finish(&wanted);
     done(dataset);
 }
 
@@ -371,7 +382,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
         frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
-        frames_test(loss_is_told), frames_test(crowds_are_cut_or_told),
+        frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }

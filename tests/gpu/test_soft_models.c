@@ -72,6 +72,7 @@ struct scene {
     size_t count;
     float solid[width * height];
     bool border;
+    bool thin; /* some are narrower than a sample */
     bool crowded; /* one tile, whose list has its first sphere many times */
     bool alone;   /* one tile */
     int windows;  /* of depth, in which it is drawn; 0 = one */
@@ -118,8 +119,10 @@ static void fill(const struct scene *s, double from, double to)
 {
     struct spl_frame_params frame = {.fx = (float)focal, .fy = (float)focal, .cx = width / 2.0f, .cy = height / 2.0f,
                                      .inverse_fx = (float)(1 / focal), .inverse_fy = (float)(1 / focal), .near = 0.125f,
-                                     .far = 100, .width = width, .height = height, .margin = (float)s->look.margin};
-    struct spl_soft_step step = {.count = tiles, .depth = (float)spl_soft_depth(s->look.opacity)};
+                                     .far = 100, .width = width, .height = height, .margin = (float)s->look.margin,
+                                     .low_pass = s->thin ? SPL_LOW_PASS : 0};
+    struct spl_soft_step step = {.count = tiles, .depth = (float)spl_soft_depth(s->look.opacity),
+                                 .thin = (float)spl_soft_thin(s->look.opacity)};
     uint32_t *items = spl_gpu_buffer_map(buffers[SPL_RESOURCE_ITEMS]);
     uint32_t *entries = spl_gpu_buffer_map(buffers[SPL_RESOURCE_SORT_FROM]);
     uint32_t *lists = spl_gpu_buffer_map(buffers[SPL_RESOURCE_LISTS]), entry = 0;
@@ -132,7 +135,7 @@ static void fill(const struct scene *s, double from, double to)
             items[6 * i + (uint32_t)c] = bits(p->center[c]);
             paint |= (uint32_t)p->color[c] << 8 * c;
         }
-        items[6 * i + 3] = bits(p->radius);
+        items[6 * i + 3] = bits(p->radius * sqrt(1 - p->thin));
         items[6 * i + 4] = paint;
         items[6 * i + 5] = i;
         step.reach = fmaxf(step.reach, (float)p->radius);
@@ -200,10 +203,10 @@ static int draw(const struct scene *s)
     static const uint32_t models[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
                                       [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
                                       [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
-    const uint32_t constants[] = {models[s->look.model], s->border};
+    const uint32_t constants[] = {models[s->look.model], s->border, s->thin};
     struct spl_gpu_kernel *kernel;
     int times = 0;
-    assert_int_equal(spl_gpu_kernel_create(gpu, "soft_base", constants, 2, &kernel, NULL), 0);
+    assert_int_equal(spl_gpu_kernel_create(gpu, "soft_base", constants, 3, &kernel, NULL), 0);
     for (int i = 0; i < s->windows; i++) /* of 1.5 to 6 */
         times += draw_window(s, kernel, i ? 1.5 + 4.5 * i / s->windows : 0,
                              i + 1 < s->windows ? 1.5 + 4.5 * (i + 1) / s->windows : 1e9);
@@ -296,6 +299,25 @@ static void borders_match(void **state)
         for (size_t i = 0; i < s.count; i += 5)
             s.spheres[i].soft = 1;
         matches(&s, "border");
+    }
+}
+
+/* Narrower than a sample: as wide as one, and so much thinner. */
+static void narrow_ones_are_thin(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 4; m++) {
+        struct scene s = make_scene(dense[m % 2], 0.7, 150);
+        s.thin = true;
+        s.border = m > 1;
+        for (size_t i = 0; i < s.count; i++) {
+            struct soft_sphere *p = &s.spheres[i];
+            double own = (double)(float)(p->center[2] / focal * between(0.05, 1.5));
+            p->radius = fmax(own, (double)SPL_LOW_PASS * p->center[2] / focal);
+            p->thin = 1 - own * own / (p->radius * p->radius);
+            p->soft = s.border ? (double)(i % 5 * 63) / 254 : 1;
+        }
+        matches(&s, "thin");
     }
 }
 
@@ -410,6 +432,7 @@ int main(void)
         cmocka_unit_test(walls_cut),
         cmocka_unit_test(eyes_within_and_equal_depths),
         cmocka_unit_test(borders_match),
+        cmocka_unit_test(narrow_ones_are_thin),
         cmocka_unit_test(long_walks_go_on),
         cmocka_unit_test(layers_match),
         cmocka_unit_test(lists_longer_than_a_run_are_walked),

@@ -164,8 +164,8 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
     }
     spl_gpu_barrier(gpu);
     if (spl_soft_sort(&order, count, low, high, &err) || spl_soft_list(&order, count, most, &err) ||
-        spl_soft_blend(&order, &(struct spl_soft_blend){.opacity = s->opacity, .border = s->border, .first = begins},
-                       &err))
+        spl_soft_blend(&order, &(struct spl_soft_blend){.opacity = s->opacity, .border = s->border, .first = begins,
+                                                        .thin = s->params.low_pass > 0}, &err))
         fail_msg("%s", err.message);
     spl_gpu_copy(gpu, memory.buffers[SPL_SOFT_STATE], 0, down, 0, state_bytes);
     if (spl_gpu_submit(gpu, &ticket, &err) || spl_gpu_wait(gpu, ticket, spl_now_ns() + 60 * SPL_NS_PER_S, &err))
@@ -257,6 +257,23 @@ static void sizes_of_all_kinds(void **state)
     }
     assert_true(matches(&s));
     free_scene(&s);
+}
+
+/* They reach the samples next to their centres, and have the share of the opacity that their area has. */
+static void narrow_ones_are_thin(void **state)
+{
+    (void)state;
+    for (int border = 0; border < 2; border++) {
+        struct scene s = scene(203, 97, 20000);
+        s.params.low_pass = SPL_LOW_PASS;
+        s.border = border;
+        for (uint32_t i = 0; i < s.count; i++) {
+            s.items[i].radius = (float)(uniform() * uniform() * 1.4 / 150) * s.items[i].z;
+            s.items[i].mark = (uint8_t)(border ? 1 + i % 255 : SPL_MARK_WHOLE);
+        }
+        assert_true(matches(&s));
+        free_scene(&s);
+    }
 }
 
 static void opacities(void **state)
@@ -352,6 +369,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(many_on_a_sample),     cmocka_unit_test(sizes_of_all_kinds),
         cmocka_unit_test(opacities),            cmocka_unit_test(solids_hide),
         cmocka_unit_test(windows_change_no_bit), cmocka_unit_test(crowds_are_told),
+        cmocka_unit_test(narrow_ones_are_thin),
     };
     return cmocka_run_group_tests(tests, open_all, close_all);
 }

@@ -76,6 +76,17 @@ def test_a_budget_leaves_it_alone():
         assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0, "of": "solid"}
 
 
+def test_a_device_that_is_lost_among_soft_spheres():
+    with Daemon(REAL, "--cache", "0", SPLATD_INJECT_LOSS_AFTER="1") as d:
+        query = f"{VIEW}?width=64&height=48&soft=plane:0,0,0,0,0,1>0&format=png".replace(">", "%3E")
+        whole, lost = d.ask(query), d.ask(query)  # the first part that is run is the counting of what is soft
+        assert whole.status == 200 and lost.status == 503, (whole.status, lost.status)
+        assert lost.json()["type"] == "urn:splatd:error:device-lost" and lost.headers["Retry-After"], lost.headers
+        again = d.ask(query)
+        assert again.status == 200 and again.body == whole.body
+        assert d.status()["counters"]["device_losses"] == 1
+
+
 def test_a_dataset_says_what_may_be_soft():
     with Daemon(REAL) as d:
         info = d.ask("/v1/datasets/wall").json()

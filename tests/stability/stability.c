@@ -50,6 +50,7 @@ static const struct {
 } themes[] = {
     {"places", check_places}, {"walls", check_walls},   {"far-away", check_far_away}, {"levels", check_levels},
     {"sums", check_sums},     {"motion", check_motion}, {"layers", check_layers},     {"maps", check_maps},
+    {"soft", check_soft},
 };
 
 static bool is_named(const char *const *names, const char *name)

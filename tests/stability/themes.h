@@ -11,6 +11,7 @@ void check_levels(struct suite *suite);   /* finer is not worse than coarser */
 void check_sums(struct suite *suite);     /* however many splats fall on a pixel, its colour is theirs */
 void check_motion(struct suite *suite);   /* no pop along a dolly, a turn, an approach */
 void check_layers(struct suite *suite);   /* finite, in range, layers agree with each other; equal bytes on repeat */
+void check_soft(struct suite *suite);     /* soft spheres are those of all rays in doubles, however many and wherever */
 void check_maps(struct suite *suite);     /* with maps images lie where they did, silhouettes are finer, nothing pops */
 void check_drivers(struct suite *suite);  /* suite->renderer against suite->other */
 

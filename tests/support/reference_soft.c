@@ -21,12 +21,18 @@ static void extent(double p, double z, double radius, double f, double c, uint32
     *last = (int)fmax(high, -1);
 }
 
+static float drawn_radius(const struct spl_frame_params *params, const struct soft_item *item)
+{
+    return fmaxf(item->radius, params->low_pass * item->z * params->inverse_fx);
+}
+
 uint32_t soft_rectangles(const struct spl_frame_params *params, const struct soft_item *item, uint32_t *rects)
 {
     int x0, x1, y0, y1;
     uint32_t count = 0, columns = (params->width + wide - 1) / wide;
-    extent(item->x, item->z, item->radius, params->fx, params->cx, params->width, &x0, &x1);
-    extent(item->y, item->z, item->radius, params->fy, params->cy, params->height, &y0, &y1);
+    const float radius = drawn_radius(params, item);
+    extent(item->x, item->z, radius, params->fx, params->cx, params->width, &x0, &x1);
+    extent(item->y, item->z, radius, params->fy, params->cy, params->height, &y0, &y1);
     if (x0 > x1 || y0 > y1)
         return 0;
     for (int row = y0 / high; row <= y1 / high; row += span)
@@ -46,7 +52,8 @@ uint32_t soft_express(const struct spl_frame_params *params, const struct soft_i
 {
     float rx = ((float)(x + (int)params->tile_x) + (0.5f - params->cx)) * params->inverse_fx;
     float ry = ((float)(y + (int)params->tile_y) + (0.5f - params->cy)) * params->inverse_fy;
-    float inverse = 1 / (1 + rx * rx + ry * ry), closer = 1 / (item->radius * item->radius);
+    float own = item->radius, radius = drawn_radius(params, item);
+    float inverse = 1 / (1 + rx * rx + ry * ry), closer = 1 / (radius * radius);
     float ox = item->x - rx * item->z, oy = item->y - ry * item->z, along = ox * rx + oy * ry;
     float share = (ox * ox + oy * oy - along * along * inverse) * closer, m = fmaxf(1 - share, 0);
     static double known = -1; /* a fit takes long */
@@ -62,7 +69,14 @@ uint32_t soft_express(const struct spl_frame_params *params, const struct soft_i
         float soft = ((float)item->mark - 1) * (1.0f / 254);
         fall = (1 - sqrtf(1 - m)) * 65536 * (1 - soft) + fall * soft;
     }
-    return (uint32_t)fminf(fmaxf(fall + 0.5f, 0), 65536);
+    float rounding = 0.5f;
+    if (own < radius) {
+        uint32_t bits[2];
+        memcpy(bits, &item->x, sizeof bits);
+        rounding = (float)((bits[0] * 2654435761u ^ bits[1] * 2246822519u) >> 8) / 16777216;
+        fall *= own * own * closer;
+    }
+    return (uint32_t)fminf(fmaxf(fall + rounding, 0), 65536);
 }
 
 struct sorted {
@@ -87,8 +101,9 @@ void soft_reference(const struct spl_frame_params *params, const struct soft_ite
     for (uint32_t i = 0; order && i < count; i++) {
         const struct soft_item *item = &items[order[i].item];
         int x0, x1, y0, y1;
-        extent(item->x, item->z, item->radius, params->fx, params->cx, params->width, &x0, &x1);
-        extent(item->y, item->z, item->radius, params->fy, params->cy, params->height, &y0, &y1);
+        const float radius = drawn_radius(params, item);
+        extent(item->x, item->z, radius, params->fx, params->cx, params->width, &x0, &x1);
+        extent(item->y, item->z, radius, params->fy, params->cy, params->height, &y0, &y1);
         for (int y = y0; y <= y1; y++)
             for (int x = x0; x <= x1; x++) {
                 size_t at = (size_t)y * params->width + (size_t)x;

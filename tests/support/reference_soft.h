@@ -9,7 +9,7 @@
 #include "shared.h"
 
 struct soft_item {
-    float x, y, z, radius; /* view space */
+    float x, y, z, radius; /* view space; drawn no narrower than params->low_pass samples, and the thinner */
     uint8_t color[3], mark;
 };
 

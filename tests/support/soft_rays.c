@@ -46,11 +46,13 @@ static double modulated(double opacity, double delta, double soft)
 
 static double express(const struct soft_look *look, double delta)
 {
-    float f[SPL_SOFT_FALLOFF];
+    static float f[SPL_SOFT_FALLOFF];
+    static double known = -1; /* a fit takes long */
     double m = 1 - delta * delta, sum = 0;
     if (look->eq19)
         return look->opacity * (cos(M_PI * delta) + 1) / 2;
-    spl_soft_falloff(look->opacity, f);
+    if (known != look->opacity)
+        spl_soft_falloff(known = look->opacity, f);
     for (int i = SPL_SOFT_FALLOFF - 1; i >= 0; i--)
         sum = sum * m + (double)f[i];
     return fmin(fmax(m * sum, 0), 1);
@@ -70,7 +72,8 @@ static struct soft_seen see_express(const struct soft_look *look, const struct s
     for (size_t i = 0; i < count; i++) {
         double middle, delta, z = spheres[i].center[2];
         if (z >= near && z <= far && meets(&spheres[i], ray, &middle, &delta))
-            blend(&seen, modulated(express(look, delta), delta, spheres[i].soft), spheres[i].color);
+            blend(&seen, modulated(express(look, delta), delta, spheres[i].soft) * (1 - spheres[i].thin),
+                  spheres[i].color);
     }
     return seen;
 }
@@ -137,7 +140,9 @@ static size_t meet(const struct soft_look *look, const struct soft_sphere *spher
         m.half = s->radius * sqrt(1 - m.delta * m.delta);
         m.shells = spl_soft_shells(look->focal * s->radius / fmax(s->center[2], 1e-9));
         double own = 2 * spl_soft_depth(look->opacity) * part(look, &m, m.half / m.radius);
-        m.depth = s->soft < 1 ? -log1p(-fmin(modulated(-expm1(-own), m.delta, s->soft), 1 - 1.0 / 1024)) : own;
+        double share = 1 - s->thin, a = share < 1 ? spl_soft_thin(look->opacity) : 1;
+        double opacity = modulated(-expm1(-own), m.delta, s->soft) * share;
+        m.depth = s->soft < 1 ? -log1p(-fmin(opacity, 1 - 1.0 / 1024)) : own * share * (a + (1 - a) * share);
         met[found++] = m;
     }
     return found;

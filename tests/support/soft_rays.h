@@ -11,6 +11,7 @@
 struct soft_sphere {
     double center[3], radius, color[3];
     double soft; /* W of eq. 22: 1 = wholly soft, 0 = at the border to what is solid */
+    double thin; /* what its opacity lacks of that of others: it is drawn wider than it is */
 };
 
 struct soft_look {

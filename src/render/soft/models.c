@@ -41,6 +41,18 @@ uint32_t spl_soft_shells(double radius_samples)
     return (uint32_t)fmin(fmax(radius_samples / SPL_SOFT_SHELL_SAMPLES, 1), SPL_SOFT_SHELLS_MAX);
 }
 
+double spl_soft_thin(double opacity)
+{
+    enum { RINGS = 256 };
+    double depth = spl_soft_depth(opacity), hidden = 0, depths = 0;
+    for (int ring = 0; ring < RINGS; ring++) {
+        double delta = (ring + 0.5) / RINGS, own = 2 * depth * spl_soft_base_part(delta, sqrt(1 - delta * delta));
+        hidden += delta * -expm1(-own);
+        depths += delta * own;
+    }
+    return depths > 0 ? hidden / depths : 1;
+}
+
 /* Least squares over rings of equal width, weighted by their area. That all of it adds up to `opacity` at m = 1 leaves
  * four unknowns, of terms m^(i + 2) - m. */
 void spl_soft_falloff(double opacity, float f[SPL_SOFT_FALLOFF])

@@ -21,6 +21,11 @@ double spl_soft_base_part(double delta, double zeta);
  * outside the sphere. */
 double spl_soft_concentric_part(uint32_t shells, double delta, double zeta);
 
+/* A sphere that is drawn with a share s of the opacity that others have, since it is drawn wider than it is, has
+ * s (a + (1 - a) s) of their optical depth, a being this: over its disc it hides s of what others hide, exactly where s
+ * is 0 or 1. */
+double spl_soft_thin(double opacity);
+
 /* One shell for every SPL_SOFT_SHELL_SAMPLES samples of the radius on the image. */
 uint32_t spl_soft_shells(double radius_samples);
 

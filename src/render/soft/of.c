@@ -34,6 +34,7 @@ static uint32_t kernel_of(const struct spl_soft_params *soft)
 struct look {
     const struct spl_soft_params *soft;
     uint32_t from, kernel;
+    bool thin;
 };
 
 /* Tiles [first, end) of the lists. */
@@ -47,13 +48,14 @@ static int dispatch(struct spl_soft_order *order, const struct look *look, uint3
     return spl_soft_dispatch(
         order,
         &(struct spl_soft_dispatch){
-            .key = {"soft_of", order->wide, {look->kernel, soft->blend > 0}},
+            .key = {"soft_of", order->wide, {look->kernel, soft->blend > 0, look->thin}},
             .step = {.count = end - first,
                      .first = tile_words * first,
                      .details = order->memory->sizes.items * (SPL_SOFT_ITEM_WORDS + 1),
                      .low = soft->of == SPL_SOFT_OF_FIRST ? SPL_SOFT_DEPTH_SEEN : SPL_SOFT_DEPTH_HALF,
                      .high = look->from,
                      .depth = (float)spl_soft_depth(soft->opacity),
+                     .thin = (float)spl_soft_thin(soft->opacity),
                      .fall_0 = fall[0] * scale,
                      .fall_1 = fall[1] * scale,
                      .fall_2 = fall[2] * scale,
@@ -102,9 +104,9 @@ static int walk(struct spl_soft_order *order, const struct look *look, uint64_t 
 }
 
 int spl_soft_find(struct spl_soft_order *order, const struct spl_soft_params *soft, uint32_t from,
-                  struct spl_error *err)
+                  bool thin, struct spl_error *err)
 {
-    const struct look look = {soft, from, kernel_of(soft)};
+    const struct look look = {soft, from, kernel_of(soft), thin};
     const bool shells = look.kernel == SPL_SOFT_FIND_DENSE + SPL_SOFT_CONCENTRIC;
     const uint32_t rounds = SPL_SOFT_ROUNDS / (shells ? SPL_SOFT_FIND_SHELLS : 1);
     bool left = order->entries > 0;

@@ -244,7 +244,7 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
             }
             if (listed == begun || (tile + 1 < tiles && work < blend_work && listed - begun < most))
                 continue;
-            struct spl_soft_dispatch what = {.key = {"soft_blend", order->wide, {blend->border, first}},
+            struct spl_soft_dispatch what = {.key = {"soft_blend", order->wide, {blend->border, first, blend->thin}},
                                              .step = {.count = listed - begun,
                                                       .first = tile_words * begun,
                                                       .fall_0 = fall[0] * scale,

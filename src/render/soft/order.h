@@ -106,6 +106,7 @@ struct spl_soft_blend {
     float reach;    /* the largest radius */
     float until;    /* what begins before this view depth is listed, of what is beyond `from` of plan.h */
     bool ends;      /* there is no window behind this one */
+    bool thin;      /* some items are narrower than a sample */
 };
 /* Blends what was listed. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);

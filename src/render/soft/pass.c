@@ -208,6 +208,7 @@ struct counted {
     uint64_t items, entries;
     uint32_t most, low, high;
     float reach; // largest radius
+    bool thin;   // some are narrower than a sample
 };
 
 static struct counted sum_slots(struct pass *pass)
@@ -218,7 +219,7 @@ static struct counted sum_slots(struct pass *pass)
     struct counted sum = {.low = UINT32_MAX};
     uint32_t reach = 0;
     for (uint32_t i = 0; i < pass->slots; i++, words += SPL_SOFT_SLOT_WORDS) {
-        const uint32_t most = words[0] >> 4 & 0xfff;
+        const uint32_t most = words[0] >> 4 & 0x7ff;
         firsts[i] = (uint32_t)sum.items;
         sum.items += words[0] & 15;
         sum.entries += words[0] >> 16;
@@ -226,6 +227,7 @@ static struct counted sum_slots(struct pass *pass)
         sum.low = words[1] < sum.low ? words[1] : sum.low;
         sum.high = larger(sum.high, words[2]);
         reach = larger(reach, words[3]);
+        sum.thin |= (words[0] & SPL_SOFT_SLOT_THIN) != 0;
     }
     memcpy(&sum.reach, &reach, sizeof reach);
     return sum;
@@ -286,9 +288,10 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
                                                                    .reach = sum->reach,
                                                                    .until = until,
                                                                    .border = soft->blend > 0,
+                                                                   .thin = sum->thin,
                                                                    .first = !pass->begun}, err);
     if (!rc && pass->finds)
-        rc = spl_soft_find(&pass->order, soft, pass->found_to, err);
+        rc = spl_soft_find(&pass->order, soft, pass->found_to, sum->thin, err);
     pass->found_to = (uint32_t)(window->end >> 32);
     pass->begun = true;
     return rc;

@@ -84,12 +84,13 @@ static int dispatch(struct spl_soft_order *order, const struct spl_soft_blend *b
                                                           [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
     const enum spl_soft_buffer lists = order->sorted == SPL_SOFT_PAIRS ? SPL_SOFT_OTHERS : SPL_SOFT_PAIRS;
     const struct spl_soft_dispatch what = {
-        .key = {"soft_base", order->wide, {models[blend->model], blend->border}},
+        .key = {"soft_base", order->wide, {models[blend->model], blend->border, blend->thin}},
         .step = {.count = group->count,
                  .first = tile_words * group->first,
                  .progress = group->progress,
                  .depth = (float)spl_soft_depth(blend->opacity),
                  .reach = blend->reach,
+                 .thin = (float)spl_soft_thin(blend->opacity),
                  .until = blend->until,
                  .ends = blend->ends},
         .from = lists,

@@ -166,7 +166,7 @@ static void injected_and_real_losses_stick(void **state)
         fake.refuse_submit = real;
         assert_int_equal(spl_gpu_begin(&gpu, NULL), 0);
         if (!real)
-            spl_gpu_inject_loss(&gpu);
+            spl_gpu_inject_loss(&gpu, 0);
         assert_int_equal(spl_gpu_submit(&gpu, &ticket, NULL), SPL_E_DEVICE_LOST);
         assert_int_equal(ticket, 7);
         assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_DEVICE_LOST);

@@ -104,6 +104,26 @@ static void more_shells_look_the_same(void **state)
     assert_true(with_15 > 0.12 && without > 0.18);
 }
 
+/* What has a share of the others' opacity hides that share of what they hide over their disc, of a model that adds depths,
+ * too: nearly so, where it is neither all nor nothing. */
+static void thin_ones_hide_their_share(void **state)
+{
+    (void)state;
+    for (int i = 0; i < OPACITIES; i++)
+        for (double share = 1; share > 0.001; share *= 0.7) {
+            struct soft_look look = {.model = SPL_SOFT_MODEL_BASE, .opacity = opacities[i], .focal = 10000};
+            double all = 0, some = 0;
+            for (double delta = 0.005; delta < 1; delta += 0.01) {
+                struct soft_sphere sphere = {.center = {delta, 0, 1000}, .radius = 1, .soft = 1};
+                all += delta * (1 - soft_see(&look, &sphere, 1, axis, 1, 1e6).transmittance);
+                sphere.thin = 1 - share;
+                some += delta * (1 - soft_see(&look, &sphere, 1, axis, 1, 1e6).transmittance);
+            }
+            near_to(some / all / share, 1, opacities[i] <= 0.5 ? 0.01 : opacities[i] <= 0.9 ? 0.07 : 0.19, "hidden");
+        }
+    near_to(spl_soft_thin(0), 1, 0, "clear");
+}
+
 /* Rms over a sphere's disc of what express and concentric are off base. */
 static double off_base(struct soft_look look, double samples)
 {
@@ -261,6 +281,7 @@ int main(void)
         cmocka_unit_test(falloffs_are_alike),   cmocka_unit_test(stretches_are_whole),
         cmocka_unit_test(depths_add),           cmocka_unit_test(order_is_by_depth),
         cmocka_unit_test(layers_are_one),       cmocka_unit_test(borders_are_dense),
+        cmocka_unit_test(thin_ones_hide_their_share),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
