@@ -3,14 +3,14 @@
 usage: behind.py OUT [SCENE[:VIEW]...]
 
 Scans, packs and renders courtyard and tree (others are refused) from places that look at a wall through a crown, with class 5 as
-`splat` draws it, left out, as one transparent layer (`layer`), and soft (`express`, `concentric`, `base`). The strength of each is the one at
+`splat` draws it, left out, as one transparent layer (`layer`), and soft (`express`, `base`). The strength of each is the one at
 which the crown is as visible as with the others, found by false position, in one of two meanings:
   contrast  mean |image - image without the crown| over the crown's pixels, as a share of what splatting has there;
   opacity   mean opacity of the crown over them, from a dataset that has nothing but its points.
 The crown's pixels: at least half of each is covered by it, it is in front of what else is there, and behind it is no sky.
 PSNR and SSIM (api/measures.md) over those alone; `behind` against the scene without crown, `crown` against the scene as it is.
 OUT keeps scans, truth, datasets and pictures; what is there is not made again. Needs NumPy and Pillow.
-environment: SPLATD_BINARY (splatd), BEHIND_POINTS (1e6), BEHIND_SIZE (480x360), BEHIND_SHARES (0.5)
+environment: SPLATD_BINARY (splatd), BEHIND_POINTS (1e6), BEHIND_SIZE (400x300), BEHIND_SHARES (0.5)
 """
 import contextlib
 import io
@@ -31,10 +31,10 @@ from PIL import Image
 from datasets import SPLATD, run
 
 POINTS = os.environ.get("BEHIND_POINTS", "1e6")
-SIZE = [int(n) for n in os.environ.get("BEHIND_SIZE", "480x360").split("x")]
+SIZE = [int(n) for n in os.environ.get("BEHIND_SIZE", "400x300").split("x")]
 SHARES = [float(s) for s in os.environ.get("BEHIND_SHARES", "0.5").split(",")]
 SKY = (135, 170, 200)
-MODELS = ("layer", "express", "concentric", "base")
+MODELS = ("layer", "express", "base")
 VIEWS = {  # eye, target, vertical field of view
     "courtyard": {"north": ([-4, -2.4, 1.7], [-4, 8, 4.6], 32), "north-east": ([-6.4, -1.6, 1.7], [-2.2, 8, 4.8], 34),
                   "north-west": ([-1.2, -1.4, 1.7], [-6.2, 8, 4.6], 34), "west": ([1.2, 1.4, 1.7], [-10, 3.4, 4.6], 32),
