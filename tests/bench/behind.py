@@ -3,10 +3,12 @@
 usage: behind.py OUT [SCENE[:VIEW]...]
 
 Scans, packs and renders courtyard and tree (others are refused) from places that look at a wall through a crown, with class 5 as
-`splat` draws it, left out, as one transparent layer (`layer`), and soft (`express`, `base`). The strength of each is the one at
-which the crown is as visible as with the others, found by false position, in one of two meanings:
-  contrast  mean |image - image without the crown| over the crown's pixels, as a share of what splatting has there;
-  opacity   mean opacity of the crown over them, from a dataset that has nothing but its points.
+`splat` draws it, left out, as one transparent layer in two readings, and soft (`express`, `base`). `layer` drops what lies behind the
+first layer; `first` has it opaque, which is what the paper's text says of its own: the splats' image over that of the points that lie
+more than MARGIN behind the crown's first surface. The strength of each is the one at which the crown is half as visible (BEHIND_SHARES) as
+with splats, found by false position, in one of two meanings:
+  contrast   mean |image - image without the crown| over the crown's pixels;
+  structure  SSIM against the exact image of the scene as it is over them, less that of the image without the crown.
 The crown's pixels: at least half of each is covered by it, it is in front of what else is there, and behind it is no sky.
 PSNR and SSIM (api/measures.md) over those alone; `behind` against the scene without crown, `crown` against the scene as it is.
 OUT keeps scans, truth, datasets and pictures; what is there is not made again. Needs NumPy and Pillow.
@@ -28,13 +30,15 @@ import urllib.request
 import numpy as np
 from PIL import Image
 
-from datasets import SPLATD, run
+from datasets import SPLATD, place_of, run
 
 POINTS = os.environ.get("BEHIND_POINTS", "1e6")
 SIZE = [int(n) for n in os.environ.get("BEHIND_SIZE", "400x300").split("x")]
 SHARES = [float(s) for s in os.environ.get("BEHIND_SHARES", "0.5").split(",")]
 SKY = (135, 170, 200)
-MODELS = ("layer", "express", "base")
+MODELS = ("layer", "first", "express", "base")
+MEANINGS = ("contrast", "structure")
+MARGIN = 0.06  # metres
 VIEWS = {  # eye, target, vertical field of view
     "courtyard": {"north": ([-4, -2.4, 1.7], [-4, 8, 4.6], 32), "north-east": ([-6.4, -1.6, 1.7], [-2.2, 8, 4.8], 34),
                   "north-west": ([-1.2, -1.4, 1.7], [-6.2, 8, 4.6], 34), "west": ([1.2, 1.4, 1.7], [-10, 3.4, 4.6], 32),
@@ -55,29 +59,45 @@ def views_file(scene, out):
     return path
 
 
-def crown_alone(scan, out):
-    """The points of class 5 as a file of their own."""
+def points_of(scan):
+    """Its header and its points."""
     head, _, body = scan.read_bytes().partition(b"end_header\n")
-    points = np.frombuffer(body, [("xyz", "<f4", 3), ("rgb", "u1", 3), ("class", "u1")])
-    kept = points[points["class"] == 5]
+    return head, np.frombuffer(body, [("xyz", "<f4", 3), ("rgb", "u1", 3), ("class", "u1")])
+
+
+def behind_first(scan, camera, depth, out):
+    """The crown's points that are not of its first surface, whose depth is known by pixel, as a dataset."""
+    head, points = points_of(scan)
+    points = points[points["class"] == 5]
+    eye, target, fov = camera
+    ahead = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
+    right = np.cross(ahead, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    at = points["xyz"] - eye
+    z, focal = at @ ahead, SIZE[1] / 2 / np.tan(np.radians(fov / 2))
+    x = np.floor(SIZE[0] / 2 + focal * (at @ right) / z).astype(int)
+    y = np.floor(SIZE[1] / 2 + focal * (at @ np.cross(ahead, right)) / z).astype(int)
+    seen = (z > 0) & (x >= 0) & (x < SIZE[0]) & (y >= 0) & (y < SIZE[1])
+    first = np.where(seen, depth[np.clip(y, 0, SIZE[1] - 1), np.clip(x, 0, SIZE[0] - 1)], -np.inf)
+    kept = points[~(z < first + MARGIN)]
     lines = [b"element vertex %d" % len(kept) if line.startswith(b"element") else line for line in head.splitlines()]
-    out.write_bytes(b"\n".join(lines) + b"\nend_header\n" + kept.tobytes())
+    scan = out.with_suffix(".ply")
+    scan.write_bytes(b"\n".join(lines) + b"\nend_header\n" + kept.tobytes())
+    run("pack", scan, "-o", out)
 
 
 def make(scene, out):
-    """Datasets of the scene and of its crown, and three folders of truth."""
+    """The dataset of the scene, and three folders of truth."""
     out.mkdir(parents=True, exist_ok=True)
-    scan, crown, views = out / f"{scene}.ply", out / f"{scene}-crown.ply", views_file(scene, out)
+    scan, views = out / f"{scene}.ply", views_file(scene, out)
     if not scan.exists():
         run("synth", scene, "--points", POINTS, "--classes", "--format", "ply", "-o", out)
-        crown_alone(scan, crown)
-    for path in (scan, crown):
-        if not path.with_suffix(".spld").exists():
-            run("pack", path, "-o", path.with_suffix(".spld"))
+    if not scan.with_suffix(".spld").exists():
+        run("pack", scan, "-o", scan.with_suffix(".spld"))
     for folder, options in (("whole", ()), ("bare", ("--without", "class:5")), ("crown", ("--only", "class:5"))):
         if not (out / folder).exists():
             run("synth", scene, "--views", views, "--samples", 8, *options, "-o", out / folder)
-    return scan.with_suffix(".spld"), crown.with_suffix(".spld")
+    return [scan.with_suffix(".spld")]
 
 
 @contextlib.contextmanager
@@ -86,7 +106,8 @@ def service(*datasets):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    with subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--quiet", *map(str, datasets)]) as daemon:
+    with subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{port}", "--ops-listen", "", "--quiet",
+                           *map(str, datasets)]) as daemon:
         def render(dataset, **parameters):
             url = f"http://127.0.0.1:{port}/v1/datasets/{dataset}/view?" + urllib.parse.urlencode(parameters)
             with urllib.request.urlopen(url, timeout=600) as reply:
@@ -130,13 +151,18 @@ def measures(image, truth, mask):
     return 10 * np.log10(255 ** 2 / max(error, 1e-9)), ssim[mask].mean()
 
 
+def first_depth(depth):
+    """Depth of the nearest of a pixel and those beside it: its centre may lie in a gap."""
+    nearest = np.where(np.isnan(depth), np.inf, depth)
+    for axis in (0, 1):
+        nearest = np.minimum(nearest, np.minimum(np.roll(nearest, 1, axis), np.roll(nearest, -1, axis)))
+    return nearest
+
+
 def crown_pixels(out, name):
     depth = [np.load(out / folder / f"truth/{name}.depth.npy") for folder in ("crown", "bare")]
     cover = [np.load(out / folder / f"truth/{name}.coverage.npy") for folder in ("crown", "bare")]
-    nearest = np.where(np.isnan(depth[0]), np.inf, depth[0])
-    for axis in (0, 1):  # the centre may lie in a gap
-        nearest = np.minimum(nearest, np.minimum(np.roll(nearest, 1, axis), np.roll(nearest, -1, axis)))
-    mask = (cover[0] >= 0.5) & (cover[1] > 0.999) & (nearest < depth[1])
+    mask = (cover[0] >= 0.5) & (cover[1] > 0.999) & (first_depth(depth[0]) < depth[1])
     mask[:5], mask[-5:], mask[:, :5], mask[:, -5:] = False, False, False, False
     return mask
 
@@ -173,69 +199,94 @@ class Place:
         self.truth = {kind: over_sky(out / kind / f"truth/{name}.color.png") for kind in ("bare", "whole")}
         self.kept = {}
         self.solid, self.bare = self.draw(None, 0), self.draw("express", 0)
-        self.most = self.contrast(self.solid)
+        self.second = self.behind_first()
+        self.ends = {meaning: [self.raw(meaning, image) for image in (self.bare, self.solid)] for meaning in MEANINGS}
+
+    def behind_first(self):
+        """What would be seen without the crown's first surface."""
+        path = self.out / f"{self.name}-second.spld"
+        depth = np.load(self.out / f"crown/truth/{self.name}.depth.npy")
+        if not path.exists():
+            behind_first(self.out / f"{self.scene}.ply", VIEWS[self.scene][self.name], first_depth(depth), path)
+        view = json.loads((self.out / "views.json").read_text(encoding="utf-8"))["views"][list(VIEWS[self.scene]).index(self.name)]
+        color, npy = path.with_suffix(".png"), path.with_suffix(".npy")
+        run("render", path, *place_of(view), "--background", "transparent", "-o", color)
+        run("render", path, *place_of(view), "--layer", "depth", "-o", npy)
+        pixels = np.asarray(Image.open(color)).astype(float)
+        there = np.load(npy) < np.nan_to_num(np.load(self.out / f"bare/truth/{self.name}.depth.npy"), nan=np.inf)
+        alpha = pixels[..., 3:] / 255 * there[..., None]
+        return self.bare * (1 - alpha) + pixels[..., :3] * alpha
 
     def draw(self, model, opacity):
+        if model == "first":
+            return np.round(opacity * self.solid + (1 - opacity) * self.second)
         key = (model, opacity)
         if key not in self.kept:
             soft = {"soft": "class:5", "soft_model": model, "soft_opacity": repr(opacity)} if model else {}
             self.kept[key] = self.send(self.scene, **self.camera, background="%02x%02x%02x" % SKY, **soft)[..., :3]
         return self.kept[key]
 
-    def contrast(self, image):
-        return np.abs(image - self.bare)[self.mask].mean()
-
-    def visible(self, meaning, model, opacity):
+    def raw(self, meaning, image):
         if meaning == "contrast":
-            return self.contrast(self.draw(model, opacity)) / self.most
-        rgba = self.send(f"{self.scene}-crown", **self.camera, soft="class:5", soft_model=model, soft_opacity=repr(opacity),
-                         background="transparent")
-        return rgba[..., 3][self.mask].mean() / 255
+            return np.abs(image - self.bare)[self.mask].mean()
+        return measures(image, self.truth["whole"], self.mask)[1]
 
-    def row(self, meaning, label, image, opacity, share):
+    def visible(self, meaning, image):
+        none, most = self.ends[meaning]
+        return (self.raw(meaning, image) - none) / (most - none)
+
+    def row(self, meaning, label, image, opacity, share, wanted=None):
         behind, crown = (measures(image, self.truth[kind], self.mask) for kind in ("bare", "whole"))
         print(f"| {self.scene} {self.name} | {meaning} | {label} | {opacity:.3f} | {share:.3f} | {behind[0]:.2f} | {behind[1]:.3f} "
-              f"| {crown[0]:.2f} | {crown[1]:.3f} |", flush=True)
+              f"| {crown[0]:.2f} | {crown[1]:.3f} |", file=sys.stderr, flush=True)
         return {"view": f"{self.scene} {self.name}", "meaning": meaning, "of": label, "opacity": opacity, "visible": share,
-                "behind": behind, "crown": crown}
+                "wanted": wanted, "behind": behind, "crown": crown}
 
-    def rows(self, meanings=("contrast", "opacity")):
+    def rows(self):
         yield self.row("-", "splat", self.solid, 1, 1)
         yield self.row("-", "left out", self.bare, 0, 0)
-        for meaning in meanings:
+        for meaning in MEANINGS:
             for share in SHARES:
                 shown, near = [self.truth["whole"], self.solid], None
                 for model in MODELS:
-                    low, high = (0.8 * near, min(1.25 * near, 1)) if near and model != "layer" else (0.0, 1.0)
-                    opacity, got = find(share, lambda x, m=model: self.visible(meaning, m, x), low, high)
+                    low, high = (0.8 * near, min(1.25 * near, 1)) if near else (0.0, 1.0)
+                    opacity, got = find(share, lambda x, m=model: self.visible(meaning, self.draw(m, x)), low, high)
                     near = opacity if model == "express" else near
                     image = self.draw(model, opacity)
                     shown.append(image)
-                    yield self.row(meaning, model, image, opacity, got)
+                    yield self.row(meaning, model, image, opacity, got, share)
                 shown += [self.bare, self.truth["bare"]]
                 path = self.out / f"{self.name}-{meaning}-{share}.png"
                 Image.fromarray(np.concatenate(shown, 1).astype(np.uint8)).save(path)
 
 
+WAYS = ("splat", "layer", "first", "express", "base", "left out")
+
+
 def judge(rows):
-    """How many views have each soft model above splat and above layer."""
-    for meaning in ("contrast", "opacity"):
-        for model in MODELS[1:]:
-            better = {"PSNR": [], "SSIM": []}
-            for row in (r for r in rows if r["of"] == model and r["meaning"] == meaning):
-                rivals = [r for r in rows if r["view"] == row["view"] and (r["of"] == "splat" or r["of"] == "layer"
-                          and r["meaning"] == meaning and abs(r["visible"] - row["visible"]) < 0.05)]
-                for i, figure in enumerate(better):
-                    better[figure].append(len(rivals) == 2 and all(row["behind"][i] > r["behind"][i] for r in rivals))
-            print(f"{model} at equal {meaning}: better than splat and layer by " +
-                  ", ".join(f"{figure} in {sum(b)} of {len(b)}" for figure, b in better.items()))
+    """A table for each meaning, and in how many views the soft models show what lies behind better than each other way."""
+    for meaning, share in [(m, s) for m in MEANINGS for s in SHARES]:
+        of = {(r["view"], r["of"]): r for r in rows if r["meaning"] == "-" or (r["meaning"], r["wanted"]) == (meaning, share)}
+        views = list(dict.fromkeys(view for view, _ in of))
+        print(f"\nequal {meaning}, {share}\n\n| view | " + " | ".join(WAYS) + " |\n|---" + "|---" * len(WAYS) + "|")
+        for view in views:
+            cells = []
+            for row in (of[view, way] for way in WAYS):
+                missed = "" if row["meaning"] == "-" or abs(row["visible"] - share) < 0.02 else f" at {row['visible']:.2f}"
+                cells.append(f"{row['behind'][0]:.1f}, {row['behind'][1]:.2f}{missed}")
+            print(f"| {view} | " + " | ".join(cells) + " |")
+        for model in ("express", "base"):
+            print(f"\n{model} is better than " + "; ".join(
+                f"{rival}: PSNR in {sum(of[v, model]['behind'][0] > of[v, rival]['behind'][0] for v in views)}, "
+                f"SSIM in {sum(of[v, model]['behind'][1] > of[v, rival]['behind'][1] for v in views)} of {len(views)}"
+                for rival in WAYS[:3]))
 
 
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     rows = []
-    print("| view | equal | crown as | soft_opacity | visible | behind: PSNR | SSIM | crown: PSNR | SSIM |\n|---" + "|---" * 8 + "|")
+    print("| view | equal | crown as | soft_opacity | visible | behind: PSNR | SSIM | crown: PSNR | SSIM |", file=sys.stderr)
     for wanted in sys.argv[2:] or list(VIEWS):
         scene, _, only = wanted.partition(":")
         if scene not in VIEWS or only and only not in VIEWS[scene]:
