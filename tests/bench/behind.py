@@ -8,10 +8,14 @@ first layer; `first` has it opaque, which is what the paper's text says of its o
 more than MARGIN behind the crown's first surface. The strength of each is the one at which the crown is half as visible (BEHIND_SHARES) as
 with splats, found by false position, in one of two meanings:
   contrast   mean |image - image without the crown| over the crown's pixels;
-  structure  SSIM against the exact image of the scene as it is over them, less that of the image without the crown.
+  detail     how much of the crown's own detail there is: of what the crown adds to the exact image, and of what it adds to the image
+             (luma, each less its blurred self), the second's regression on the first. An even veil has none.
+`base` has the strength that was found for `express`. `capped` is no setting that there is, but what one would give: express at DENSE,
+of which the strength is the share that spheres hold back together at most.
 The crown's pixels: at least half of each is covered by it, it is in front of what else is there, and behind it is no sky.
 PSNR and SSIM (api/measures.md) over those alone; `behind` against the scene without crown, `crown` against the scene as it is.
-OUT keeps scans, truth, datasets and pictures; what is there is not made again. Needs NumPy and Pillow.
+OUT keeps scans, truth, datasets and pictures (PNG: exact, each way, left out, exact without; JPEG: splat, layer, express, left out);
+scans, truth and datasets that are there are not made again. Needs NumPy and Pillow.
 environment: SPLATD_BINARY (splatd), BEHIND_POINTS (1e6), BEHIND_SIZE (400x300), BEHIND_SHARES (0.5)
 """
 import contextlib
@@ -36,8 +40,10 @@ POINTS = os.environ.get("BEHIND_POINTS", "1e6")
 SIZE = [int(n) for n in os.environ.get("BEHIND_SIZE", "400x300").split("x")]
 SHARES = [float(s) for s in os.environ.get("BEHIND_SHARES", "0.5").split(",")]
 SKY = (135, 170, 200)
-MODELS = ("layer", "first", "express", "base")
-MEANINGS = ("contrast", "structure")
+MODELS = ("layer", "first", "express", "base", "capped")
+DENSE = 0.6
+MEANINGS = ("contrast", "detail")
+LUMA = np.array((0.299, 0.587, 0.114))
 MARGIN = 0.06  # metres
 VIEWS = {  # eye, target, vertical field of view
     "courtyard": {"north": ([-4, -2.4, 1.7], [-4, 8, 4.6], 32), "north-east": ([-6.4, -1.6, 1.7], [-2.2, 8, 4.8], 34),
@@ -140,10 +146,15 @@ def smooth(image):
     return image
 
 
+def detail(image):
+    luma = image @ LUMA
+    return luma - smooth(luma)
+
+
 def measures(image, truth, mask):
     """PSNR, SSIM over the pixels of the mask, whose windows lie within the image."""
     error = np.mean((image - truth)[mask] ** 2)
-    a, b = (x @ (0.299, 0.587, 0.114) for x in (image, truth))
+    a, b = (x @ LUMA for x in (image, truth))
     ma, mb = smooth(a), smooth(b)
     va, vb, ab = smooth(a * a) - ma * ma, smooth(b * b) - mb * mb, smooth(a * b) - ma * mb
     c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
@@ -167,14 +178,17 @@ def crown_pixels(out, name):
     return mask
 
 
-def find(wanted, measure, low=0.0, high=1.0):
-    """Where a rising function has that value, by false position (Illinois), and the value there; from 0 to 1 where it has not
-    between these; the end nearest to it where it never has."""
-    below, above, side = measure(low) - wanted, measure(high) - wanted, 0
+def find(wanted, measure):
+    """Where a function first comes to that value from 0 on, and the value there: steps, then false position (Illinois). 0 or 1
+    where it is always above or below."""
+    low, below, side = 0.0, measure(0.0) - wanted, 0
+    for high in (0.03, 0.06, 0.12, 0.25, 0.5, 1.0):
+        above = measure(high) - wanted
+        if above > 0 or below >= 0:
+            break
+        low, below = high, above
     if below >= 0 or above <= 0:
-        if (low, high) != (0, 1):
-            return find(wanted, measure)
-        return (low, below + wanted) if below >= 0 else (high, above + wanted)
+        return (0.0, below + wanted) if below >= 0 else (1.0, above + wanted)
     for _ in range(12):
         x = (low * above - high * below) / (above - below)
         f = measure(x) - wanted
@@ -220,6 +234,8 @@ class Place:
     def draw(self, model, opacity):
         if model == "first":
             return np.round(opacity * self.solid + (1 - opacity) * self.second)
+        if model == "capped":
+            return np.round(opacity * self.draw("express", DENSE) + (1 - opacity) * self.bare)
         key = (model, opacity)
         if key not in self.kept:
             soft = {"soft": "class:5", "soft_model": model, "soft_opacity": repr(opacity)} if model else {}
@@ -229,7 +245,8 @@ class Place:
     def raw(self, meaning, image):
         if meaning == "contrast":
             return np.abs(image - self.bare)[self.mask].mean()
-        return measures(image, self.truth["whole"], self.mask)[1]
+        own, added = (detail(a - b)[self.mask] for a, b in ((self.truth["whole"], self.truth["bare"]), (image, self.bare)))
+        return (own * added).sum() / (own * own).sum()
 
     def visible(self, meaning, image):
         none, most = self.ends[meaning]
@@ -247,20 +264,20 @@ class Place:
         yield self.row("-", "left out", self.bare, 0, 0)
         for meaning in MEANINGS:
             for share in SHARES:
-                shown, near = [self.truth["whole"], self.solid], None
+                shown = {"exact": self.truth["whole"], "splat": self.solid}
                 for model in MODELS:
-                    low, high = (0.8 * near, min(1.25 * near, 1)) if near else (0.0, 1.0)
-                    opacity, got = find(share, lambda x, m=model: self.visible(meaning, self.draw(m, x)), low, high)
-                    near = opacity if model == "express" else near
+                    if model != "base":
+                        opacity, got = find(share, lambda x, m=model: self.visible(meaning, self.draw(m, x)))
                     image = self.draw(model, opacity)
-                    shown.append(image)
+                    shown[model] = image
                     yield self.row(meaning, model, image, opacity, got, share)
-                shown += [self.bare, self.truth["bare"]]
-                path = self.out / f"{self.name}-{meaning}-{share}.png"
-                Image.fromarray(np.concatenate(shown, 1).astype(np.uint8)).save(path)
+                shown |= {"left out": self.bare, "bare": self.truth["bare"]}
+                for ending, parts in (("png", list(shown)), ("jpg", ["splat", "layer", "express", "left out"])):
+                    strip = Image.fromarray(np.concatenate([shown[p] for p in parts], 1).astype(np.uint8))
+                    strip.save(self.out / f"{self.name}-{meaning}-{share}.{ending}", quality=85)
 
 
-WAYS = ("splat", "layer", "first", "express", "base", "left out")
+WAYS = ("splat", "layer", "first", "express", "base", "capped", "left out")
 
 
 def judge(rows):
@@ -275,7 +292,7 @@ def judge(rows):
                 missed = "" if row["meaning"] == "-" or abs(row["visible"] - share) < 0.02 else f" at {row['visible']:.2f}"
                 cells.append(f"{row['behind'][0]:.1f}, {row['behind'][1]:.2f}{missed}")
             print(f"| {view} | " + " | ".join(cells) + " |")
-        for model in ("express", "base"):
+        for model in ("express", "base", "capped"):
             print(f"\n{model} is better than " + "; ".join(
                 f"{rival}: PSNR in {sum(of[v, model]['behind'][0] > of[v, rival]['behind'][0] for v in views)}, "
                 f"SSIM in {sum(of[v, model]['behind'][1] > of[v, rival]['behind'][1] for v in views)} of {len(views)}"
