@@ -63,6 +63,10 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_REAL(struct arguments, scan.misregister, 0, 10)},
     {"format", "LIST", "of ptx,ply,las", .otherwise = "ptx,ply from tripods, ply,las from what moves",
      SPL_CMD_TEXT(struct arguments, scan.formats)},
+    {"classes", NULL,
+     "each point's class: 2 ground, 5 vegetation, 6 building, 10 rails, 11 road, 13 and 14 wires, 15 pylons, 16 what "
+     "wires hang on, 17 bridge, 64 ceiling, 65 furniture, else 1; PLY and LAS alone",
+     SPL_CMD_FLAG(struct arguments, scan.classes)},
     {.help = "Exact pictures:"},
     {"views", "FILE",
      "JSON of named views, or the folder of a COLMAP text model: DIR/truth/VIEW.color.png (area-sampled in linear "
@@ -83,6 +87,8 @@ static const struct spl_cmd_option options[] = {
     {"samples", "N", "up to N x N a pixel", .fallback = "16",
      SPL_CMD_COUNT_32(struct arguments, pictures.samples, 1, SPL_EXACT_SAMPLES_MAX)},
     {.help = "Both:"},
+    {"without", "LIST", "objects that are not there, by name or as class:5", SPL_CMD_TEXT(struct arguments, scan.without)},
+    {"only", "LIST", "the objects that are there", SPL_CMD_TEXT(struct arguments, scan.only)},
     {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, scan.threads, 1, 64)},
     {"output", "DIR", "made when missing", .letter = 'o', .take = take_output},
     {.help = "What there is:"},
@@ -113,6 +119,9 @@ static const struct spl_cmd_table table = {
         "  splatd synth courtyard --mixed 0.5 --dropout 0.05 --misregister 0.02 -o scan\n"
         "The truth that renders are compared with, at the scene's sample cameras:\n"
         "  splatd synth courtyard --print-views > cams.json && splatd synth courtyard --views cams.json -o scan\n"
+        "What a scene is without its trees, and what the trees cover:\n"
+        "  splatd synth courtyard --views cams.json --without class:5 -o bare\n"
+        "  splatd synth courtyard --views cams.json --only class:5 -o crown\n"
         "A scan with photographs and panoramas whose poses are exact:\n"
         "  splatd synth courtyard --points 1e6 --photos 40 --panoramas 2048 -o scan\n\n",
     .after = "\nThe files' paths go to stdout, messages to stderr.\n",
@@ -148,6 +157,8 @@ static int run(struct arguments *a, struct spl_error *err)
     p->directory = a->scan.directory;
     p->seed = a->scan.seed;
     p->threads = a->scan.threads;
+    p->without = a->scan.without;
+    p->only = a->scan.only;
     p->views = a->views ? &views : NULL;
     if (!rc && pictures)
         rc = spl_pictures_check(p, err);

@@ -154,6 +154,7 @@ unsigned spl_scanner_cast(const struct spl_scene *scene, const struct spl_scan_g
         mad3(r->scene, 1, moved, r->scene);
         r->intensity = (float)(albedo_of(place.color) * (0.5 - 0.5 * dot3(hit->normal, pulse.direction)));
         memcpy(r->color, place.color, sizeof r->color);
+        r->class = scene->classes ? scene->classes[scene->primitives[hit->primitive].object] : 1;
     }
     for (unsigned i = 0; returns && i < found; i++) {
         returns[i].number = (uint8_t)(i + 1);

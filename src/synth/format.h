@@ -10,6 +10,7 @@ struct spl_scan_file {
     const struct spl_scene *scene;
     const struct spl_scan_grid *grid;
     const struct spl_scan_faults *faults;
+    bool classes;                 /* are written */
     uint64_t points;              /* 0 until they are counted */
     uint64_t by_return[SPL_SCANNER_RETURNS_MAX];
     double bounds[2][3];          /* of the returns, scene coordinates */
@@ -19,7 +20,7 @@ enum { SPL_SCAN_HEADER_MAX = 1024 };
 
 struct spl_scan_format {
     const char *name;             /* and extension */
-    bool structured;              /* a record a pulse, in the station's frame: terrestrial scanners only */
+    bool structured;              /* a record a pulse, in the station's frame: terrestrial scanners only, no classes */
     size_t record_max;            /* bytes */
     /* These return the bytes they put at `to`. The file's header (may be NULL) has one length whatever is in it, so
      * that it can be written again when the points are counted. */

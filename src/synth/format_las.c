@@ -1,6 +1,6 @@
 /* LAS 1.4, point format 7 (colour, GPS time): what mobile and airborne scans come in. Coordinates are whole tenths of a
  * millimetre around the scene's offset, which reaches 214 km. Colours are the 8 bit ones times 257, which is what the
- * format asks for. Classes are 0, "never classified"; a point's source is its pass, counted from 1. Written for
+ * format asks for. Classes are 0, "never classified", unless they were asked for; a point's source is its pass, counted from 1. Written for
  * little-endian and other machines alike. Pure functions; any thread. */
 #include "synth/format.h"
 
@@ -76,7 +76,6 @@ static size_t header(char *to, const struct spl_scan_file *file)
 
 static size_t record(char *to, const struct spl_scan_file *file, const struct spl_return *r)
 {
-    (void)file;
     memset(to, 0, record_bytes);
     for (int i = 0; i < 3; i++) {
         put32(to + 4 * i, (uint32_t)steps_of(r->scene[i]));
@@ -84,6 +83,7 @@ static size_t record(char *to, const struct spl_scan_file *file, const struct sp
     }
     put16(to + 12, (uint16_t)lround((double)r->intensity * 65535));
     to[14] = (char)(r->number | r->of << 4);
+    to[16] = (char)(file->classes ? r->class : 0);
     /* The scan angle in steps of 0.006 degrees, for beams around -z. */
     double angle = atan2(r->local[1], -r->local[2]) * 180 / M_PI;
     put16(to + 18, (uint16_t)(int16_t)lround(angle / 0.006));

@@ -1,5 +1,6 @@
 /* PLY, binary little-endian, world coordinates: floats near the origin, where 20 m keep a micrometre, doubles in a
- * scene that lies elsewhere. The comment that says how the scan was made fills the header up to its fixed length. Pure
+ * scene that lies elsewhere. Classes follow where they were asked for.
+ * The comment that says how the scan was made fills the header up to its fixed length. Pure
  * functions; any thread. */
 #include "synth/format.h"
 
@@ -21,9 +22,10 @@ static size_t header(char *to, const struct spl_scan_file *file)
     int used = snprintf(to, header_bytes,
                         "ply\nformat binary_little_endian 1.0\nelement vertex %llu\n"
                         "property %s x\nproperty %s y\nproperty %s z\n"
-                        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                        "property uchar red\nproperty uchar green\nproperty uchar blue\n%s"
                         "comment %s seed %llu noise %g ",
-                        (unsigned long long)file->points, type, type, type, file->scene->name,
+                        (unsigned long long)file->points, type, type, type,
+                        file->classes ? "property uchar classification\n" : "", file->scene->name,
                         (unsigned long long)f->seed, f->noise);
     if (f->mixed > 0 || f->dropout > 0 || f->misregister > 0)
         used += snprintf(to + used, header_bytes - (size_t)used, "mixed %g dropout %g misregister %g ", f->mixed,
@@ -49,7 +51,10 @@ static size_t record(char *to, const struct spl_scan_file *file, const struct sp
         memcpy(to, position, bytes = sizeof position);
     }
     memcpy(to + bytes, r->color, sizeof r->color);
-    return bytes + sizeof r->color;
+    bytes += sizeof r->color;
+    if (file->classes)
+        to[bytes++] = (char)r->class;
+    return bytes;
 }
 
-const struct spl_scan_format spl_format_ply = {.name = "ply", .record_max = 27, .header = header, .record = record};
+const struct spl_scan_format spl_format_ply = {.name = "ply", .record_max = 28, .header = header, .record = record};

@@ -273,7 +273,7 @@ static int check_against(const struct spl_pictures_options *o, const struct spl_
 int spl_pictures_check(const struct spl_pictures_options *options, struct spl_error *err)
 {
     struct spl_scene *scene = NULL;
-    int result = spl_scene_create(options->scene, &scene, err);
+    int result = spl_scene_create_part(options->scene, options->without, options->only, &scene, err);
     if (!result)
         result = check_against(options, scene, err);
     spl_scene_destroy(scene);
@@ -283,7 +283,7 @@ int spl_pictures_check(const struct spl_pictures_options *options, struct spl_er
 int spl_pictures_write(const struct spl_pictures_options *options, struct spl_error *err)
 {
     struct run r = {.options = options};
-    int result = spl_scene_create(options->scene, &r.scene, err);
+    int result = spl_scene_create_part(options->scene, options->without, options->only, &r.scene, err);
     if (!result)
         result = check_against(options, r.scene, err);
     if (!result && options->views)

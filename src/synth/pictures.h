@@ -14,6 +14,7 @@ enum {
 
 struct spl_pictures_options {
     const char *scene, *directory;     /* made when missing */
+    const char *without, *only;        /* as of spl_scene_create_part() */
     const struct spl_view_list *views; /* may be NULL: no truth */
     size_t photos;                     /* 0: none */
     uint32_t photo_width, photo_height;

@@ -34,6 +34,7 @@ struct spl_return {
     double local[3], scene[3];   /* in the station's frame; in the scene's, moved by what the pose is off by */
     float intensity;             /* 0..1 */
     uint8_t color[3];
+    uint8_t class;               /* as spl_scene_class(), of the surface that the central ray meets, or the nearest */
     uint8_t number, of;          /* 1 .. returns of its pulse */
     uint16_t pass;
     uint64_t pulse;              /* its index in the pass */

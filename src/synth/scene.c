@@ -50,7 +50,21 @@ static int unknown(const char *name, struct spl_error *err)
     return spl_fail_field(err, SPL_E_USAGE, "scene", "there is no scene '%s'; there are: %s", name, names);
 }
 
+static void classify(struct spl_scene *scene)
+{
+    uint8_t *classes = spl_alloc(scene->object_count, 1, &scene->error);
+    scene->classes = classes;
+    for (size_t i = 0; classes && i < scene->object_count; i++)
+        classes[i] = spl_scene_class(scene->objects[i]);
+}
+
 int spl_scene_create(const char *name, struct spl_scene **out, struct spl_error *err)
+{
+    return spl_scene_create_part(name, NULL, NULL, out, err);
+}
+
+int spl_scene_create_part(const char *name, const char *without, const char *only, struct spl_scene **out,
+                          struct spl_error *err)
 {
     size_t i = 0;
     while (i < scene_count && strcmp(scenes[i].name, name))
@@ -64,7 +78,15 @@ int spl_scene_create(const char *name, struct spl_scene **out, struct spl_error 
     scene->help = scenes[i].help;
     scenes[i].build(scene);
     if (!scene->error.code)
+        classify(scene);
+    if (!scene->error.code) {
+        int code = spl_scene_keep(scene, without, only, err);
+        if (code) {
+            spl_scene_destroy(scene);
+            return code;
+        }
         spl_bvh_build(scene->primitives, scene->primitive_count, &scene->nodes, &scene->error);
+    }
     if (scene->error.code) {
         int code = spl_fail(err, scene->error.code, "%s", scene->error.message);
         spl_scene_destroy(scene);
@@ -81,6 +103,7 @@ void spl_scene_destroy(struct spl_scene *scene)
     free(scene->primitives);
     free(scene->nodes);
     free(scene->objects);
+    free((void *)scene->classes);
     free(scene->stations);
     free(scene->track);
     free(scene);

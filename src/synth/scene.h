@@ -64,6 +64,7 @@ struct spl_scene {
     const struct spl_material *materials; /* static */
     const char **objects;         /* names, static; an object's id is its index */
     size_t object_count, object_capacity;
+    const uint8_t *classes;       /* of the objects, as spl_scene_class(); NULL of scenes that were built otherwise */
     struct spl_scanner scanner;
     struct spl_station *stations; /* what they are is the scanner's kind */
     size_t station_count, station_capacity;
@@ -88,6 +89,11 @@ struct spl_hit {
 
 /* Builds the scene of that name; SPL_E_USAGE with field "scene" lists the names. The caller owns *out. */
 int spl_scene_create(const char *name, struct spl_scene **out, struct spl_error *err);
+
+/* The same without some objects, or with only some of them: lists, parted by ',', of objects' names and of classes
+ * ("class:5"); NULL = all. Stations, cameras and the objects' ids stay. SPL_E_USAGE with field "without" or "only". */
+int spl_scene_create_part(const char *name, const char *without, const char *only, struct spl_scene **out,
+                          struct spl_error *err);
 void spl_scene_destroy(struct spl_scene *scene); /* NULL-safe */
 
 /* The first surface along origin + t direction, t > 0 (a direction of any length but 0); false for sky, and *hit is
@@ -97,6 +103,14 @@ bool spl_scene_hit(const struct spl_scene *scene, const double origin[3], const 
 
 /* The id of the object of that name, UINT32_MAX when there is none. */
 uint32_t spl_scene_find_object(const struct spl_scene *scene, const char *name);
+
+/* What an object of that name is, as LAS has it: 1 = nothing of the kinds that there are, 2 ground, 5 vegetation,
+ * 6 building, 10 rails, 11 road, 13 and 14 wires, 15 pylons, 16 what wires hang on, 17 bridges; 64 ceilings,
+ * 65 furniture. */
+uint8_t spl_scene_class(const char *object);
+
+/* Drops primitives of objects as spl_scene_create_part() says; before the hierarchy is built. */
+int spl_scene_keep(struct spl_scene *scene, const char *without, const char *only, struct spl_error *err);
 
 /* The exact colour of a primitive at a point of its surface. */
 void spl_scene_color(const struct spl_scene *scene, uint32_t primitive, const double position[3], uint8_t color[3]);

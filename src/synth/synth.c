@@ -77,12 +77,12 @@ static void cast_columns(void *context, size_t begin, size_t end, unsigned worke
 }
 
 /* Default: PLY, and with it PTX from a tripod and LAS from everything that moves. */
-static int choose_formats(const char *list, const struct spl_scene *scene, bool wanted[formats_count],
+static int choose_formats(const char *list, bool classes, const struct spl_scene *scene, bool wanted[formats_count],
                           struct spl_error *err)
 {
     bool structured = scene->scanner.kind == SPL_SCANNER_TERRESTRIAL;
     if (!list)
-        list = structured ? "ptx,ply" : "ply,las";
+        list = structured && classes ? "ply" : structured ? "ptx,ply" : "ply,las";
     for (const char *at = list; at;) {
         size_t length = strcspn(at, ","), f = 0;
         while (f < formats_count && (strlen(formats[f]->name) != length || strncmp(at, formats[f]->name, length)))
@@ -93,6 +93,9 @@ static int choose_formats(const char *list, const struct spl_scene *scene, bool 
         if (formats[f]->structured && !structured)
             return spl_fail_field(err, SPL_E_USAGE, "format",
                                   "%s is scanned on the move, which %s cannot hold; there are: ply, las", scene->name,
+                                  formats[f]->name);
+        if (formats[f]->structured && classes)
+            return spl_fail_field(err, SPL_E_USAGE, "format", "%s has no room for classes; there are: ply, las",
                                   formats[f]->name);
         wanted[f] = true;
         at = at[length] ? at + length + 1 : NULL;
@@ -233,9 +236,9 @@ int spl_synth(const struct spl_synth_options *options, uint64_t *points_written,
         s.output[f].fd = -1;
     int result = check(options, err);
     if (!result)
-        result = spl_scene_create(options->scene, &scene, err);
+        result = spl_scene_create_part(options->scene, options->without, options->only, &scene, err);
     if (!result)
-        result = choose_formats(options->formats, scene, s.wanted, err);
+        result = choose_formats(options->formats, options->classes, scene, s.wanted, err);
     if (!result)
         result = spl_output_make_directory(options->directory, err);
     for (size_t f = 0; f < formats_count && !result; f++)
@@ -247,6 +250,7 @@ int spl_synth(const struct spl_synth_options *options, uint64_t *points_written,
     s.file.scene = scene;
     s.file.grid = &s.grid;
     s.file.faults = &s.faults;
+    s.file.classes = options->classes;
     s.faults.noise = options->noise < 0 ? scene->scanner.noise : options->noise;
     s.grid = spl_scanner_fit(scene, &s.faults, options->points, options->threads);
     uint64_t in_column = s.grid.rows * scene->scanner.returns;

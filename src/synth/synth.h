@@ -2,6 +2,7 @@
 #ifndef SPL_SYNTH_SYNTH_H
 #define SPL_SYNTH_SYNTH_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -18,6 +19,8 @@ struct spl_synth_options {
     double dropout;           /* 0..0.9: share of returns lost; more where it is dark, grazing or far */
     double misregister;       /* 0..10 metres by which each station's, head's or flight line's pose is off */
     const char *formats;      /* of "ptx,ply,las"; NULL = ptx,ply of scenes scanned from tripods, ply,las of others */
+    bool classes;             /* each point's class is written (spl_scene_class()), and PTX, which has none, is not */
+    const char *without, *only; /* as of spl_scene_create_part() */
     unsigned threads;         /* 0 = all cores; the files do not depend on it */
     void (*progress)(void *context, const struct spl_progress *progress);
     void *progress_context;

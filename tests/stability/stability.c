@@ -6,7 +6,7 @@
  *                                               way: all of it, or the conditions that begin so, or all the others
  *   stability conditions [NAME…] [--method METHOD] --update [--whole]   writes the table's rows anew, those of these
  *                                               conditions and of the method; read it before it is committed
- *   stability plant half-pixel|margin-0|pop|no-trim     a planted fault: exits 0 only where the check meant for it
+ *   stability plant half-pixel|margin-0|pop|no-trim|six-axes     a planted fault: exits 0 only where the check meant for it
  *                                               catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose
@@ -31,6 +31,7 @@ static const struct {
     {"margin-0", PLANT_MARGIN_0, "depth-unbiased", check_walls},
     {"pop", PLANT_POP, "no-pop", check_motion},
     {"no-trim", PLANT_NO_TRIM, "halo-is-trimmed", check_maps},
+    {"six-axes", PLANT_SIX_AXES, "no-flip", check_flips},
 };
 
 static bool open_renderer(const char *backend, struct spl_renderer **renderer)
@@ -50,7 +51,7 @@ static const struct {
 } themes[] = {
     {"places", check_places}, {"walls", check_walls},   {"far-away", check_far_away}, {"levels", check_levels},
     {"sums", check_sums},     {"motion", check_motion}, {"layers", check_layers},     {"maps", check_maps},
-    {"soft", check_soft},
+    {"soft", check_soft},     {"flips", check_flips},
 };
 
 static bool is_named(const char *const *names, const char *name)
@@ -157,7 +158,7 @@ int main(int argc, char **argv)
     if (rc == 2)
         fprintf(stderr, "usage: stability invariants vulkan|egl [THEME…] | drivers | conditions [NAME…] [--others] "
                         "[--method METHOD] [--update] | plant "
-                        "half-pixel|margin-0|pop|no-trim [--whole]\n");
+                        "half-pixel|margin-0|pop|no-trim|six-axes [--whole]\n");
     spl_renderer_destroy(suite.renderer);
     spl_renderer_destroy(suite.other);
     return rc;

@@ -13,6 +13,7 @@ void check_motion(struct suite *suite);   /* no pop along a dolly, a turn, an ap
 void check_layers(struct suite *suite);   /* finite, in range, layers agree with each other; equal bytes on repeat */
 void check_soft(struct suite *suite);     /* soft spheres are those of all rays in doubles, however many and wherever */
 void check_maps(struct suite *suite);     /* with maps images lie where they did, silhouettes are finer, nothing pops */
+void check_flips(struct suite *suite);    /* around soft spheres no order flips */
 void check_drivers(struct suite *suite);  /* suite->renderer against suite->other */
 
 /* Holds one frame to what each of its layers may hold; a frame of all layers. */

@@ -28,7 +28,7 @@ struct world {
     char name[64];
 };
 
-enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP, PLANT_NO_TRIM };
+enum plant { PLANT_NONE, PLANT_HALF_PIXEL, PLANT_MARGIN_0, PLANT_POP, PLANT_NO_TRIM, PLANT_SIX_AXES };
 
 struct suite {
     struct report report;

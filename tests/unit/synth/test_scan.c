@@ -390,6 +390,42 @@ static void poses_in_a_ptx_are_off_by_what_was_asked(void **state)
     spl_point_batch_finish(&batch);
 }
 
+/* Each point's is that of the object that lies there; without the option files are as they were. */
+static void classes_are_written(void **state)
+{
+    (void)state;
+    static const char *const scenes[] = {"courtyard", "powerline"};
+    for (size_t s = 0; s < 2; s++) {
+        struct spl_synth_options o = options_for(in_folder("classes"), 3000);
+        o.scene = scenes[s];
+        o.formats = "ply,las";
+        o.classes = true;
+        o.dropout = 0.123456789;
+        o.misregister = 1e-9;
+        o.seed = UINT64_MAX;
+        const uint64_t points = scan(o);
+        for (int las = 0; las < 2; las++) {
+            char path[96];
+            snprintf(path, sizeof path, "classes/%s.%s", scenes[s], las ? "las" : "ply");
+            struct spl_point_batch batch;
+            struct spl_cloud *cloud;
+            size_t seen[256] = {0};
+            read_cloud(in_folder(path), points, &batch, &cloud);
+            for (size_t i = 0; i < points; i++)
+                seen[batch.classification[i]]++;
+            assert_int_equal(seen[0], 0);
+            assert_true(seen[2] > points / 20 && seen[5] > points / 100 && (s || seen[6] > points / 5));
+            spl_cloud_destroy(cloud);
+            spl_point_batch_finish(&batch);
+        }
+        o.only = "class:5";
+        o.formats = NULL;
+        o.directory = in_folder("crown");
+        scan(o);
+        assert_int_equal(file_count(o.directory), s ? 3 : 1); /* no PTX */
+    }
+}
+
 static void refused(struct spl_synth_options o, int code, const char *field, const char *word)
 {
     struct spl_error err = {0};
@@ -434,6 +470,11 @@ static void bad_arguments_are_named_and_leave_nothing(void **state)
     REFUSED(dropout, -0.1, SPL_E_USAGE, "dropout", "-0.1");
     REFUSED(misregister, 11, SPL_E_USAGE, "misregister", "11 m");
     REFUSED(misregister, NAN, SPL_E_USAGE, "misregister", "0 to 10");
+    REFUSED(without, "unicorn", SPL_E_USAGE, "without", "leaves");
+    REFUSED(only, "class:99", SPL_E_USAGE, "only", "class:99");
+    o.classes = true;
+    REFUSED(formats, "ply,ptx", SPL_E_USAGE, "format", "no room for classes");
+    o.classes = false;
     REFUSED(directory, "", SPL_E_USAGE, "directory", "directory");
     REFUSED(directory, NULL, SPL_E_USAGE, "directory", "directory");
     REFUSED(directory, "/proc/no/where", SPL_E_IO, "", "/proc/no");
@@ -579,6 +620,7 @@ int main(void)
         cmocka_unit_test(poses_in_a_ptx_are_off_by_what_was_asked),
         cmocka_unit_test(points_lie_on_the_surfaces),
         cmocka_unit_test(our_readers_find_the_same_points_and_the_stations),
+        cmocka_unit_test(classes_are_written),
         cmocka_unit_test(bad_arguments_are_named_and_leave_nothing),
         cmocka_unit_test(a_full_disk_keeps_the_old_files),
         cmocka_unit_test(refused_memory_leaves_nothing),

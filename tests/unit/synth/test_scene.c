@@ -461,6 +461,69 @@ static void views_are_printed_in_world_coordinates(void **state)
     assert_string_equal(err.field, "scene");
 }
 
+static void objects_have_classes(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *object;
+        int class;
+    } rows[] = {{"leaves", 5},        {"oak-branches", 5}, {"ground", 2},     {"ground-wire", 13}, {"contact-wires", 14},
+                {"facade-north", 6},  {"field-rape", 2},   {"sphere", 1},     {"underground", 1},  {"wallpaper", 1},
+                {"study-ceiling", 64}, {"chair-2", 65},    {"study-walls", 6}, {"pylon-1", 15},    {"", 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (spl_scene_class(rows[i].object) != rows[i].class)
+            fail_msg("%s is of class %d", rows[i].object, spl_scene_class(rows[i].object));
+}
+
+/* Whatever is left is where it was, and behind what is gone one sees on. */
+static void parts_of_scenes(void **state)
+{
+    (void)state;
+    struct spl_scene *all = NULL, *bare = NULL, *crown = NULL, *same = NULL;
+    struct spl_error err = {0};
+    assert_int_equal(spl_scene_create("courtyard", &all, NULL), 0);
+    assert_int_equal(spl_scene_create_part("courtyard", "class:5", NULL, &bare, NULL), 0);
+    assert_int_equal(spl_scene_create_part("courtyard", NULL, "leaves,branches", &crown, NULL), 0);
+    assert_int_equal(bare->primitive_count + crown->primitive_count, all->primitive_count);
+    assert_int_equal(spl_scene_create_part("courtyard", "wires", "class:5,class:14", &same, NULL), 0);
+    assert_int_equal(same->primitive_count, crown->primitive_count);
+    const uint32_t leaves = spl_scene_find_object(all, "leaves"), branches = spl_scene_find_object(all, "branches");
+    const double eye[3] = {-1, 0.1, 1.6};
+    size_t green = 0;
+    for (int i = 0; i < 400; i++) {
+        const double to[3] = {-4 + 0.1 * (i % 20 - 10) - eye[0], 2.6 - eye[1], 3.3 + 0.1 * (i / 20 - 10) - eye[2]};
+        struct spl_hit a = {0}, b = {0}, c = {0};
+        bool whole = spl_scene_hit(all, eye, to, &a), without = spl_scene_hit(bare, eye, to, &b);
+        bool only = spl_scene_hit(crown, eye, to, &c);
+        assert_true(whole == (without || only));
+        assert_true(!without || (b.id != leaves && b.id != branches));
+        assert_true(!only || c.id == leaves || c.id == branches);
+        const struct spl_hit *nearest = only && (!without || c.t < b.t) ? &c : &b;
+        assert_true(!whole || (a.t == nearest->t && a.id == nearest->id && !memcmp(a.color, nearest->color, 3)));
+        green += only && without && c.t < b.t;
+    }
+    assert_true(green > 100);
+    spl_scene_destroy(all);
+    spl_scene_destroy(bare);
+    spl_scene_destroy(crown);
+    spl_scene_destroy(same);
+    static const struct {
+        const char *without, *only, *field, *word;
+    } wrong[] = {{"unicorn", NULL, "without", "facade-north"}, {NULL, "leaves,", "only", "''"},
+                 {"class:99", NULL, "without", "class:99"},     {"class:", NULL, "without", "class:"},
+                 {"class: 5", NULL, "without", "class: 5"},     {NULL, "class:5x", "only", "class:5x"},
+                 {"leaves", "leaves", "only", "nothing"},       {"", NULL, "without", "''"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        struct spl_scene *none = NULL;
+        err = (struct spl_error){0};
+        assert_int_equal(spl_scene_create_part("courtyard", wrong[i].without, wrong[i].only, &none, &err), SPL_E_USAGE);
+        assert_null(none);
+        assert_string_equal(err.field, wrong[i].field);
+        if (!strstr(err.message, wrong[i].word))
+            fail_msg("'%s' does not say '%s'", err.message, wrong[i].word);
+    }
+}
+
 static void unknown_scenes_and_refused_memory_are_errors(void **state)
 {
     (void)state;
@@ -472,7 +535,7 @@ static void unknown_scenes_and_refused_memory_are_errors(void **state)
     for (long n = 1;; n++) {
         err = (struct spl_error){0};
         spl_memory_fail_after(n);
-        int result = spl_scene_create("railway", &scene, &err);
+        int result = spl_scene_create_part("railway", "rails", NULL, &scene, &err);
         spl_memory_fail_after(0);
         if (!result)
             break;
@@ -496,6 +559,8 @@ int main(void)
         cmocka_unit_test(every_scene_keeps_its_promises),
         cmocka_unit_test(special_places_are_what_they_claim),
         cmocka_unit_test(views_are_printed_in_world_coordinates),
+        cmocka_unit_test(objects_have_classes),
+        cmocka_unit_test(parts_of_scenes),
         cmocka_unit_test(unknown_scenes_and_refused_memory_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
