@@ -196,7 +196,8 @@ export class Soft extends EventTarget {
         ? spanOf(attribute)
         : {low: dataset.bounds.min[2], high: dataset.bounds.max[2]};
       Object.assign($("soft-threshold"), {min: low, max: high, step: (high - low) / STEPS});
-      $("soft-threshold").value = low + 0.75 * (high - low);
+      const far = low + 0.75 * (high - low); // a tenth is soft at least, so that one sees what it does
+      $("soft-threshold").value = attribute ? Math.min(far, quantile(attribute, 0.9)) : far;
       $("soft-side").value = ">";
     }
     if (kinds) this.list(attribute);

@@ -35,13 +35,17 @@ def view(eye, target, fov):
 
 # source, options of pack, what is soft, strength, first and last view
 SCANS = {
-    "street": ("mls/street.las.zst", [], "uncertainty>q0.6", 0.15, None, None),
-    "trees": ("trees/pine_plot.laz", [], "uncertainty>q0.5", 0.15, None, None),
-    "autzen": ("als/autzen_trim.las", [], "class:1", 0.2, None, None),
-    "powerline": ("als/powerline.laz", [], "class:1", 0.2, None, None),
-    "courtyard": ("courtyard", [], "box:-7,0,2.3,-1.5,5.4,6.5", 0.15, view([6, -5, 3], [-4, 2.6, 2.5], 50),
-                  view([-1, 0.1, 1.6], [-4, 2.6, 3.3], 55)),
-    "interior": ("interior", ["--primitives", "all"], "plane:0,0,2.3,0,0,1>0 or plane:0,0.1,0,0,-1,0>0", 0.12,
+    "street": ("mls/street.las.zst", [], "uncertainty>q0.6", 0.1, view([406132.26, 7405434.06, 548.5], [406152.2, 7405467.3, 527.3], 45),
+               view([406140, 7405446, 530], [406156, 7405478, 526], 50)),
+    "trees": ("trees/pine_plot.laz", [], "uncertainty>q0.5", 0.1, view([-3.5, -9.3, 66.2], [5, 5, 57.1], 45),
+              view([-1, -6, 52], [5, 5, 57], 50)),
+    "autzen": ("als/autzen_trim.las", [], "number_of_returns>1", 0.15, view([636114, 848376, 970], [636601, 849187, 451], 45),
+               view([636500, 848800, 600], [636750, 849200, 430], 45)),
+    "powerline": ("als/powerline.laz", [], "class:5", 0.15, view([228860, 578230, 35], [228930, 578480, 15], 45),
+                  view([228880, 578420, 28], [228940, 578500, 8], 50)),
+    "courtyard": ("courtyard", [], "box:-7,0.2,2.2,-1.5,5.4,6.5", 0.1, view([6, -6.5, 5.5], [-3, 2.6, 2.5], 50),
+                  view([-0.4, -1, 1.6], [-4, 2.6, 3.1], 60)),
+    "interior": ("interior", ["--primitives", "all"], "plane:0,0,2.3,0,0,1>0 or plane:0,0.1,0,0,-1,0>0", 0.1,
                  view([3, -4, 6.5], [4, 2.4, 0.8], 50), view([9, -3, 5], [4, 2.4, 0.8], 50)),
 }
 
