@@ -5,11 +5,12 @@ usage: soft.py [SCAN…] [--device LIST] [--size WxH] [--frames N] [--quick] [--
 
 SCAN (street, trees, autzen, powerline, courtyard, interior) says what is soft and from where one looks; the last two are
 `splatd synth`'s. Prints a table in Markdown, a line for each scan and backend: how many splats a frame draws where all is
-solid, how many spheres where some is soft, and their share of both; the splat frame in ms, by the host's clock and by
-processor time of all threads; then layer, express and base, each as a quotient of the splat frame that was drawn in turn
-with it, by both clocks, and for express what the soft stage has of its frame. Where others work on the machine read
-processor time. base and layer are left out (–) where they are refused or take longer than ten minutes. --quick: 640x360,
-3 frames, no base. --pictures: no table; both views of each scan, plain and soft beside each other, as PNG in DIR.
+solid, how many spheres where some is soft, and which share that is (of panels each cell is one); the splat frame in ms,
+by the host's clock and by processor time of all threads; then layer, express and base, each as a quotient of the splat
+frame that was drawn in turn with it, by both clocks, and for express what the soft stage has of its frame. Where others
+work on the machine read processor time. What is refused, or takes longer than ten minutes, is –. --quick: 640x360, 3
+frames, no base. --pictures: no table; both views of each scan plain, soft, and without what is soft, as PNG in DIR, and
+the first two beside each other as JPEG (needs ffmpeg).
 --keep: where datasets go, and are found again.
 
 environment: SPLATD_BINARY (splatd), SPLATD_DATA (real scans; those that are not there are left out)
@@ -35,7 +36,7 @@ def view(eye, target, fov):
 
 # source, options of pack, what is soft, strength, first and last view
 SCANS = {
-    "street": ("mls/street.las.zst", [], "uncertainty>q0.6", 0.1, view([406132.26, 7405434.06, 548.5], [406152.2, 7405467.3, 527.3], 45),
+    "street": ("mls/street.las.zst", [], "uncertainty>q0.8", 0.1, view([406132.26, 7405434.06, 548.5], [406152.2, 7405467.3, 527.3], 45),
                view([406140, 7405446, 530], [406156, 7405478, 526], 50)),
     "trees": ("trees/pine_plot.laz", [], "uncertainty>q0.5", 0.1, view([-3.5, -9.3, 66.2], [5, 5, 57.1], 45),
               view([-1, -6, 52], [5, 5, 57], 50)),
@@ -118,7 +119,7 @@ def measure(name, dataset, o):
     info = json.loads(run("info", dataset, "--json"))
     spheres, splats = soft["spheres_drawn"], soft["splats_drawn"]
     cells = [name, o.backend, f"{info['points']:,}", f"{solid['splats_drawn']:,.0f}", f"{spheres:,.0f}",
-             f"{100 * spheres / max(spheres + splats, 1):.0f} %",
+             "cells" if solid["panels_drawn"] else f"{100 * spheres / max(splats, 1):.0f} %",
              f"{solid['frame_ms']['median']:.0f}, {solid['processor_ms']:.0f}", quotient(found["layer"], "layer"),
              quotient(rows, "express"), f"{100 * soft['passes_ms']['soft'] / soft['frame_ms']['median']:.0f} %",
              quotient(found.get("base"), "base")]
@@ -135,6 +136,9 @@ def picture(name, dataset, o):
         for model, soft in (("plain", []), ("soft", ["--soft", term, "--soft-opacity", strength]),
                             ("without", ["--soft", term, "--soft-opacity", 0])):
             run("render", dataset, *where, *soft, "--device", o.backend, "-o", o.folder / f"{name}-{number}-{model}.png")
+        parts = [part for model in ("plain", "soft") for part in ("-i", o.folder / f"{name}-{number}-{model}.png")]
+        subprocess.run(["ffmpeg", "-v", "error", "-y", *parts, "-filter_complex", "hstack", "-q:v", "4",
+                        o.folder / f"{name}-{number}.jpg"], check=True)
 
 
 def main():
