@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 """Soft transparency beside plain splatting on scans: table 1 of the soft-transparency paper, as ratios of frame times.
 
-usage: soft.py [SCAN…] [--device LIST] [--size WxH] [--frames N] [--quick] [--pictures] [--keep DIR]
+usage: soft.py [SCAN…] [--device LIST] [--size WxH] [--frames N] [--models LIST] [--quick] [--pictures] [--keep DIR]
 
 SCAN (street, trees, autzen, powerline, courtyard, interior) says what is soft and from where one looks; the last two are
 `splatd synth`'s. Prints a table in Markdown, a line for each scan and backend: how many splats a frame draws where all is
 solid, how many spheres where some is soft, and which share that is (of panels each cell is one); the splat frame in ms,
 by the host's clock and by processor time of all threads; then layer, express and base, each as a quotient of the splat
 frame that was drawn in turn with it, by both clocks, and for express what the soft stage has of its frame. Where others
-work on the machine read processor time. What is refused, or takes longer than ten minutes, is –. --quick: 640x360, 3
-frames, no base. --pictures: no table; both views of each scan plain, soft, and without what is soft, as PNG in DIR, and
-the first two beside each other as JPEG (needs ffmpeg).
---keep: where datasets go, and are found again.
+work on the machine read processor time. What is refused, or takes longer than ten minutes, is –; base has two frames.
+--quick: 640x360, 3 frames, no base. --pictures: no table; both views of each scan plain, soft, and without what is
+soft, as PNG in DIR, and the first two beside each other as JPEG (needs ffmpeg). --keep: where datasets go, and are
+found again.
 
 environment: SPLATD_BINARY (splatd), SPLATD_DATA (real scans; those that are not there are left out)
 """
@@ -88,7 +88,8 @@ def bench(name, dataset, model, o):
         views = dataset.with_suffix(".views.json")
         views.write_text(json.dumps({name: {"overview": first, "close": last}}))
         path = ["--views", views, "--set", name]
-    command = [SPLATD, "bench", dataset, *path, "--device", o.backend, "--size", o.size, "--frames", o.frames, "--soft", term,
+    command = [SPLATD, "bench", dataset, *path, "--device", o.backend, "--size", o.size, "--frames",
+               2 if model == "base" else o.frames, "--soft", term,
                "--soft-opacity", strength, "--soft-model", model, "--json"]
     print("$ " + " ".join(map(str, command)), file=sys.stderr)
     try:
@@ -113,14 +114,14 @@ def quotient(rows, model):
 
 
 def measure(name, dataset, o):
-    found = {model: bench(name, dataset, model, o) for model in MODELS if not (o.quick and model == "base")}
+    found = {model: bench(name, dataset, model, o) for model in o.models}
     rows = found["express"]
     solid, soft = rows["solid"], rows["express"]
     info = json.loads(run("info", dataset, "--json"))
     spheres, splats = soft["spheres_drawn"], soft["splats_drawn"]
     cells = [name, o.backend, f"{info['points']:,}", f"{solid['splats_drawn']:,.0f}", f"{spheres:,.0f}",
              "cells" if solid["panels_drawn"] else f"{100 * spheres / max(splats, 1):.0f} %",
-             f"{solid['frame_ms']['median']:.0f}, {solid['processor_ms']:.0f}", quotient(found["layer"], "layer"),
+             f"{solid['frame_ms']['median']:.0f}, {solid['processor_ms']:.0f}", quotient(found.get("layer"), "layer"),
              quotient(rows, "express"), f"{100 * soft['passes_ms']['soft'] / soft['frame_ms']['median']:.0f} %",
              quotient(found.get("base"), "base")]
     print("| " + " | ".join(cells) + " |", flush=True)
@@ -147,6 +148,7 @@ def main():
     parser.add_argument("--device", default="vulkan,egl")
     parser.add_argument("--size")
     parser.add_argument("--frames", type=int)
+    parser.add_argument("--models")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--pictures", action="store_true")
     parser.add_argument("--keep", type=pathlib.Path)
@@ -154,6 +156,9 @@ def main():
     for name in o.scans:
         if name not in SCANS:
             parser.error(f"'{name}' is none of {', '.join(SCANS)}")
+    o.models = o.models.split(",") if o.models else [m for m in MODELS if not (o.quick and m == "base")]
+    if "express" not in o.models or set(o.models) - set(MODELS):
+        parser.error("--models is express and any of layer, base")
     o.size = o.size or ("640x360" if o.quick else "1280x720")
     o.frames = o.frames or (3 if o.quick else 8)
     with tempfile.TemporaryDirectory() as temporary:

@@ -21,7 +21,7 @@ SERVICE = "http://127.0.0.1:8080"
 ELSEWHERE = re.compile(r"https://|\$TOKEN|docker |kubectl ")
 # (command, what its example has, what is put behind it so that it does not take long)
 SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--size 16x12"),
-           ("synth", "--panoramas", "--panoramas 256 --samples 1"), ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"),
+           ("synth", "--panoramas", "--panoramas 256 --samples 1"), ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"), ("tour", "roof-tour", "--frames 5"),
            ("render", "", "--size 32")]
 
 
