@@ -18,6 +18,9 @@ layout(std430, binding = SPL_STORAGE_ITEMS) writeonly buffer item_buffer { uint 
 layout(std430, binding = SPL_STORAGE_SORT_TO) writeonly buffer pair_buffer { uint pairs[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_MARKS) mark_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_STARTS) start_texels;
+#ifdef SPL_CELL_LANES
+SPL_TEXEL_BUFFER(SPL_TEXELS_TESTS) test_texels;
+#endif
 
 /* The samples along an axis, inclusive, that a sphere at p, depth q, may reach. */
 vec2 sphere_extent(float p, float q, float radius, float f, float c)
@@ -35,6 +38,21 @@ uint mark_at(spl_draw_chunk chunk, uint i)
 {
     uint cell = i >> SPL_CELL, word = chunk.marks + item_of(i) * SPL_MARKS_PANEL + (cell >> 2);
     return imageLoad(mark_texels, int(word)).x >> 8u * (cell & 3u) & 255u;
+}
+
+/* Where its node's cube begins or ends, from the eye along the world's axes. */
+vec3 cube_end(uint word)
+{
+    int at = int(word);
+    return uintBitsToFloat(uvec3(imageLoad(test_texels, at).x, imageLoad(test_texels, at + 1).x,
+                                 imageLoad(test_texels, at + 2).x));
+}
+
+/* Does a cell's middle lie in it? Others are drawn by the node that they lie in: src/render/select_soft.c. */
+bool is_own(vec3 p, vec3 low, vec3 high)
+{
+    vec3 at = rotate_to_world(p);
+    return all(greaterThanEqual(at, low)) && all(lessThan(at, high));
 }
 #else
 #define SPL_SLOT_ITEMS SPL_SOFT_SLOT_SPLATS
@@ -65,6 +83,10 @@ void main()
     uint count = 0u, entries = 0u, most = 0u, nearest = SPL_NOTHING, farthest = 0u, largest = 0u, thin = 0u;
     uint next = PHASE == 2u ? imageLoad(start_texels, int(known ? slot : 0u)).x : 0u;
     uint columns = job.columns;
+#ifdef SPL_CELL_LANES
+    uint cube = known ? run.chunk.color_base : 0u;
+    vec3 cube_low = cube_end(cube), cube_high = cube_end(cube + 3u);
+#endif
     for (uint k = 0u;;) {
         uint i = first + k * stride;
         uint mark = MARKED != 0u ? mark_at(run.chunk, i) : SPL_MARK_WHOLE;
@@ -77,6 +99,9 @@ void main()
             uint key = floatBitsToUint(p.z);
             bool after = key > job.low || (key == job.low && slot >= job.low_slot);
             bool before = key < job.high || (key == job.high && slot < job.high_slot);
+#ifdef SPL_CELL_LANES
+            before = before && is_own(p, cube_low, cube_high);
+#endif
             if (p.z >= frame.near && p.z <= frame.far && low.x <= high.x && low.y <= high.y && after && before) {
                 uvec2 from = uvec2(ivec2(low) - tile_corner()) / uvec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
                 uvec2 span = uvec2(ivec2(high) - tile_corner()) / uvec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) - from;

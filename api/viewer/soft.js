@@ -34,6 +34,43 @@ function histogram(attribute) {
   return bins;
 }
 
+/** The share of an attribute's values that are less; at a place of the slider. */
+function shareBelow(attribute, at) {
+  const {quantiles} = attribute.values,
+    value = at * spanOf(attribute).unit,
+    above = quantiles.findIndex((x) => x > value);
+  if (above <= 0) return above < 0 ? 1 : 0;
+  const [a, b] = [quantiles[above - 1], quantiles[above]];
+  return (above - 1 + (value - a) / (b - a)) / (quantiles.length - 1);
+}
+
+/** Where on the slider a share of them is less. */
+function quantile(attribute, share) {
+  const {quantiles} = attribute.values,
+    place = Math.min(1, Math.max(0, share)) * (quantiles.length - 1),
+    low = Math.floor(place),
+    [a, b] = [quantiles[low], quantiles[Math.min(low + 1, quantiles.length - 1)]];
+  return (a + (b - a) * (place - low)) / spanOf(attribute).unit;
+}
+
+/** The values that `3-5,9` names; null where it names one that is not among `kinds`. */
+function namedKinds(text, kinds) {
+  const named = text.split(",").flatMap((part) => {
+    const [low, high = low] = part.split(/-|\.\./).map(Number);
+    const within = kinds.map(({value}) => value).filter((value) => value >= low && value <= high);
+    return within.length && high >= low ? within : [null];
+  });
+  return named.includes(null) ? null : named;
+}
+
+/** What a class of a scan is, by ASPRS; a dataset's own numbers have no name. */
+const CLASSES = ["not classified", "unclassified", "ground", "low vegetation", "medium vegetation", "high vegetation",
+  "building", "low noise", , "water", "rail", "road", , "guard wire", "wire", "tower", "connector", "bridge", "high noise"];
+const nameOf = ({name}, value) => (name === "class" && CLASSES[value] ? `${value} ${CLASSES[value]}` : `${value}`);
+
+/** As a share is read: 0.4 %, 12 %. */
+const percent = (share) => `${(100 * share).toFixed(share > 0 && share < 0.1 ? 1 : 0)} %`;
+
 const short = (x) => `${Number(x.toPrecision(4))}`;
 
 export class Soft extends EventTarget {
@@ -116,12 +153,13 @@ export class Soft extends EventTarget {
 
   /** Sets the controls to what a text says, where they can say it. */
   recognise(text) {
-    const compare = text.match(/^(\w+)([<>])([-+.\de]+)$/i),
+    const compare = text.match(/^(\w+)([<>])(q?)([-+.\de]+)$/i),
       height = text.match(/^plane:0,0,([-+.\de]+),0,0,1>0$/i),
-      list = text.match(/^(\w+):([\d,]+)$/);
+      list = text.match(/^(\w+):(\d+(?:(?:-|\.\.)\d+)?(?:,\d+(?:(?:-|\.\.)\d+)?)*)$/);
     const named = (name) => this.dataset.attributes.find((attribute) => attribute.name === name);
     const what = $("soft-what");
-    const kinds = list && named(list[1])?.values?.kinds;
+    const known = list && named(list[1])?.values?.kinds,
+      kinds = known && namedKinds(list[2], known);
     what.value = !text
       ? ""
       : height
@@ -136,10 +174,10 @@ export class Soft extends EventTarget {
     if (height) $("soft-threshold").value = height[1];
     if (compare && what.value === compare[1]) {
       $("soft-side").value = compare[2];
-      $("soft-threshold").value = compare[3];
+      $("soft-threshold").value = compare[3] ? quantile(this.attribute, Number(compare[4])) : compare[4];
     }
     if (kinds)
-      for (const box of $("soft-kinds").querySelectorAll("input")) box.checked = list[2].split(",").includes(box.value);
+      for (const box of $("soft-kinds").querySelectorAll("input")) box.checked = kinds.includes(Number(box.value));
     this.label();
   }
 
@@ -162,7 +200,8 @@ export class Soft extends EventTarget {
         ? spanOf(attribute)
         : {low: dataset.bounds.min[2], high: dataset.bounds.max[2]};
       Object.assign($("soft-threshold"), {min: low, max: high, step: (high - low) / STEPS});
-      $("soft-threshold").value = low + 0.75 * (high - low);
+      const far = low + 0.75 * (high - low); // a tenth is soft at least, so that one sees what it does
+      $("soft-threshold").value = attribute ? Math.min(far, quantile(attribute, 0.9)) : far;
       $("soft-side").value = ">";
     }
     if (kinds) this.list(attribute);
@@ -171,13 +210,14 @@ export class Soft extends EventTarget {
   }
 
   /** A box for each value. */
-  list({values}) {
+  list(attribute) {
+    const {values} = attribute;
     $("soft-kinds").replaceChildren(
       ...values.kinds.map(({value, count}) => {
         const [label, box] = [document.createElement("label"), document.createElement("input")];
         Object.assign(box, {type: "checkbox", value});
-        label.append(box, ` ${value} `, Object.assign(document.createElement("small"), {
-          textContent: `${((100 * count) / values.count).toFixed(1)} %`,
+        label.append(box, ` ${nameOf(attribute, value)} `, Object.assign(document.createElement("small"), {
+          textContent: percent(count / values.count),
         }));
         return label;
       }),
@@ -212,8 +252,13 @@ export class Soft extends EventTarget {
 
   label() {
     const above = $("soft-side").value === ">",
-      slider = $("soft-threshold");
-    $("soft-threshold-label").textContent = `${$("soft-what").value === ":height" ? "Height" : "Threshold"} ${short(slider.valueAsNumber)}`;
+      slider = $("soft-threshold"),
+      {attribute} = this,
+      below = attribute?.values && !attribute.values.kinds ? shareBelow(attribute, slider.valueAsNumber) : null;
+    $("soft-threshold-label").textContent =
+      `${$("soft-what").value === ":height" ? "Height" : "Threshold"} ${short(slider.valueAsNumber)}` +
+      (below === null ? "" : `: ${percent(above ? 1 - below : below)} soft`);
+    slider.setAttribute("aria-valuetext", $("soft-threshold-label").textContent);
     $("soft-opacity-label").textContent = `Strength ${Number($("control-soft_opacity").value)}`;
     const [low, high] = [Number(slider.min), Number(slider.max)];
     $("soft-histogram")

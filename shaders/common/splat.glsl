@@ -122,6 +122,16 @@ vec3 rotate_to_view(vec3 v)
     return r;
 }
 
+/* Of a view-space place: from the eye, along the world's axes. */
+vec3 rotate_to_world(vec3 v)
+{
+    precise vec3 r;
+    r.x = frame.rotation[0] * v.x + frame.rotation[4] * v.y + frame.rotation[8] * v.z;
+    r.y = frame.rotation[1] * v.x + frame.rotation[5] * v.y + frame.rotation[9] * v.z;
+    r.z = frame.rotation[2] * v.x + frame.rotation[6] * v.y + frame.rotation[10] * v.z;
+    return r;
+}
+
 /* Run `entry` of the dispatch; empty behind the list's end. */
 splat_run load_run_of(uint entry)
 {

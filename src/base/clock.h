@@ -16,6 +16,14 @@ static inline uint64_t spl_now_ns(void)
     return (uint64_t)t.tv_sec * SPL_NS_PER_S + (uint64_t)t.tv_nsec;
 }
 
+/* What all threads of this process have worked. */
+static inline uint64_t spl_processor_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (uint64_t)t.tv_sec * SPL_NS_PER_S + (uint64_t)t.tv_nsec;
+}
+
 /* What is left until `deadline_ns`; 0 once it has passed. */
 static inline uint64_t spl_remaining_ns(uint64_t deadline_ns)
 {

@@ -61,13 +61,14 @@ static json_t *row_json(const struct spl_bench_row *row)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(row->dataset);
     return json_pack(
-        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f, s:s, s:i, s:I}",
+        "{s:s, s:I, s:s, s:s, s:s, s:s, s:f, s:o, s:f, s:o, s:f, s:o, s:f, s:f, s:f, s:f, s:f, s:f, s:s, s:i, s:I}",
         "dataset", info->id, "leaf_splats", (json_int_t)info->leaf_splats, "backend", row->device.backend, "device",
         row->device.name, "driver", row->device.driver, "method", spl_method_name(row->method), "lod", row->lod,
-        "frame_ms", summary_json(&row->frame), "units", summary_json(&row->units), "floor_ms", row->floor, "passes_ms",
-        passes_json(row), "splats_drawn", row->splats, "panels_drawn", row->panels, "meshes_drawn", row->meshes,
-        "lines_drawn", row->lines, "chunks_drawn", row->chunks, "soft", name_soft(row->drawn_soft),
-        "incomplete_frames", (int)row->incomplete, "memory_bytes", (json_int_t)row->memory);
+        "frame_ms", summary_json(&row->frame), "processor_ms", row->processor, "units", summary_json(&row->units),
+        "floor_ms", row->floor, "passes_ms", passes_json(row), "splats_drawn", row->splats, "panels_drawn", row->panels,
+        "meshes_drawn", row->meshes, "lines_drawn", row->lines, "chunks_drawn", row->chunks, "spheres_drawn",
+        row->spheres, "soft", name_soft(row->drawn_soft), "incomplete_frames", (int)row->incomplete, "memory_bytes",
+        (json_int_t)row->memory);
 }
 
 int spl_cmd_bench_print_json(const struct spl_bench_options *o, const struct spl_bench_report *r, struct spl_error *err)

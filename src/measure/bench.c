@@ -13,7 +13,7 @@
 #include "shared.h"
 
 struct sample {
-    double frame, calibrator;
+    double frame, processor, calibrator;
     struct spl_frame_stats stats;
 };
 
@@ -92,9 +92,10 @@ static int render(struct bench *b, size_t row, uint32_t frame, struct sample *sa
     if (status)
         return status;
     struct spl_frame image;
-    uint64_t begin = spl_now_ns();
+    uint64_t begin = spl_now_ns(), worked = spl_processor_ns();
     status = spl_renderer_render(b->renderers[row_device(o, row)], b->report->rows[row].dataset, &view, &image, err);
     sample->frame = (double)(spl_now_ns() - begin) / SPL_NS_PER_MS;
+    sample->processor = (double)(spl_processor_ns() - worked) / SPL_NS_PER_MS;
     if (status)
         return status;
     sample->stats = image.stats;
@@ -144,6 +145,7 @@ static void summarise_row(struct bench *b, size_t index)
     const uint32_t frames = b->options->frames;
     const struct sample *samples = &b->samples[index * frames];
     row->frame = SUMMARY(s->frame);
+    row->processor = SUMMARY(s->processor).median;
     row->units = SUMMARY(s->frame / s->calibrator);
     row->floor = SUMMARY(s->calibrator * (double)s->stats.splats_drawn / SPL_CALIBRATOR_POINTS).median;
 #define STAGE(name) row->name = SUMMARY(s->stats.name##_ms).median;
@@ -153,6 +155,7 @@ static void summarise_row(struct bench *b, size_t index)
     row->panels = SUMMARY(s->stats.panels_drawn).median;
     row->meshes = SUMMARY(s->stats.meshes_drawn).median;
     row->lines = SUMMARY(s->stats.lines_drawn).median;
+    row->spheres = SUMMARY(s->stats.soft_drawn).median;
     row->chunks = SUMMARY(s->stats.chunks_drawn).median;
     row->memory = spl_renderer_get_memory(b->renderers[row_device(b->options, index)]);
     for (uint32_t f = 0; f < frames; f++)

@@ -37,6 +37,7 @@ struct spl_bench_row {
     double lod;
     const struct spl_soft_params *drawn_soft; /* of the options */
     struct spl_summary frame;
+    double processor;                    /* median: processor time of all threads, a software device's with them */
     struct spl_summary units;            /* frame / calibrator of the same place on the path */
     double floor;                        /* median: the calibrator's time for as many points as splats were drawn */
 #define STAGE(name) double name; /* median */
@@ -44,6 +45,7 @@ struct spl_bench_row {
 #undef STAGE
     double splats, chunks;               /* drawn, medians */
     double panels, meshes, lines;        /* likewise; lines by their straight pieces */
+    double spheres;                      /* likewise */
     uint32_t incomplete;                 /* frames in which coarser nodes stood in for pages that were not resident */
     uint64_t memory;                     /* device bytes held, all datasets together */
 };

@@ -217,12 +217,12 @@ static uint32_t count_layers(const struct spl_chunk *chunk)
 }
 
 /* Panels and meshes are drawn whole, or all of their cells are: as discs of their spacing, or as points. */
-static int draw_panels(struct spl_walk *w, const double node_to_eye[3], const struct spl_view_box *node_box,
-                       const struct spl_chunk *chunk, uint32_t page, struct spl_error *err)
+static int draw_panels(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3],
+                       const struct spl_view_box *node_box, const struct spl_chunk *chunk, struct spl_error *err)
 {
     enum { cells = SPL_PANEL_SIDE * SPL_PANEL_SIDE };
     const struct spl_camera *camera = w->params->camera;
-    const uint32_t kind = spl_chunk_kind(chunk);
+    const uint32_t kind = spl_chunk_kind(chunk), page = node->page;
     const bool mesh = kind == SPL_CHUNK_MESHES, as_such = mesh ? w->params->meshes : w->params->panels;
     const double disc = spl_walk_largest_radius(chunk);
     const double half = hypot(sqrt(0.5) * SPL_PANEL_SIDE * (double)chunk->step, (double)spl_panels_get_reach(chunk));
@@ -258,6 +258,11 @@ static int draw_panels(struct spl_walk *w, const double node_to_eye[3], const st
     out.color_base = 0;
     w->list->drawn[kind] += chunk->count;
     rc = spl_walk_list_marks(w, &(struct spl_draw_origin){.page = page, .kind = kind}, &out, err);
+    if (!rc) {
+        struct spl_panel_frame frame;
+        spl_panels_get_frame(chunk, &frame);
+        rc = spl_walk_hold_cells(w, node, node_to_eye, frame.normal, &out, err);
+    }
     if (!rc)
         rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = kind}, &out, &cells_box, disc, err);
     if (rc || !w->judged.solid)
@@ -300,7 +305,7 @@ int spl_walk_draw(struct spl_walk *w, const struct spl_found_node *found, struct
         const struct spl_chunk *chunk = &chunks[i];
         uint32_t kind = spl_chunk_kind(chunk);
         int rc = kind == SPL_CHUNK_LINES     ? draw_lines(w, node_to_eye, &whole, chunk, node->page, err)
-                 : spl_kind_has_panels(kind) ? draw_panels(w, node_to_eye, &whole, chunk, node->page, err)
+                 : spl_kind_has_panels(kind) ? draw_panels(w, node, node_to_eye, &whole, chunk, err)
                                              : draw_discs(w, found, node_to_eye, &whole, chunk, err);
         if (rc)
             return rc;

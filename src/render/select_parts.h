@@ -68,6 +68,10 @@ bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, co
  * otherwise. */
 int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,
                         struct spl_error *err);
+/* Where it has soft cells of panels: says in it where the cube of its node is, to which they are held along the plane of
+ * `normal`. */
+int spl_walk_hold_cells(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3],
+                        const float normal[3], struct spl_draw_chunk *chunk, struct spl_error *err);
 /* Where it has soft splats and these are drawn: lists them, of panels their cells, each a sphere of `radius` at most;
  * `box` holds these. */
 int spl_walk_list_soft(struct spl_walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,

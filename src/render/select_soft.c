@@ -1,6 +1,12 @@
 /* What of a chunk is soft, as it is listed: solid, soft, or both with marks, which are made once for all windows. Where
  * nothing is soft, or nothing of a chunk, it is listed as ever. */
+#include <math.h>
+#include <string.h>
+
 #include "render/select_parts.h"
+
+/* A face of a node cuts a plane where the plane's normal has less than this along the face's. */
+static const double across_below = 0.8;
 
 void spl_walk_judge(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box)
 {
@@ -59,6 +65,25 @@ int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, 
     const struct spl_draw_origin origin = {.page = from->page, .kind = from->kind, .role = SPL_ROLE_MARK};
     return spl_draw_list_add(w->list, &origin, &marked, &(struct spl_chunk_bounds){0},
                              panels ? SPL_PANEL_SIDE * SPL_PANEL_SIDE : 1, err);
+}
+
+/* Panels of neighbouring nodes reach over each other by about a cell, which solid ones do not show. A cell is drawn by
+ * the node in whose cube its middle lies; but across a face that lies along the plane, points of both nodes have made
+ * cells, and neither has them all: there both are drawn. */
+int spl_walk_hold_cells(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3],
+                        const float normal[3], struct spl_draw_chunk *chunk, struct spl_error *err)
+{
+    float ends[2][3];
+    uint32_t words[6];
+    if (!w->judged.soft || !w->params->draws_soft)
+        return SPL_OK;
+    for (int a = 0; a < 3; a++) {
+        const bool across = node->depth && fabs((double)normal[a]) < across_below; // the root has no neighbours
+        ends[0][a] = across ? (float)node_to_eye[a] : -INFINITY;
+        ends[1][a] = across ? (float)(node_to_eye[a] + (double)node->size) : INFINITY;
+    }
+    memcpy(words, ends, sizeof words);
+    return spl_draw_list_add_tests(w->list, words, 6, &chunk->color_base, err);
 }
 
 int spl_walk_list_soft(struct spl_walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,

@@ -21,7 +21,7 @@ SERVICE = "http://127.0.0.1:8080"
 ELSEWHERE = re.compile(r"https://|\$TOKEN|docker |kubectl ")
 # (command, what its example has, what is put behind it so that it does not take long)
 SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--size 16x12"),
-           ("synth", "--panoramas", "--panoramas 256 --samples 1"), ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"),
+           ("synth", "--panoramas", "--panoramas 256 --samples 1"), ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"), ("tour", "roof-tour", "--frames 5"),
            ("render", "", "--size 32")]
 
 
@@ -98,6 +98,7 @@ def test_commands():
         pathlib.Path(full, "groundtruth.txt").write_text("1 3 0 1 0 0 0 1\n2 3 0 2 0 0 0 1\n")
         pathlib.Path(full, "keys.json").write_text('{"keyframes": [{"camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "fov": 60}},'
                                                    ' {"camera": {"eye": [2, 1, 1], "target": [0, 0, 1], "fov": 60}}], "fps": 2}')
+        shutil.copytree(ROOT / "api/examples", pathlib.Path(full, "api/examples"))
         key = pathlib.Path(full, "url.key")
         key.write_text("0123456789abcdef0123456789abcdef\n")
         key.chmod(0o600)

@@ -771,7 +771,9 @@ def test_what_is_soft():
             tab.key("ArrowLeft")
         less = next_link(tab, lambda now: now["soft"] != term)["soft"]
         less = next_link(tab, lambda now: float(now["soft"].split(">")[1]) < float(term.split(">")[1]) - 0.014)["soft"]
-        assert tab.text("#soft-threshold-label") == f"Threshold {less.split('>')[1]}"
+        at, share = re.fullmatch(r"Threshold ([\d.]+): ([\d.]+) % soft", tab.text("#soft-threshold-label")).groups()
+        assert at == less.split(">")[1] and abs(float(share) - 100 * (1 - (0.08 * float(at) / 0.1) ** 0.25)) < 0.7, (at, share)
+        assert "soft" in tab.run("document.querySelector('#soft-threshold').getAttribute('aria-valuetext')")
         tab.choose("#soft-side", "<")
         next_link(tab, lambda now: now["soft"] == less.replace(">", "<"))
         tab.run("document.querySelector('#control-soft_opacity').focus()")
@@ -789,10 +791,20 @@ def test_what_is_soft():
         tab.until(REST)
         tab.choose("#soft-what", "class")
         next_link(tab, lambda now: "soft" not in now)  # none is chosen yet
-        assert tab.run("[...document.querySelectorAll('#soft-kinds label')].map(e => e.textContent.trim())") == ["2 75.0 %", "5 25.0 %"]
+        assert tab.run("[...document.querySelectorAll('#soft-kinds label')].map(e => e.textContent.trim())") == ["2 ground 75 %", "5 high vegetation 25 %"]
         tab.run("document.querySelector('#soft-kinds input[value=\"5\"]').focus()")
         tab.key(" ")
         next_link(tab, lambda now: now.get("soft") == "class:5")
+        for written, checked in ("class:3-5", [False, True]), ("class:2..5", [True, True]), ("class:2,5", [True, True]):
+            tab.choose("#soft-terms", written)
+            next_link(tab, lambda now: now.get("soft") == written)  # as it was written, and the boxes as it says
+            assert tab.run("[document.querySelector('#soft-what').value, "
+                           "...[...document.querySelectorAll('#soft-kinds input')].map(e => e.checked)]") == ["class", *checked]
+        tab.choose("#soft-terms", "class:2,7")
+        assert tab.run("document.querySelector('#soft-what').value") == ":text"
+        tab.choose("#soft-terms", "uncertainty<q0.5")
+        assert tab.run("['what', 'side'].map(n => document.querySelector('#soft-' + n).value)") == ["uncertainty", "<"]
+        assert re.fullmatch(r"Threshold 0.0\d+: (49|50|51) % soft", tab.text("#soft-threshold-label"))
         tab.choose("#soft-what", ":height")
         height = next_link(tab, lambda now: now["soft"].startswith("plane"))["soft"]
         assert re.fullmatch(r"plane:0,0,1\.\d+,0,0,1>0", height), height

@@ -143,6 +143,11 @@ static struct spl_view make_view(const struct golden *golden)
     view.supersample = golden->supersample;
     view.disc.atoms = golden->atoms;
     view.maps = golden->maps ? SPL_MAPS_ON : SPL_MAPS_OFF;
+    if (golden->soft && spl_soft_parse(golden->soft, &view.soft, NULL))
+        abort();
+    view.soft.model = golden->model;
+    view.soft.opacity = golden->opacity;
+    view.soft.blend = golden->blend;
     memcpy(view.background, golden->background, sizeof view.background);
     return view;
 }

@@ -53,6 +53,20 @@ with tempfile.TemporaryDirectory() as folder:
         said = run("tour", "c.spld", "--path", "whole.json", "--size", "64x48", "--layer", "depth", "--format", "png",
                    "--depth-scale", scale, "-o", "png")
         assert ("of 3 frames lie beyond 65535 steps" in said) == lost, said
+    # the example whose roof fades: first and last frame are those of 'render', the roof gone in the last
+    example = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"], "api/examples/roof-tour.json").resolve()
+    roof = ["--soft", "plane:0,0,2.3,0,0,1>0", "--size", "64x48"]
+    run("synth", "interior", "--points", 20000, "--format", "ply", "-o", ".")
+    run("pack", "interior.ply", "--primitives", "all", "-o", "interior.spld")
+    run("tour", "interior.spld", "--path", example, *roof, "--frames", 6, "--format", "png", "-o", "roof")
+    keys = json.loads(example.read_text())["keyframes"]
+    frames = [pathlib.Path("roof", f"{i:06}.png").read_bytes() for i in range(6)]
+    for i in (0, 5):
+        place = [f"--{name}={','.join(map(str, keys[i]['camera'][name]))}" for name in ("eye", "target", "up")]
+        run("render", "interior.spld", *place, "--fov", keys[i]["camera"]["fov"], *roof, "--soft-opacity", keys[i]["soft_opacity"],
+            "-o", "key.png")
+        assert pathlib.Path("key.png").read_bytes() == frames[i], i
+    assert len(set(frames)) == 6 and keys[0]["soft_opacity"] == 1 and keys[-1]["soft_opacity"] == 0
     for arguments, said in [
         (["-o", "x"], "--path"), (["--path", "keys.json"], "-o"), (["--path", "nowhere.json", "-o", "x"], "nowhere.json"),
         (["--path", "keys.json", "-o", "x"], "frames or seconds"), (["--path", "keys.json", "--ease", "up", "-o", "x"], "--ease"),

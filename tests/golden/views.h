@@ -24,6 +24,9 @@ struct golden {
     uint32_t atoms;           /* of the textures that every splat has; 0 = its colour */
     bool maps;                /* those of the station are drawn */
     bool relief;              /* of meshes, else of the courtyard */
+    const char *soft;         /* terms of what is drawn as soft spheres; NULL = nothing */
+    enum spl_soft_model model;
+    double opacity, blend;
 };
 
 static const struct golden goldens[] = {
@@ -65,6 +68,21 @@ static const struct golden goldens[] = {
     /* the same by the nearest alone: each triangle has one normal */
     {"relief-normal", {0.4, -1.2, 0.7}, {0, 0, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_NORMAL, 0, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}, .relief = true},
+    /* a crown through which one sees, in fixed point, and its border to what is solid: rows of its splats are partly
+     * soft. A level is a rounding of the solid behind it; a splat whose centre moves over a sample's border adds or
+     * takes a whole sphere there */
+    {"soft-express", {-0.4, -1, 1.6}, {-4, 2.6, 3.1}, 60, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.004}, .soft = "plane:0,0,2.4,0,0,1>0", .opacity = 0.15, .blend = 1},
+    /* the same in base, whose stretches add what overlaps: logarithms and exponentials of drivers, 1 level more */
+    {"soft-base", {-0.4, -1, 1.6}, {-4, 2.6, 3.1}, 60, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {2, 0.004}, .soft = "plane:0,0,2.4,0,0,1>0", .model = SPL_SOFT_MODEL_BASE, .opacity = 0.3},
+    /* one layer over a transparent sky: straight alpha of what soft and solid hold back together; where the nearest of
+     * two spheres changes, a whole colour does */
+    {"soft-layer", {0, -2, 1.5}, {-1, 3, 6}, 60, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
+     {1, 0.006}, .soft = "box:-7,0,2,-1,6,8", .model = SPL_SOFT_MODEL_LAYER, .opacity = 0.5},
+    /* cells of panels and meshes as spheres, some of a panel solid, method nearest */
+    {"soft-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
+     {1, 0.004}, .relief = true, .soft = "plane:0,0,0,1,0,0.2>0", .opacity = 0.2},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

@@ -53,6 +53,7 @@ with tempfile.TemporaryDirectory() as folder:
     soft = ["--soft", "box:-2,-2,0,2,2,3", "--soft", "plane:0,0,2,0,0,1>0", "--soft-model", "layer,express"]
     rows = json.loads(must("bench", folder / "a.spld", *common, *soft, "--lod", "2,1", "--json"))["rows"]
     assert [(r["lod"], r["soft"]) for r in rows] == [(l, s) for l in (2, 1) for s in ("solid", "layer", "express")], rows
+    assert all((r["spheres_drawn"] > 0) == (r["soft"] != "solid") and r["processor_ms"] > 0 for r in rows), rows
     table = must("bench", folder / "a.spld", *common, *soft)
     assert "spheres" in table and "spheres" not in must("bench", folder / "a.spld", *common)
     assert [line.split()[3] for line in table.splitlines() if line.startswith("a ")] == ["solid", "layer", "express"], table

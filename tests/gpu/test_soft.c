@@ -377,12 +377,75 @@ static void loss_is_told(void **state)
     done(dataset);
 }
 
+/* A wall along x, upright where `lean` is 0, of panels of 16 cells: one in the octant below x = 0, one in that above,
+ * both `reach` cells beyond where these meet. Splats in the corners say where that is. */
+static struct spl_dataset *wall_of_two(int reach, double lean, int levels)
+{
+    enum { side = SPL_PANEL_SIDE };
+    struct make_splat corners[8] = {0};
+    struct spl_panel panels[2][2] = {0};
+    struct make_panels made[2] = {0};
+    for (int i = 0; i < 8; i++) {
+        corners[i].radius = 0.01f;
+        corners[i].normal[1] = 1;
+        for (int a = 0; a < 3; a++)
+            corners[i].position[a] = i >> a & 1 ? 2 : -2;
+    }
+    for (int m = 0; m < 2; m++) {
+        const double sign = m ? 1 : -1; // u is -x of the second
+        made[m] = (struct make_panels){.plane = {.origin = {sign * 0.5, lean > 0 ? -1e-3 : -0.3, -1.1},
+                                                 .normal = {0, (float)(sign * cos(lean)), (float)(sign * -sin(lean))},
+                                                 .cell = 1.0f / 32, .points = 100},
+                                       .panels = panels[m], .count = reach ? 2 : 1, .color_error = 3};
+        for (int p = 0; p < 2; p++)
+            for (int y = 0; y < side; y++) {
+                panels[m][p].column = (uint8_t)p;
+                panels[m][p].cells[y] = (uint16_t)(p ? (1 << reach) - 1 : 0xffff);
+                for (int x = 0; x < side; x++)
+                    memcpy(panels[m][p].color[y][x], (uint8_t[]){220, (uint8_t)(90 * m), 40}, 3);
+            }
+    }
+    struct spl_dataset *dataset = make_dataset_panels(corners, 8, made, 2, levels);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    return dataset;
+}
+
+/* Cells of neighbouring nodes that lie over each other are drawn once, unless the face between the nodes lies along
+ * their plane: then neither node need have all of them. */
+static void neighbours_do_not_add_up(void **state)
+{
+    (void)state;
+    struct spl_view view = looking(origin, 3, 160, 120);
+    const double eye[3] = {0.2, -1.5, -0.8}, target[3] = {0, 0, -0.85}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    view.lod = 0;
+    view.camera.far = 2; // not the corners
+    soften(&view, 1, -100, 0.3);
+    for (int leans = 0; leans < 2; leans++) {
+        const double lean = leans ? 0.01 : 0; // through y = 0 in the middle of the wall
+        struct spl_dataset *over = wall_of_two(2, lean, 2), *meet = wall_of_two(0, lean, 2), *one = wall_of_two(2, lean, 1);
+        struct spl_frame a = draw(renderer, over, &view), b = draw(renderer, meet, &view), c = draw(renderer, one, &view);
+        assert_int_equal(b.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
+        assert_int_equal(a.stats.soft_drawn, b.stats.soft_drawn);
+        assert_int_equal(c.stats.soft_drawn, b.stats.soft_drawn + 4 * SPL_PANEL_SIDE);
+        assert_int_equal(worst_level(&a, &b), 0);
+        assert_true(worst_level(&b, &c) > 10);
+        spl_frame_finish(&a);
+        spl_frame_finish(&b);
+        spl_frame_finish(&c);
+        done(over);
+        done(meet);
+        done(one);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
         frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
+        frames_test(neighbours_do_not_add_up),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }
