@@ -234,7 +234,7 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     bool usual = !job->request.picks && !job->request.container;
     bool cut_short = job->request.view.partial && !job->stats.complete;
     if (job->plan && usual && !job->stats.pages_loaded && !cut_short) // loading is no property of the setting
-        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
+        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS, job->stats.soft_ms);
 }
 
 /* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
