@@ -307,7 +307,8 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'uncertainty>q0.9'");
     if (a->soft.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
         return spl_fail(err, SPL_E_USAGE,
-                        "--reference and --photographs show nothing soft: with --soft the dataset's own render is compared");
+                        "--reference and --photographs show nothing soft: with --soft the reference is the dataset's "
+                        "own render");
     if (!a->soft_model_count)
         a->soft_models[a->soft_model_count++] = SPL_SOFT_MODEL_EXPRESS;
     a->softs[0] = (struct spl_soft_params){.opacity = a->soft.opacity};

@@ -83,8 +83,8 @@ ptrdiff_t spl_planner_find(const struct spl_planner *planner, const struct spl_s
 void spl_planner_learn(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height, enum spl_layer layer,
                        double ms);
 
-/* The same of a frame in which something was soft, of whose time soft_ms were the soft stage's: it teaches what is soft,
- * not the setting. */
+/* The same of a frame in which something was soft, of whose time soft_ms were the soft stage's: it teaches what is
+ * soft, not the setting. */
 void spl_planner_learn_soft(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
                             enum spl_layer layer, const struct spl_soft_params *soft, double ms, double soft_ms);
 

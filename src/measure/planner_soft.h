@@ -4,10 +4,10 @@
  * The stage of soft spheres costs the same whatever the solid method is, and nothing of a profile says how many spheres
  * a view's terms make, so a soft view is estimated as
  *     ms = solid · exp(rest) + exp(cost + by_samples · ln samples - by_lod · ln lod)
- * where `solid` is the estimate of the same view with nothing soft, and the other four are learned from frames: how much of
- * the solid work is left, what the stage takes, and how that follows size and level. Before the first frame of its terms
- * a view is taken to cost what the last other terms of its model did; before any, a guess by model. Pure; owned by the
- * planner's thread. */
+ * where `solid` is the estimate of the same view with nothing soft, and the other four are learned from frames: how
+ * much of the solid work is left, what the stage takes, and how that follows size and level. Before the first frame of
+ * its terms a view is taken to cost what the last other terms of its model did; before any, a guess by model. Pure;
+ * owned by the planner's thread. */
 #ifndef SPL_MEASURE_PLANNER_SOFT_H
 #define SPL_MEASURE_PLANNER_SOFT_H
 

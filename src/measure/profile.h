@@ -104,8 +104,8 @@ void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, dou
  * and beats nobody; infinities are ordinary. Less is better on both axes: hand over -PSNR. O(count²), no allocation. */
 void spl_front_mark(const double *cost, const double *error, size_t count, bool *front);
 
-/* Sets `front` of every point, from ms and psnr: one front of the points where all is solid, one of those with something
- * soft, whose images are others. Points without a PSNR are not on it. */
+/* Sets `front` of every point, from ms and psnr: one front of the points where all is solid, one of those with
+ * something soft, whose images are others. Points without a PSNR are not on it. */
 void spl_profile_mark_front(struct spl_profile *profile);
 
 /* Reads and checks `path`. `dataset` and `device` (each may be NULL: not compared) are what it must have been measured

@@ -189,8 +189,8 @@ static int read_soft(const json_t *root, const char *name, struct spl_soft_param
     soft->opacity = json_number_value(json_object_get(json, "opacity"));
     soft->blend = json_number_value(json_object_get(json, "blend"));
     if (!terms || !json_is_number(json_object_get(json, "opacity")) || !json_is_number(json_object_get(json, "blend")))
-        return spl_fail_field(err, SPL_E_INPUT, "soft", "%s: 'soft' needs a text 'terms', numbers 'opacity' and 'blend'",
-                              name);
+        return spl_fail_field(err, SPL_E_INPUT, "soft",
+                              "%s: 'soft' needs a text 'terms', numbers 'opacity' and 'blend'", name);
     int rc = spl_soft_parse(terms, soft, &why);
     if (!rc)
         rc = spl_soft_check(soft, &why);
@@ -397,11 +397,12 @@ json_t *spl_profile_to_json(const struct spl_profile *profile)
     for (size_t i = 0; i < profile->count; i++)
         json_array_append_new(points, point_to_json(&profile->points[i]));
     return json_pack("{s:s, s:i, s:s, s:{s:s, s:o}, s:{s:s, s:s, s:s, s:b}, s:s, s:i, s:i, s:i, s:o*, s:o}", "format",
-                     FORMAT, "format_version", profile->soft.count ? SPL_PROFILE_VERSION : 1, "splatd", profile->splatd, "dataset", "id",
-                     profile->dataset_id, "version", json_sprintf("%016" PRIx64, profile->dataset_version), "device",
-                     "backend", profile->backend, "name", profile->device, "driver", profile->driver, "software",
-                     profile->software, "reference", profile->reference, "views", (int)profile->views, "width",
-                     (int)profile->width, "height", (int)profile->height, "soft", soft_to_json(&profile->soft), "points", points);
+                     FORMAT, "format_version", profile->soft.count ? SPL_PROFILE_VERSION : 1, "splatd",
+                     profile->splatd, "dataset", "id", profile->dataset_id, "version",
+                     json_sprintf("%016" PRIx64, profile->dataset_version), "device", "backend", profile->backend,
+                     "name", profile->device, "driver", profile->driver, "software", profile->software, "reference",
+                     profile->reference, "views", (int)profile->views, "width", (int)profile->width, "height",
+                     (int)profile->height, "soft", soft_to_json(&profile->soft), "points", points);
 }
 
 int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)

@@ -188,11 +188,12 @@ json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, 
         failed |= json_array_append_new(views, plan_view(&o->views->views[i])) != 0;
     for (size_t i = 0; i < o->setting_count; i++)
         failed |= json_array_append_new(settings, plan_setting(&o->settings[i])) != 0;
-    json_t *plan = json_pack("{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:o*, s:I}", "splatd-bench",
-                             1, "program", SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device",
-                             "backend", sweep->device.backend, "name", sweep->device.name, "driver",
-                             sweep->device.driver, "reference", "kind", spl_reference_name(o->reference.kind), "hash",
-                             hash, "views", views, "settings", settings, "soft", plan_soft(o->soft), "repeats", (json_int_t)o->repeats);
+    json_t *plan = json_pack(
+        "{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:o*, s:I}", "splatd-bench", 1, "program",
+        SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device", "backend", sweep->device.backend,
+        "name", sweep->device.name, "driver", sweep->device.driver, "reference", "kind",
+        spl_reference_name(o->reference.kind), "hash", hash, "views", views, "settings", settings, "soft",
+        plan_soft(o->soft), "repeats", (json_int_t)o->repeats);
     if (plan && !failed)
         return plan;
     json_decref(plan);

@@ -1,6 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * colours from maps, and soft models, have colours of their own between them, supersampling is a dash pattern, fewer atoms than all are
- * paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them, a soft model that of the method at its place; supersampling
+ * is a dash pattern, fewer atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,8 +32,8 @@ static struct spl_chart_curve *add_curve(struct build *b, const char *name, unsi
     return curve;
 }
 
-/* Methods first, then those that take colours from maps, with maps. Soft models have those of the methods that stand
- * at their place, so that few are pale: where something is soft, one method is what is usually compared. */
+/* Methods first, then those that take colours from maps, with maps. A soft model has that of the method as many places
+ * further on: where something is soft, what is compared is usually one method. */
 static unsigned color_of(const struct spl_setting *s)
 {
     if (s->soft)

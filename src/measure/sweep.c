@@ -56,7 +56,8 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
         spl_camera_resize(&out->camera, (out->camera.width + 1) / 2, (out->camera.height + 1) / 2);
 }
 
-static int get_reference(struct job *job, size_t view, bool soft, struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err)
+static int get_reference(struct job *job, size_t view, bool soft, struct spl_image images[SPL_LAYER_COUNT],
+                         struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
     struct spl_reference reference = o->reference;

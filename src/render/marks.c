@@ -35,8 +35,8 @@ static uint32_t mark_of(float share)
     return 1 + (uint32_t)(share * SPL_MARK_MOST + 0.5f);
 }
 
-/* The codes 0..last of a chunk as numbers, against those that the term takes. A header does not say whether any splat has
- * the last code of steps, that of no value; a dataset does whose values are as many as its splats. */
+/* The codes 0..last of a chunk as numbers, against those that the term takes. A header does not say whether any splat
+ * has the last code of steps, that of no value; a dataset does whose values are as many as its splats. */
 static enum verdict judge_numbers(const struct spl_marks_term *term, enum spl_stream_type type,
                                   struct spl_stream_code code, uint32_t *test)
 {
