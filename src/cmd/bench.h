@@ -30,6 +30,8 @@ struct spl_cmd_bench_sweep {
     bool atoms_listed;          /* asked for, not the default */
     enum spl_setting_maps maps; /* only for datasets with maps and methods that take them; NO_MAPS = on and off */
     bool maps_asked;
+    const struct spl_soft_params *softs; /* solid, then what is compared with it */
+    size_t soft_count;
 };
 
 struct spl_cmd_bench_arguments {

@@ -195,7 +195,8 @@ static const struct spl_cmd_option options[] = {
     {"maps", "on|off|both", "colours from stations' maps, where the dataset has them", .otherwise = "on; both with -o",
      .take = take_maps},
     {"soft", "TERMS",
-     "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is solid",
+     "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is solid; "
+     "with -o the first model is the reference of all of them",
      .take = take_soft},
     {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express", .take = take_soft_models},
     {"soft-opacity", "X", "of a soft sphere at its centre", .fallback = "0.3",
@@ -242,6 +243,7 @@ const struct spl_cmd_table spl_cmd_bench_table = {
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
         "  splatd bench hall.spld --soft 'uncertainty>q0.9' --soft-model express,base --frames 5\n"
         "  splatd bench hall.spld -o hall-bench\n"
+        "  splatd bench hall.spld --soft class:3-5 --soft-model base,express --method splat --lod 1,2 -o hall-soft\n"
         "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
         "  splatd bench hall.spld --views colmap/sparse --photographs --lod 1,2 -o hall-bench\n\n",
     .options = options,
@@ -303,18 +305,22 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
 {
     if (!a->soft.count && a->soft_model_count)
         return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'uncertainty>q0.9'");
-    if (a->soft.count && a->sweep.output)
-        return spl_fail(err, SPL_E_USAGE, "--soft is for the table of frame times; leave -o out");
+    if (a->soft.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
+        return spl_fail(err, SPL_E_USAGE,
+                        "--reference and --photographs show nothing soft: with --soft the reference is the dataset's "
+                        "own render");
     if (!a->soft_model_count)
         a->soft_models[a->soft_model_count++] = SPL_SOFT_MODEL_EXPRESS;
     a->softs[0] = (struct spl_soft_params){.opacity = a->soft.opacity};
     a->bench.softs = a->softs;
+    a->sweep.softs = a->softs;
     a->bench.soft_count = 1;
     for (size_t i = 0; a->soft.count && i < a->soft_model_count; i++) {
         struct spl_soft_params *soft = &a->softs[a->bench.soft_count++];
         *soft = a->soft;
         soft->model = a->soft_models[i];
     }
+    a->sweep.soft_count = a->bench.soft_count;
     return SPL_OK;
 }
 

@@ -134,16 +134,25 @@ static int make_settings(const struct spl_cmd_bench_sweep *o, const struct spl_d
     *count = 0;
     if (o->atoms_listed && !info->atoms)
         return spl_fail(err, SPL_E_USAGE, "--atoms is about textures, and dataset '%s' has none", info->id);
-    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count * (o->atom_count + 1), sizeof **out, err);
+    *out = spl_alloc(o->method_count * o->lod_count * o->supersample_count * (o->atom_count + 1) * o->soft_count,
+                     sizeof **out, err);
     if (!*out)
         return SPL_E_NOMEM;
+    const size_t each = o->method_count * o->lod_count * o->supersample_count;
     int rc = SPL_OK;
-    for (size_t i = 0; !rc && i < o->method_count * o->lod_count * o->supersample_count; i++) {
-        struct spl_setting s = {.method = o->methods[i / o->supersample_count / o->lod_count],
+    for (size_t i = 0; !rc && i < each * o->soft_count; i++) {
+        const struct spl_soft_params *soft = &o->softs[i / each];
+        struct spl_setting s = {.method = o->methods[i % each / o->supersample_count / o->lod_count],
                                 .lod = o->lods[i / o->supersample_count % o->lod_count],
-                                .supersample = o->supersamples[i % o->supersample_count]};
+                                .supersample = o->supersamples[i % o->supersample_count],
+                                .soft = soft->count ? 1 + (uint32_t)soft->model : 0};
         rc = add_colors(o, info, s, *out, count, err);
     }
+    if (!rc && *count > SPL_PROFILE_POINTS_MAX)
+        rc = spl_fail(err, SPL_E_USAGE,
+                      "%zu settings are more than the %d that are compared at once: fewer of --method, --lod, "
+                      "--supersample or --soft-model",
+                      *count, (int)SPL_PROFILE_POINTS_MAX);
     return rc;
 }
 
@@ -247,6 +256,7 @@ int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *o, const struct spl_dataset 
     o->sweep.dataset = dataset;
     o->sweep.views = o->sweep.reference.views = &views;
     o->sweep.settings = settings;
+    o->sweep.soft = o->soft_count > 1 ? &o->softs[1] : NULL;
     o->sweep.folder = o->output;
     o->sweep.progress = show_progress;
     o->sweep.progress_context = &progress;

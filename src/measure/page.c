@@ -66,6 +66,19 @@ static int write_row(struct page *page, const char *key, enum spl_sweep_picture 
     return rc;
 }
 
+/* The picture that settings are compared with, of all that are solid, or of all that are not; null where none is. */
+static int write_reference(struct page *page, size_t view, bool soft, struct spl_error *err)
+{
+    const struct spl_profile *profile = &page->report->profile;
+    size_t s = 0;
+    while (s < profile->count && (profile->points[s].setting.soft > 0) != soft)
+        s++;
+    if (s < profile->count)
+        return write_picture(page, SPL_SWEEP_REFERENCE, view, s, err);
+    fputs("null", page->out);
+    return SPL_OK;
+}
+
 static int write_pictures(struct page *page, struct spl_error *err)
 {
     size_t views = page->report->sweep->options->views->count;
@@ -74,7 +87,11 @@ static int write_pictures(struct page *page, struct spl_error *err)
     for (size_t i = 0; !rc && i < spl_sweep_page_views(views); i++) {
         size_t view = spl_sweep_page_view(views, i);
         fprintf(page->out, "%s{\"view\":%zu,\"reference\":", i ? ",\n" : "", view);
-        rc = write_picture(page, SPL_SWEEP_REFERENCE, view, 0, err);
+        rc = write_reference(page, view, false, err);
+        if (!rc) {
+            fputs(",\n\"soft_reference\":", page->out);
+            rc = write_reference(page, view, true, err);
+        }
         if (!rc)
             rc = write_row(page, "render", SPL_SWEEP_RENDER, view, err);
         if (!rc)

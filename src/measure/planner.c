@@ -60,6 +60,24 @@ double spl_profile_psnr_bound(const struct spl_profile *profile, const struct sp
     return point->psnr - student(n - 1) * point->psnr_sd * sqrt(1 + 1 / n);
 }
 
+/* What was measured of soft settings: beside the same ones with nothing soft. */
+static void add_soft(struct spl_planner *planner, const struct spl_profile *profile)
+{
+    for (size_t i = 0; profile && i < profile->count; i++) {
+        const struct spl_profile_point *p = &profile->points[i];
+        struct spl_soft_params soft = profile->soft;
+        struct spl_setting solid = p->setting;
+        ptrdiff_t index;
+        if (!p->setting.soft || isnan(p->soft_ms))
+            continue;
+        solid.soft = 0;
+        soft.model = (enum spl_soft_model)(p->setting.soft - 1);
+        if ((index = spl_planner_find(planner, &solid)) >= 0)
+            spl_planner_learn_soft(planner, (size_t)index, profile->width, profile->height, SPL_LAYER_COLOR, &soft,
+                                   p->ms, p->soft_ms);
+    }
+}
+
 int spl_planner_init(struct spl_planner *planner, const struct spl_profile *profile,
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err)
 {
@@ -71,7 +89,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
         return SPL_E_NOMEM;
     for (size_t i = 0; profile && i < profile->count; i++) {
         const struct spl_profile_point *p = &profile->points[i];
-        if (usable && !usable(&p->setting))
+        if (p->setting.soft || (usable && !usable(&p->setting)))
             continue;
         planner->candidates[planner->count++] = (struct spl_candidate){.setting = p->setting,
                                                                        .fixed_ms = p->fixed_ms,
@@ -84,6 +102,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
     planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
     if (!planner->count)
         planner->count = add_guesses(planner->candidates, usable);
+    add_soft(planner, profile);
     for (size_t i = 0; i < planner->count; i++) {
         planner->atoms |= planner->candidates[i].setting.atoms != SPL_TEXTURE_ATOMS;
         planner->maps |= planner->candidates[i].setting.maps != SPL_SETTING_NO_MAPS;
@@ -184,6 +203,13 @@ static double rank(double psnr)
     return isnan(psnr) ? -INFINITY : psnr;
 }
 
+static struct spl_soft_work work_of(const struct spl_setting *setting, uint32_t width, uint32_t height,
+                                    enum spl_layer layer)
+{
+    double samples = setting->supersample * setting->supersample * width * height;
+    return (struct spl_soft_work){1e-6 * samples, setting->lod, layer};
+}
+
 /* How one candidate stands to the demand. */
 struct standing {
     double ms, tail_ms;
@@ -195,8 +221,13 @@ static struct standing assess(const struct spl_planner *planner, size_t index, c
     const struct spl_candidate *c = &planner->candidates[index];
     double bound = is_unmeasured(&c->setting, demand) ? NAN : c->bound;
     struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
+    double spread = planner->spread;
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
-    s.tail_ms = s.ms * exp(planner->spread);
+    if (demand->soft && demand->soft->count)
+        s.ms = spl_soft_costs_estimate(&planner->soft, demand->soft,
+                                       work_of(&c->setting, demand->width, demand->height, demand->layer), s.ms,
+                                       &spread);
+    s.tail_ms = s.ms * exp(spread);
     if (!isnan(demand->budget_ms))
         s.in_time = s.ms + demand->extra_ms <= demand->budget_ms &&
                     s.tail_ms + demand->extra_ms <= SPL_BUDGET_TOLERANCE * demand->budget_ms;
@@ -298,8 +329,19 @@ void spl_planner_learn(struct spl_planner *planner, size_t index, uint32_t width
     for (size_t i = 0; i < planner->count; i++)
         planner->candidates[i].learned *= fade;
     struct spl_candidate *c = &planner->candidates[index];
-    planner->shared = clamp(planner->shared + (first ? first_gain : shared_gain) * residual, learned_most);
+    double before = planner->shared;
+    planner->shared = clamp(before + (first ? first_gain : shared_gain) * residual, learned_most);
+    if (first)
+        spl_soft_costs_shift(&planner->soft, planner->shared - before);
     c->learned = clamp(c->learned + setting_gain * residual, learned_most);
     if (layer != SPL_LAYER_COLOR)
         planner->layer[layer] = clamp(planner->layer[layer] + layer_gain * residual, learned_most);
+}
+
+void spl_planner_learn_soft(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
+                            enum spl_layer layer, const struct spl_soft_params *soft, double ms, double soft_ms)
+{
+    spl_assert(index < planner->count);
+    spl_soft_costs_learn(&planner->soft, soft, work_of(&planner->candidates[index].setting, width, height, layer),
+                         spl_planner_estimate(planner, index, width, height, layer), ms, soft_ms);
 }

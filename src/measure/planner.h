@@ -4,11 +4,12 @@
  *     ms = (fixed_ms + ms_per_mpx · megapixels) · exp(shared + setting + layer)
  * where the three terms are learned from measured frames: how this machine is now, how this setting differs from its
  * model, how a layer other than colour does. `spread` follows the 97 % quantile of what remains, ln(measured /
- * estimate), so that the tail, not the mean, is held against the budget. No clock, no I/O; a planner belongs to one
- * thread. */
+ * estimate), so that the tail, not the mean, is held against the budget. A view with something soft takes that, less
+ * what is no longer solid, and its soft stage (planner_soft.h). No clock, no I/O; a planner belongs to one thread. */
 #ifndef SPL_MEASURE_PLANNER_H
 #define SPL_MEASURE_PLANNER_H
 
+#include "measure/planner_soft.h"
 #include "measure/profile.h"
 
 /* Of a budget: frames may take up to this multiple, and one in twenty longer. */
@@ -21,6 +22,7 @@ struct spl_demand {
     uint32_t width, height;
     uint64_t samples_max; /* that a setting may need for it; 0 = any */
     enum spl_layer layer;
+    const struct spl_soft_params *soft; /* may be NULL: as without terms, nothing; it is kept as it is */
     bool keep_method, keep_lod, keep_supersample, keep_atoms, keep_maps; /* only settings that equal `kept` in these */
     struct spl_setting kept;
 };
@@ -44,6 +46,7 @@ struct spl_planner {
     bool atoms, maps; /* candidates name them; else any number of atoms, or maps on and off, is a candidate's setting */
     double shared, layer[SPL_LAYER_COUNT], spread; /* ln */
     uint64_t frames;                               /* learned from */
+    struct spl_soft_costs soft;
 };
 
 /* The PSNR that a further view reaches with 95 % probability: the one-sided prediction bound mean − t · sd · √(1 + 1/n)
@@ -52,7 +55,7 @@ double spl_profile_psnr_bound(const struct spl_profile *profile, const struct sp
 
 /* Takes what it needs from `profile`. NULL: a conservative table of common settings whose times are those of a slow
  * machine; nothing is promised of their accuracy. Settings that `usable` (may be NULL) refuses are left out; when none
- * is left the table is used. */
+ * is left the table is used. Points with something soft are no settings to choose: they say what that costs. */
 int spl_planner_init(struct spl_planner *planner, const struct spl_profile *profile,
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err);
 void spl_planner_finish(struct spl_planner *planner);
@@ -68,7 +71,7 @@ void spl_planner_finish(struct spl_planner *planner);
 int spl_planner_choose(const struct spl_planner *planner, const struct spl_demand *demand, struct spl_choice *choice,
                        struct spl_error *err);
 
-/* The estimate for one setting, as choose() makes it. */
+/* The estimate for one setting, as choose() makes it where nothing is soft. */
 double spl_planner_estimate(const struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
                             enum spl_layer layer);
 
@@ -79,5 +82,10 @@ ptrdiff_t spl_planner_find(const struct spl_planner *planner, const struct spl_s
  * ten frames; learned factors stay within 1/1000 … 1000. Numbers that are not finite and positive are ignored. */
 void spl_planner_learn(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height, enum spl_layer layer,
                        double ms);
+
+/* The same of a frame in which something was soft, of whose time soft_ms were the soft stage's: it teaches what is
+ * soft, not the setting. */
+void spl_planner_learn_soft(struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
+                            enum spl_layer layer, const struct spl_soft_params *soft, double ms, double soft_ms);
 
 #endif

@@ -18,6 +18,11 @@ const char *spl_setting_maps_name(enum spl_setting_maps maps)
     return maps == SPL_SETTING_MAPS_ON ? "on" : maps == SPL_SETTING_MAPS_OFF ? "off" : "";
 }
 
+const char *spl_setting_soft_name(uint32_t soft)
+{
+    return soft ? spl_soft_model_name((enum spl_soft_model)(soft - 1)) : "solid";
+}
+
 bool spl_setting_has_maps(enum spl_method method)
 {
     const struct spl_method_info *info = spl_method_get(method);
@@ -34,10 +39,22 @@ void spl_setting_apply(const struct spl_setting *setting, struct spl_view *view)
         view->maps = setting->maps == SPL_SETTING_MAPS_ON ? SPL_MAPS_ON : SPL_MAPS_OFF;
 }
 
+void spl_setting_apply_soft(const struct spl_setting *setting, const struct spl_soft_params *terms,
+                            struct spl_view *view)
+{
+    spl_setting_apply(setting, view);
+    if (!setting->soft || !terms) {
+        view->soft.count = 0;
+        return;
+    }
+    view->soft = *terms;
+    view->soft.model = (enum spl_soft_model)(setting->soft - 1);
+}
+
 bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b)
 {
     bool textured = spl_method_has_textures(a->method) && a->maps != SPL_SETTING_MAPS_ON;
-    return a->method == b->method && a->lod == b->lod && a->supersample == b->supersample &&
+    return a->method == b->method && a->soft == b->soft && a->lod == b->lod && a->supersample == b->supersample &&
            (a->maps == b->maps || !spl_setting_has_maps(a->method)) && (a->atoms == b->atoms || !textured);
 }
 
@@ -122,11 +139,15 @@ void spl_profile_mark_front(struct spl_profile *profile)
     double cost[SPL_PROFILE_POINTS_MAX] = {0}, error[SPL_PROFILE_POINTS_MAX] = {0};
     bool front[SPL_PROFILE_POINTS_MAX];
     spl_assert(profile->count <= SPL_PROFILE_POINTS_MAX);
-    for (size_t i = 0; i < profile->count; i++) {
-        cost[i] = profile->points[i].ms;
-        error[i] = -profile->points[i].psnr;
+    for (int soft = 0; soft < 2; soft++) {
+        for (size_t i = 0; i < profile->count; i++) {
+            const struct spl_profile_point *p = &profile->points[i];
+            cost[i] = (p->setting.soft > 0) == soft ? p->ms : (double)NAN;
+            error[i] = -p->psnr;
+        }
+        spl_front_mark(cost, error, profile->count, front);
+        for (size_t i = 0; i < profile->count; i++)
+            if ((profile->points[i].setting.soft > 0) == soft)
+                profile->points[i].front = front[i];
     }
-    spl_front_mark(cost, error, profile->count, front);
-    for (size_t i = 0; i < profile->count; i++)
-        profile->points[i].front = front[i];
 }

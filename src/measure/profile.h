@@ -14,7 +14,8 @@
 
 #include "base/error.h"
 
-enum { SPL_PROFILE_VERSION = 1, SPL_PROFILE_POINTS_MAX = 1024 };
+/* Version 2 has points with something soft; without any a profile is of version 1. */
+enum { SPL_PROFILE_VERSION = 2, SPL_PROFILE_POINTS_MAX = 1024 };
 
 /* Are colours taken from the stations' maps? */
 enum spl_setting_maps {
@@ -32,7 +33,11 @@ struct spl_setting {
     uint32_t atoms; /* as spl_view.atoms; SPL_TEXTURE_ATOMS where the dataset or the method has no textures, or where
                        maps are drawn in their place */
     enum spl_setting_maps maps;
+    uint32_t soft; /* 0 = all is solid, else 1 + spl_soft_model; of which terms, who holds the setting knows */
 };
+
+/* "solid", else the soft model's name; static. */
+const char *spl_setting_soft_name(uint32_t soft);
 
 /* "on", "off", "" for none; static. */
 const char *spl_setting_maps_name(enum spl_setting_maps maps);
@@ -40,8 +45,12 @@ const char *spl_setting_maps_name(enum spl_setting_maps maps);
 /* Does the method take colours from maps where there are any? */
 bool spl_setting_has_maps(enum spl_method method);
 
-/* The view drawn so; maps stay as they are where the setting does not name them. */
+/* The view drawn so; maps stay as they are where the setting does not name them, and what is soft does. */
 void spl_setting_apply(const struct spl_setting *setting, struct spl_view *view);
+
+/* The same where a setting may have something soft: `terms` of its model, or nothing. NULL: none may have. */
+void spl_setting_apply_soft(const struct spl_setting *setting, const struct spl_soft_params *terms,
+                            struct spl_view *view);
 
 /* Do both draw the same? Atoms and maps are not compared where the method draws none, nor atoms where maps are on. */
 bool spl_setting_equal(const struct spl_setting *a, const struct spl_setting *b);
@@ -57,6 +66,7 @@ struct spl_profile_point {
     double psnr, psnr_sd, psnr_q05; /* dB, of colour: mean, standard deviation and 5 % quantile over the views; at most
                                       SPL_PROFILE_PSNR_MAX, which stands for "equal" */
     double ssim, depth_rmse, depth_beyond, holes, see_through, halo, normal_mean; /* means, as struct spl_metrics */
+    double soft_ms;                /* of `ms`, the stage of soft spheres; NAN where all is solid */
     bool front;                    /* on the Pareto front of ms and psnr; set by spl_profile_mark_front() */
 };
 #define SPL_PROFILE_PSNR_MAX 100.0
@@ -70,6 +80,7 @@ struct spl_profile {
     char reference[16];            /* what PSNR is against: "exact", "photographs" or "self" (4×4 supersampled) */
     uint32_t views;                /* how many, >= 1 */
     uint32_t width, height;        /* of the frames that ms and ms_q90 are about */
+    struct spl_soft_params soft;   /* of the points that have a soft model, which is theirs; count 0 = none has */
     struct spl_profile_point *points; /* owned by the holder */
     size_t count;                  /* 1 … SPL_PROFILE_POINTS_MAX */
 };
@@ -93,7 +104,8 @@ void spl_profile_fit_time(const double *mpx, const double *ms, size_t count, dou
  * and beats nobody; infinities are ordinary. Less is better on both axes: hand over -PSNR. O(count²), no allocation. */
 void spl_front_mark(const double *cost, const double *error, size_t count, bool *front);
 
-/* Sets `front` of every point, from ms and psnr. Points without a PSNR are not on it. */
+/* Sets `front` of every point, from ms and psnr: one front of the points where all is solid, one of those with
+ * something soft, whose images are others. Points without a PSNR are not on it. */
 void spl_profile_mark_front(struct spl_profile *profile);
 
 /* Reads and checks `path`. `dataset` and `device` (each may be NULL: not compared) are what it must have been measured

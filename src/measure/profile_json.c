@@ -41,7 +41,7 @@ static const struct number {
     NUMBER(ssim, -1, 1, true),         NUMBER(depth_rmse, 0, 1e12, true),
     NUMBER(depth_beyond, 0, 1, true),  NUMBER(holes, 0, 1, true),
     NUMBER(see_through, 0, 1, true),   NUMBER(halo, 0, 1, true),
-    NUMBER(normal_mean, 0, 180, true),
+    NUMBER(normal_mean, 0, 180, true), NUMBER(soft_ms, 0, 1e9, true),
 #undef NUMBER
 };
 enum { number_count = sizeof numbers / sizeof *numbers };
@@ -73,6 +73,9 @@ static int check_point(struct spl_profile_point *point, const char *name, size_t
             return spl_fail_field(err, SPL_E_INPUT, n->name, "%s: point %zu: %s %g is outside %g to %g", name, index,
                                   n->name, value, n->least, n->most);
     }
+    if (point->soft_ms > point->ms)
+        return spl_fail_field(err, SPL_E_INPUT, "soft_ms", "%s: point %zu: soft_ms %g is above ms %g", name, index,
+                              point->soft_ms, point->ms);
     if (!(point->fixed_ms + point->ms_per_mpx > 0))
         return spl_fail_field(err, SPL_E_INPUT, "fixed_ms", "%s: point %zu: fixed_ms and ms_per_mpx are both 0", name,
                               index);
@@ -160,8 +163,42 @@ static int read_maps(const json_t *object, const char *name, size_t index, enum 
     return 0;
 }
 
-static int read_point(const json_t *object, const char *name, size_t index, struct spl_profile_point *point,
-                      struct spl_error *err)
+/* Left out where all is solid. */
+static int read_soft_model(const json_t *object, const struct spl_profile *profile, const char *name, size_t index,
+                           uint32_t *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(object, "soft_model");
+    int model = json_is_string(json) ? spl_soft_model_from_name(json_string_value(json)) : -1;
+    *out = model < 0 ? 0 : 1 + (uint32_t)model;
+    if (json && (model < 0 || !profile->soft.count))
+        return spl_fail_field(err, SPL_E_INPUT, "soft_model",
+                              model < 0 ? "%s: point %zu: 'soft_model' is no model's name"
+                                        : "%s: point %zu has a 'soft_model', and the profile no 'soft' that it is of",
+                              name, index);
+    return 0;
+}
+
+/* What is soft where points have a model; left out where none has. */
+static int read_soft(const json_t *root, const char *name, struct spl_soft_params *soft, struct spl_error *err)
+{
+    const json_t *json = json_object_get(root, "soft");
+    const char *terms = json_string_value(json_object_get(json, "terms"));
+    struct spl_error why = {0};
+    if (!json)
+        return 0;
+    soft->opacity = json_number_value(json_object_get(json, "opacity"));
+    soft->blend = json_number_value(json_object_get(json, "blend"));
+    if (!terms || !json_is_number(json_object_get(json, "opacity")) || !json_is_number(json_object_get(json, "blend")))
+        return spl_fail_field(err, SPL_E_INPUT, "soft",
+                              "%s: 'soft' needs a text 'terms', numbers 'opacity' and 'blend'", name);
+    int rc = spl_soft_parse(terms, soft, &why);
+    if (!rc)
+        rc = spl_soft_check(soft, &why);
+    return rc ? spl_fail_field(err, SPL_E_INPUT, "soft", "%s: 'soft': %.300s", name, why.message) : 0;
+}
+
+static int read_point(const json_t *object, const struct spl_profile *profile, const char *name, size_t index,
+                      struct spl_profile_point *point, struct spl_error *err)
 {
     char method[32];
     int rc;
@@ -171,7 +208,8 @@ static int read_point(const json_t *object, const char *name, size_t index, stru
         (rc = read_number(object, "lod", false, name, index, &point->setting.lod, err)) ||
         (rc = read_number(object, "supersample", false, name, index, &point->setting.supersample, err)) ||
         (rc = read_atoms(object, name, index, &point->setting.atoms, err)) ||
-        (rc = read_maps(object, name, index, &point->setting.maps, err)))
+        (rc = read_maps(object, name, index, &point->setting.maps, err)) ||
+        (rc = read_soft_model(object, profile, name, index, &point->setting.soft, err)))
         return rc;
     int found = spl_method_from_name(method);
     if (found < 0)
@@ -214,7 +252,8 @@ static int read_header(const json_t *root, const char *name, struct spl_profile 
         (rc = read_text(root, "reference", profile->reference, sizeof profile->reference, name, err)) ||
         (rc = read_count(root, "views", views_max, &profile->views, name, err)) ||
         (rc = read_count(root, "width", side_max, &profile->width, name, err)) ||
-        (rc = read_count(root, "height", side_max, &profile->height, name, err)))
+        (rc = read_count(root, "height", side_max, &profile->height, name, err)) ||
+        (rc = read_soft(root, name, &profile->soft, err)))
         return rc;
     if (!json_is_boolean(software))
         return spl_fail_field(err, SPL_E_INPUT, "software", "%s: 'software' must be true or false", name);
@@ -234,7 +273,7 @@ static int read_points(const json_t *root, const char *name, struct spl_profile 
     profile->count = count;
     int rc = 0;
     for (size_t i = 0; !rc && i < count; i++)
-        rc = read_point(json_array_get(points, i), name, i, &profile->points[i], err);
+        rc = read_point(json_array_get(points, i), profile, name, i, &profile->points[i], err);
     return rc ? rc : check(profile, name, err);
 }
 
@@ -332,11 +371,24 @@ static json_t *point_to_json(const struct spl_profile_point *point)
                              (int)point->setting.atoms, "front", point->front);
     if (point->setting.maps)
         json_object_set_new(json, "maps", json_string(spl_setting_maps_name(point->setting.maps)));
+    if (point->setting.soft)
+        json_object_set_new(json, "soft_model", json_string(spl_setting_soft_name(point->setting.soft)));
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
         double value = *number_of(&copy, n);
+        if (n->offset == offsetof(struct spl_profile_point, soft_ms) && !point->setting.soft)
+            continue;
         json_object_set_new(json, n->name, isfinite(value) ? json_real(value) : json_null());
     }
     return json;
+}
+
+static json_t *soft_to_json(const struct spl_soft_params *soft)
+{
+    char terms[SPL_SOFT_TEXT_MAX + 1];
+    if (!soft->count)
+        return NULL;
+    spl_soft_print(soft, terms, sizeof terms);
+    return json_pack("{s:s, s:f, s:f}", "terms", terms, "opacity", soft->opacity, "blend", soft->blend);
 }
 
 json_t *spl_profile_to_json(const struct spl_profile *profile)
@@ -344,12 +396,13 @@ json_t *spl_profile_to_json(const struct spl_profile *profile)
     json_t *points = json_array();
     for (size_t i = 0; i < profile->count; i++)
         json_array_append_new(points, point_to_json(&profile->points[i]));
-    return json_pack("{s:s, s:i, s:s, s:{s:s, s:o}, s:{s:s, s:s, s:s, s:b}, s:s, s:i, s:i, s:i, s:o}", "format", FORMAT,
-                     "format_version", SPL_PROFILE_VERSION, "splatd", profile->splatd, "dataset", "id",
-                     profile->dataset_id, "version", json_sprintf("%016" PRIx64, profile->dataset_version), "device",
-                     "backend", profile->backend, "name", profile->device, "driver", profile->driver, "software",
-                     profile->software, "reference", profile->reference, "views", (int)profile->views, "width",
-                     (int)profile->width, "height", (int)profile->height, "points", points);
+    return json_pack("{s:s, s:i, s:s, s:{s:s, s:o}, s:{s:s, s:s, s:s, s:b}, s:s, s:i, s:i, s:i, s:o*, s:o}", "format",
+                     FORMAT, "format_version", profile->soft.count ? SPL_PROFILE_VERSION : 1, "splatd",
+                     profile->splatd, "dataset", "id", profile->dataset_id, "version",
+                     json_sprintf("%016" PRIx64, profile->dataset_version), "device", "backend", profile->backend,
+                     "name", profile->device, "driver", profile->driver, "software", profile->software, "reference",
+                     profile->reference, "views", (int)profile->views, "width", (int)profile->width, "height",
+                     (int)profile->height, "soft", soft_to_json(&profile->soft), "points", points);
 }
 
 int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)

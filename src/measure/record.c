@@ -157,7 +157,22 @@ static json_t *plan_setting(const struct spl_setting *s)
         json_decref(out);
         out = NULL;
     }
+    if (out && s->soft && json_object_set_new(out, "soft_model", json_string(spl_setting_soft_name(s->soft)))) {
+        json_decref(out);
+        out = NULL;
+    }
     return out;
+}
+
+/* What is soft where something is, and the model of the reference. */
+static json_t *plan_soft(const struct spl_soft_params *soft)
+{
+    char terms[SPL_SOFT_TEXT_MAX + 1];
+    if (!soft)
+        return NULL;
+    spl_soft_print(soft, terms, sizeof terms);
+    return json_pack("{s:s, s:s, s:f, s:f}", "terms", terms, "model", spl_soft_model_name(soft->model), "opacity",
+                     soft->opacity, "blend", soft->blend);
 }
 
 json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, struct spl_error *err)
@@ -173,11 +188,12 @@ json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, 
         failed |= json_array_append_new(views, plan_view(&o->views->views[i])) != 0;
     for (size_t i = 0; i < o->setting_count; i++)
         failed |= json_array_append_new(settings, plan_setting(&o->settings[i])) != 0;
-    json_t *plan = json_pack("{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:I}", "splatd-bench",
-                             1, "program", SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device",
-                             "backend", sweep->device.backend, "name", sweep->device.name, "driver",
-                             sweep->device.driver, "reference", "kind", spl_reference_name(o->reference.kind), "hash",
-                             hash, "views", views, "settings", settings, "repeats", (json_int_t)o->repeats);
+    json_t *plan = json_pack(
+        "{s:i, s:s, s:{s:s, s:s}, s:{s:s, s:s, s:s}, s:{s:s, s:s}, s:o, s:o, s:o*, s:I}", "splatd-bench", 1, "program",
+        SPLATD_VERSION, "dataset", "id", info->id, "version", version, "device", "backend", sweep->device.backend,
+        "name", sweep->device.name, "driver", sweep->device.driver, "reference", "kind",
+        spl_reference_name(o->reference.kind), "hash", hash, "views", views, "settings", settings, "soft",
+        plan_soft(o->soft), "repeats", (json_int_t)o->repeats);
     if (plan && !failed)
         return plan;
     json_decref(plan);

@@ -80,8 +80,9 @@ static int load_photograph(const struct spl_named_view *view, struct spl_image *
     return load_file(view, view->photograph, SPL_LAYER_COLOR, &images[SPL_LAYER_COLOR], err);
 }
 
-static int render_self(const struct spl_named_view *named, struct spl_renderer *renderer,
-                       const struct spl_dataset *dataset, struct spl_image *images, struct spl_error *err)
+static int render_self(const struct spl_reference *r, const struct spl_named_view *named,
+                       struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_image *images,
+                       struct spl_error *err)
 {
     struct spl_view view;
     spl_view_init(&view);
@@ -89,6 +90,8 @@ static int render_self(const struct spl_named_view *named, struct spl_renderer *
     view.lod = 0;
     view.supersample = SELF_SUPERSAMPLE;
     view.background[3] = 0;
+    if (r->soft)
+        view.soft = *r->soft;
     for (size_t i = 0; i < FILES; i++)
         view.layers |= 1u << files[i].layer;
     struct spl_frame frame;
@@ -112,7 +115,7 @@ int spl_reference_get(const struct spl_reference *r, size_t index, struct spl_re
     const struct spl_named_view *view = &r->views->views[index];
     int rc = r->kind == SPL_REFERENCE_EXACT         ? load_exact(r, view, images, err)
              : r->kind == SPL_REFERENCE_PHOTOGRAPHS ? load_photograph(view, images, err)
-                                                    : render_self(view, renderer, dataset, images, err);
+                                                    : render_self(r, view, renderer, dataset, images, err);
     if (rc)
         finish_images(images);
     return rc;

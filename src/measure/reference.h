@@ -18,6 +18,7 @@ struct spl_reference {
     enum spl_reference_kind kind;
     const char *folder;                /* SPL_REFERENCE_EXACT only; borrowed */
     const struct spl_view_list *views; /* borrowed */
+    const struct spl_soft_params *soft; /* SPL_REFERENCE_SELF only: what is drawn so; NULL = all is solid. Borrowed */
 };
 
 /* "self", "exact", "photographs": as in profiles. */

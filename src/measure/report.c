@@ -19,7 +19,9 @@ void spl_report_setting_name(const struct spl_setting *s, char name[64])
     if (s->atoms < SPL_TEXTURE_ATOMS)
         used += snprintf(name + used, 64 - (size_t)used, " atoms=%u", s->atoms);
     if (s->maps)
-        snprintf(name + used, 64 - (size_t)used, " maps=%s", spl_setting_maps_name(s->maps));
+        used += snprintf(name + used, 64 - (size_t)used, " maps=%s", spl_setting_maps_name(s->maps));
+    if (s->soft)
+        snprintf(name + used, 64 - (size_t)used, " soft=%s", spl_setting_soft_name(s->soft));
 }
 
 /* Times of one setting, view and size over the repeats, through `pick`. */
@@ -91,6 +93,8 @@ static void fill_times(struct spl_report *report, size_t setting, double *values
         mpx[size] = spl_summarise(values, views).median;
     }
     spl_profile_fit_time(mpx, ms, SPL_SWEEP_SIZES, &p->fixed_ms, &p->ms_per_mpx);
+    p->soft_ms = p->setting.soft ? fmin(over_views(sweep, setting, SPL_SWEEP_FULL, pick_soft, values), p->ms)
+                                 : (double)NAN;
 }
 
 /* Mean over the views of `power` of what lies at `offset` of their metrics, without NANs; NAN where there is none. */
@@ -196,6 +200,8 @@ int spl_report_init(struct spl_report *report, const struct spl_sweep *sweep, st
         profile->views = (uint32_t)o->views->count;
         profile->width = o->views->views[0].camera.width;
         profile->height = o->views->views[0].camera.height;
+        if (o->soft)
+            profile->soft = *o->soft;
         for (size_t s = 0; s < o->setting_count; s++) {
             profile->points[s].setting = o->settings[s];
             fill_times(report, s, values);
@@ -327,7 +333,7 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
     fputs("method,lod,supersample,atoms,front,ms,ms_q90,device_ms,splats,psnr,psnr_overall,psnr_sd,psnr_q05,ssim,"
           "depth_rmse,depth_beyond,"
           "holes,see_through,halo,normal_mean,dense_share,dense_psnr,dense_depth_beyond,dense_holes,"
-          "dense_see_through,maps\n",
+          "dense_see_through,maps,soft_model,soft_ms\n",
           out);
     for (size_t s = 0; s < report->profile.count; s++) {
         const struct spl_profile_point *p = &report->profile.points[s];
@@ -344,7 +350,9 @@ int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *lengt
             d.holes,        d.see_through};
         for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
             put(out, numbers[i]);
-        fprintf(out, ",%s\n", spl_setting_maps_name(p->setting.maps));
+        fprintf(out, ",%s,%s", spl_setting_maps_name(p->setting.maps), spl_setting_soft_name(p->setting.soft));
+        put(out, p->soft_ms);
+        fputc('\n', out);
     }
     free(values);
     if (fclose(out)) {

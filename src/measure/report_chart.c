@@ -1,6 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * colours from maps have colours of their own between them, supersampling is a dash pattern, fewer atoms than all are
- * paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them, a soft model that of the method at its place; supersampling
+ * is a dash pattern, fewer atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,9 +32,12 @@ static struct spl_chart_curve *add_curve(struct build *b, const char *name, unsi
     return curve;
 }
 
-/* Methods first, then those that take colours from maps, with maps. */
+/* Methods first, then those that take colours from maps, with maps. A soft model has that of the method as many places
+ * further on: where something is soft, what is compared is usually one method. */
 static unsigned color_of(const struct spl_setting *s)
 {
+    if (s->soft)
+        return (unsigned)s->method + s->soft;
     unsigned color = s->maps == SPL_SETTING_MAPS_ON ? SPL_METHOD_COUNT : s->method;
     for (int method = 0; s->maps == SPL_SETTING_MAPS_ON && method < (int)s->method; method++)
         color += spl_setting_has_maps((enum spl_method)method);
@@ -58,6 +61,8 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
     char name[64];
     int used = snprintf(name, sizeof name, "%s%s", spl_method_name(s.method),
                         s.maps == SPL_SETTING_MAPS_ON ? " + panorama" : "");
+    if (s.soft)
+        used += snprintf(name + used, sizeof name - (size_t)used, ", %s", spl_setting_soft_name(s.soft));
     if (s.supersample != 1)
         used += snprintf(name + used, sizeof name - (size_t)used, " %g×%g", s.supersample, s.supersample);
     if (s.atoms < ALL)
@@ -68,7 +73,8 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
 }
 
 /* A method's curves of one pass; those with maps first. */
-static void add_method(struct build *b, const struct spl_profile *profile, enum spl_method method, int pass)
+static void add_method(struct build *b, const struct spl_profile *profile, enum spl_method method, uint32_t soft,
+                       int pass)
 {
     for (int maps = SPL_SETTING_MAPS_COUNT; maps-- > 0;)
         for (unsigned i = 0; i < SUPERSAMPLES; i++)
@@ -78,7 +84,8 @@ static void add_method(struct build *b, const struct spl_profile *profile, enum 
                                  (struct spl_setting){.method = method,
                                                       .supersample = supersamples[i],
                                                       .atoms = atoms,
-                                                      .maps = (enum spl_setting_maps)maps},
+                                                      .maps = (enum spl_setting_maps)maps,
+                                                      .soft = soft},
                                  i);
 }
 
@@ -87,7 +94,8 @@ static void add_methods(struct build *b, const struct spl_profile *profile)
 {
     for (int pass = 0; pass < 3; pass++)
         for (int method = 0; method < SPL_METHOD_COUNT; method++)
-            add_method(b, profile, (enum spl_method)method, pass);
+            for (uint32_t soft = 0; soft <= SPL_SOFT_MODEL_COUNT; soft++)
+                add_method(b, profile, (enum spl_method)method, soft, pass);
 }
 
 /* One curve for each name, in the order in which the names first appear. */

@@ -51,18 +51,21 @@ static void fill_view(const struct spl_sweep_options *o, size_t setting, size_t 
 {
     spl_view_init(out);
     out->camera = o->views->views[view].camera;
-    spl_setting_apply(&o->settings[setting], out);
+    spl_setting_apply_soft(&o->settings[setting], o->soft, out);
     if (size != SPL_SWEEP_FULL)
         spl_camera_resize(&out->camera, (out->camera.width + 1) / 2, (out->camera.height + 1) / 2);
 }
 
-static int get_reference(struct job *job, size_t view, struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err)
+static int get_reference(struct job *job, size_t view, bool soft, struct spl_image images[SPL_LAYER_COUNT],
+                         struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
+    struct spl_reference reference = o->reference;
+    reference.soft = soft ? o->soft : NULL;
     for (int losses = 0;; losses++) {
         struct spl_error why = {0};
         uint64_t begin = spl_now_ns();
-        int rc = spl_reference_get(&o->reference, view, job->device.renderer, o->dataset, images, &why);
+        int rc = spl_reference_get(&reference, view, job->device.renderer, o->dataset, images, &why);
         if (o->reference.kind == SPL_REFERENCE_SELF)
             job->device.rendering_ns += spl_now_ns() - begin;
         if (!rc)
@@ -100,13 +103,13 @@ static int mark_dense(struct job *job, size_t v, struct spl_truth *t, struct spl
     return rc;
 }
 
-static int get_truth(struct job *job, size_t v, struct spl_truth *t, struct spl_error *err)
+static int get_truth(struct job *job, size_t v, bool soft, struct spl_truth *t, struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
     const struct spl_camera *camera = &o->views->views[v].camera;
     int rc = spl_truth_init(t, camera->width, camera->height, err);
     if (!rc)
-        rc = get_reference(job, v, t->images, err);
+        rc = get_reference(job, v, soft, t->images, err);
     if (!rc && o->reference.kind == SPL_REFERENCE_EXACT && t->images[SPL_LAYER_DEPTH].pixels)
         rc = mark_dense(job, v, t, err);
     return rc;
@@ -144,20 +147,27 @@ static int compare(struct job *job, size_t setting, size_t v, const struct spl_t
     return rc;
 }
 
-static int compare_view(struct job *job, size_t v, struct spl_error *err)
+/* Is the setting one of those, all solid or not, that this view has yet to be compared under? */
+static bool is_missing(const struct job *job, size_t setting, size_t v, bool soft)
+{
+    return (job->options->settings[setting].soft > 0) == soft && !spl_sweep_get_accuracy(job->sweep, setting, v)->done;
+}
+
+/* Under the settings where all is solid, or under those with something soft: each have a reference. */
+static int compare_view(struct job *job, size_t v, bool soft, struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
-    size_t missing = 0;
-    for (size_t s = 0; s < o->setting_count; s++)
-        missing += !spl_sweep_get_accuracy(job->sweep, s, v)->done;
-    if (!missing)
+    size_t first = 0;
+    while (first < o->setting_count && !is_missing(job, first, v, soft))
+        first++;
+    if (first == o->setting_count)
         return SPL_OK;
     struct spl_truth t;
-    int rc = get_truth(job, v, &t, err);
+    int rc = get_truth(job, v, soft, &t, err);
     if (!rc && spl_sweep_has_pictures(o->views->count, v))
-        rc = spl_sweep_save_picture(o, SPL_SWEEP_REFERENCE, v, 0, &t.images[SPL_LAYER_COLOR], err);
-    for (size_t s = 0; !rc && s < o->setting_count; s++) {
-        if (spl_sweep_get_accuracy(job->sweep, s, v)->done)
+        rc = spl_sweep_save_picture(o, SPL_SWEEP_REFERENCE, v, first, &t.images[SPL_LAYER_COLOR], err);
+    for (size_t s = first; !rc && s < o->setting_count; s++) {
+        if (!is_missing(job, s, v, soft))
             continue;
         rc = compare(job, s, v, &t, err);
         advance(job, "accuracy");
@@ -174,8 +184,11 @@ static int compare_all(struct job *job, struct spl_error *err)
         for (size_t v = 0; v < o->views->count; v++)
             job->total += !spl_sweep_get_accuracy(job->sweep, s, v)->done;
     int rc = SPL_OK;
-    for (size_t v = 0; !rc && v < o->views->count; v++)
-        rc = compare_view(job, v, err);
+    for (size_t v = 0; !rc && v < o->views->count; v++) {
+        rc = compare_view(job, v, false, err);
+        if (!rc)
+            rc = compare_view(job, v, true, err);
+    }
     return rc;
 }
 

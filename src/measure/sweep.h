@@ -23,6 +23,8 @@ struct spl_sweep_options {
     struct spl_reference reference;
     const struct spl_setting *settings; /* 1 … SPL_PROFILE_POINTS_MAX; members as spl_view */
     size_t setting_count;
+    const struct spl_soft_params *soft; /* terms of the settings that have a soft model, compared with the same view
+                                           drawn at its best by this model; NULL where none has */
     uint32_t repeats;
     struct spl_renderer_options renderer;
     const char *folder; /* made where it is missing */
@@ -75,7 +77,8 @@ size_t spl_sweep_page_views(size_t views);
 size_t spl_sweep_page_view(size_t views, size_t i);
 
 enum spl_sweep_picture { SPL_SWEEP_REFERENCE, SPL_SWEEP_RENDER, SPL_SWEEP_ERROR };
-/* Where a picture lies: FOLDER/pictures/…, into `path` of 4096 bytes. `setting` is not looked at for references. */
+/* Where a picture lies: FOLDER/pictures/…, into `path` of 4096 bytes. References are one for all settings, and one more
+ * for those with something soft. */
 void spl_sweep_picture_path(const struct spl_sweep_options *options, enum spl_sweep_picture kind, size_t view,
                             size_t setting, char path[4096]);
 

@@ -30,7 +30,8 @@ void spl_sweep_picture_path(const struct spl_sweep_options *o, enum spl_sweep_pi
                             char path[4096])
 {
     if (kind == SPL_SWEEP_REFERENCE)
-        snprintf(path, 4096, "%s/pictures/view%zu-reference.jpg", o->folder, view);
+        snprintf(path, 4096, "%s/pictures/view%zu-reference%s.jpg", o->folder, view,
+                 o->settings[setting].soft ? "-soft" : "");
     else
         snprintf(path, 4096, "%s/pictures/view%zu-setting%zu%s.jpg", o->folder, view, setting,
                  kind == SPL_SWEEP_ERROR ? "-error" : "");

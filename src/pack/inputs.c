@@ -10,7 +10,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <limits.h>
-#include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -23,6 +22,7 @@
 #include "cloud/cloud.h"
 #include "cloud/source.h"
 #include "pack/names.h"
+#include "pack/warn.h"
 
 enum { depth_max = 64 };
 
@@ -234,16 +234,7 @@ static int search(struct finder *f, const char *path, unsigned depth, struct spl
     return rc;
 }
 
-__attribute__((format(printf, 2, 3))) static void say(const struct finder *f, const char *format, ...)
-{
-    char text[1200];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    if (f->inputs->listener.warn)
-        f->inputs->listener.warn(f->inputs->listener.context, text);
-}
+#define say(f, ...) spl_pack_warn((f)->inputs->listener.warn, (f)->inputs->listener.context, __VA_ARGS__)
 
 static int add_folder(struct finder *f, const char *path, struct spl_error *err)
 {

@@ -12,6 +12,7 @@
 #include "dataset/rewrite.h"
 #include "pack/prune.h"
 #include "pack/texture/pass.h"
+#include "pack/warn.h"
 
 /* Two names of one file, which need not be there yet. */
 static bool is_same(const char *a, const char *b)
@@ -67,10 +68,7 @@ static bool is_asked_for(const struct spl_map_options *maps)
 
 static void warn_of_none(const struct spl_pack_options *options, const struct spl_error *why)
 {
-    char text[1200];
-    snprintf(text, sizeof text, "%s; so there are no maps", why->message);
-    if (options->warn)
-        options->warn(options->progress_context, text);
+    spl_pack_warn(options->warn, options->progress_context, "%s; so there are no maps", why->message);
 }
 
 int spl_passes_run(struct spl_passes *p, const char *part, const char *points, struct spl_error *err)

@@ -4,12 +4,12 @@
 #include "pack/scans.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "pack/kept.h"
 #include "pack/names.h"
+#include "pack/warn.h"
 
 static const double like_steps = 10; /* times the finest step of coordinates: nothing to mention */
 /* 32 bit floats: coarser than a millimetre, and than the scan's size alone would make them. */
@@ -22,15 +22,7 @@ struct saying {
     void *context;
 };
 
-__attribute__((format(printf, 2, 3))) static void say(const struct saying *s, const char *format, ...)
-{
-    char text[1200];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    s->warn(s->context, text);
-}
+#define say(s, ...) spl_pack_warn((s)->warn, (s)->context, __VA_ARGS__)
 
 static bool has_points(const struct spl_scan *scan)
 {

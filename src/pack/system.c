@@ -5,13 +5,13 @@
 
 #include <ctype.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "cloud/crs.h"
 #include "geom/unit.h"
+#include "pack/warn.h"
 
 /* Foot and US survey foot, 2e-6 apart: a millimetre in five hundred metres of height, nothing that stretches. */
 static const double heights_alike = 1e-5;
@@ -24,16 +24,7 @@ struct finding {
     double unit_m;
 };
 
-__attribute__((format(printf, 2, 3))) static void say(const struct finding *f, const char *format, ...)
-{
-    char text[800];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    if (f->options->warn)
-        f->options->warn(f->options->context, text);
-}
+#define say(f, ...) spl_pack_warn((f)->options->warn, (f)->options->context, __VA_ARGS__)
 
 static const char *name_system(const struct spl_cloud_coordinates *c, char text[96])
 {

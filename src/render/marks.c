@@ -35,7 +35,8 @@ static uint32_t mark_of(float share)
     return 1 + (uint32_t)(share * SPL_MARK_MOST + 0.5f);
 }
 
-/* The codes 0..last of a chunk as numbers, against those that the term takes. */
+/* The codes 0..last of a chunk as numbers, against those that the term takes. A header does not say whether any splat
+ * has the last code of steps, that of no value; a dataset does whose values are as many as its splats. */
 static enum verdict judge_numbers(const struct spl_marks_term *term, enum spl_stream_type type,
                                   struct spl_stream_code code, uint32_t *test)
 {
@@ -57,7 +58,7 @@ static enum verdict judge_numbers(const struct spl_marks_term *term, enum spl_st
     test[7] = word_of(term->share_step);
     test[8] = word_of(term->share_high);
     test[9] = word_of(term->share_step_high);
-    if (start > term->span || most > term->span - start || none)
+    if (start > term->span || most > term->span - start || (none && !term->complete))
         return VERDICT_SOME;
     return share_at(term, start) >= 1 && share_at(term, start + (uint32_t)most) >= 1 ? VERDICT_ALL : VERDICT_BLENDED;
 }

@@ -22,6 +22,7 @@ struct spl_marks_term {
     int stream; /* of attributes; -1 = a shape */
     double least, most;
     bool with_least, with_most;
+    bool complete; /* every splat of the dataset has a value: no code says that there is none */
     double blend_least, blend_most; /* values behind the ends on which W of eq. 22 rises to 1; 0 = there is none */
     double shape[6];
     /* Of streams of whole numbers and steps: the numbers (base + code) that are soft. */

@@ -81,12 +81,11 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
     out->stream = find_stream(info, term->name);
     if (out->stream < 0)
         return refuse_name(info, term->name, err);
+    values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
+    out->complete = values && values->count == info->leaf_splats;
     const bool share = term->measure == SPL_SOFT_ATTRIBUTE && !strcmp(term->name, "uncertainty");
-    if (term->measure == SPL_SOFT_QUANTILE || share) {
-        values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
-        if (!values)
-            return refuse_values(info, term, err);
-    }
+    if ((term->measure == SPL_SOFT_QUANTILE || share) && !values)
+        return refuse_values(info, term, err);
     if (share) { /* without ends it is infinite times 0 where all are certain */
         out->least = isfinite(term->least) ? term->least * values->p99 : term->least;
         out->most = isfinite(term->most) ? term->most * values->p99 : term->most;

@@ -58,7 +58,34 @@ with tempfile.TemporaryDirectory() as folder:
     assert "spheres" in table and "spheres" not in must("bench", folder / "a.spld", *common)
     assert [line.split()[3] for line in table.splitlines() if line.startswith("a ")] == ["solid", "layer", "express"], table
 
-    for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out"],
+    compared = ["bench", folder / "a.spld", *soft[:4], "--soft-model", "base,express", "--method", "splat", "--lod", 2,
+                "--supersample", 1, "--frames", 2, "--size", "80x60", "--repeats", 1, "-o", folder / "compared"]
+    table = must(*compared)
+    report = json.loads((folder / "compared/bench.json").read_text())
+    profile = json.loads((folder / "a.profile.json").read_text())
+    assert report["soft"] == profile["soft"] == {"terms": f"{soft[1]} or {soft[3]}", "opacity": 0.3, "blend": 0}, report["soft"]
+    assert profile["format_version"] == 2
+    for points in (report["points"], profile["points"]):
+        assert [p.get("soft_model") for p in points] == [None, "base", "express"], points
+        assert "soft_ms" not in points[0] and all(0 < p["soft_ms"] <= p["ms"] for p in points[1:]), points
+        assert all(p["psnr"] > 15 for p in points), points
+    solid, base, express = report["points"]
+    assert base["psnr"] >= express["psnr"] - 1 and base["psnr"] != express["psnr"], (base, express)  # base is the reference
+    rows = [row.split(",") for row in (folder / "compared/bench.csv").read_text().splitlines()]
+    assert [row[rows[0].index("soft_model")] for row in rows[1:]] == ["solid", "base", "express"], rows
+    chart = (folder / "compared/chart.svg").read_text()
+    assert ">splat<" in chart and ">splat, base<" in chart and ">splat, express<" in chart
+    page = (folder / "compared/index.html").read_text()
+    assert page.count('"soft_reference":"') == 2, page[-2000:]
+    assert (folder / "compared/pictures/view0-reference.jpg").read_bytes() != \
+        (folder / "compared/pictures/view0-reference-soft.jpg").read_bytes()
+    state = (folder / "compared/state.jsonl").read_text()
+    assert must(*compared).splitlines()[0] == table.splitlines()[0]  # nothing is measured again
+    assert (folder / "compared/state.jsonl").read_text() == state
+    other = run(*[x if x != soft[1] else "box:-1,-1,0,2,2,3" for x in compared])
+    assert other.returncode != 0 and "--restart" in other.stderr, other.stderr
+
+    for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out", "--photographs"],
                   ["--soft", "class:1", "--soft-model", "base,base"], ["--soft", "class:1", "--soft-opacity", 2],
                   ["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],
                   ["--views", folder / "no.json"], ["--method", "lines"], ["--lod", "-1"], ["--size", "160x"]):

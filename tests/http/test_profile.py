@@ -124,6 +124,54 @@ def test_budget_and_psnr_choose():
         assert reply.headers["Splatd-Demand"] == "met"  # whatever a busy machine has taught it
 
 
+def test_what_is_soft_counts():
+    soft = {"soft": "axis:0,0,0,0,0,1<0.5"}
+    with serving(profile(VERSION), FAKE_SOFT_MS=MPX_MS) as (d, _):  # at lod=1 as much again
+        assert ask(d, budget="1s", **soft)[0] == ("splat", 1, 2)  # 200 ms
+        assert ask(d, budget="36ms")[0] == ("splat", 1, 1)  # 25
+        for _ in range(4):
+            setting, reply = ask(d, budget="36ms", **soft)
+            assert setting[:2] in [("splat", 2), ("splat", 4)], setting  # 25 for lod=2, 50 for lod=1
+            assert "soft" in reply.headers["Splatd-Soft"]
+        d.view(width=500, height=500, lod=2, method="splat", format="raw", **soft)  # frames that nobody planned teach too
+        setting, reply = ask(d, budget="1s", lod=2, method="splat", **soft)
+        promised = float(fields(reply.headers["Splatd-Promised"])["ms"])
+        assert 24 < promised < 36, promised
+        assert ask(d, budget="22ms", **soft)[0][1] >= 4
+        setting, reply = ask(d, budget="1s", lod=2, method="splat")  # what is solid is promised what it was
+        assert float(fields(reply.headers["Splatd-Promised"])["ms"]) < 18
+        setting, reply = ask(d, budget="1s", lod=2, method="splat", soft_opacity=0, **soft)  # nothing of it is drawn
+        assert float(fields(reply.headers["Splatd-Promised"])["ms"]) < 18
+
+
+def test_a_profile_says_what_soft_models_cost():
+    points = profile(VERSION)["points"]
+    points += [{**p, "soft_model": model, "ms": p["ms"] + soft, "ms_q90": 1.05 * (p["ms"] + soft), "soft_ms": soft}
+               for p in points if p["supersample"] == 1 and p["method"] == "splat"
+               for model, soft in (("express", 80 / p["lod"]), ("base", 800 / p["lod"]))]
+    what = {"terms": "axis:0,0,0,0,0,1<0.5", "opacity": 0.3, "blend": 0}
+    with serving(profile(VERSION, format_version=2, points=points, soft=what)) as (d, _):
+        served = d.ask(PROFILE).json()
+        assert served["soft"] == what and served["format_version"] == 2
+        assert [p.get("soft_model") for p in served["points"]] == [None] * 6 + ["express", "base"] * 3
+        assert [p["front"] for p in served["points"]][:6] == [True, False, True, True, True, True]  # as without them
+        texts = [e.text for e in xml.etree.ElementTree.fromstring(d.ask(PROFILE + "?format=svg").body).iter()
+                 if e.tag.endswith("text")]
+        assert {"splat", "splat, express", "splat, base"} <= set(texts), texts
+        for model, least, most in (("express", 40, 60), ("base", 200, 320)):  # of 25 + 20, of 25 + 200 and more, before any frame
+            _, reply = ask(d, budget="10s", lod=1, supersample=1, method="splat", soft=what["terms"], soft_model=model)
+            promised = float(fields(reply.headers["Splatd-Promised"])["ms"])
+            assert least < promised < most, (model, promised)
+        assert ask(d, budget="36ms")[0] == ("splat", 1, 1)  # soft points are no settings to choose
+    broken = [({"soft": None}, "soft"), ({"soft": {**what, "terms": "x"}}, "soft"), ({"soft": {**what, "opacity": 2}}, "soft"),
+              ({"soft": {"terms": "class:3"}}, "soft"), ({"points": [{**points[0], "soft_model": "exact"}]}, "soft_model"),
+              ({"points": [{**points[6], "soft_ms": 1e6}]}, "soft_ms")]
+    for change, field in broken:
+        document = {**profile(VERSION, format_version=2, points=points, soft=what), **change}
+        with serving(document) as (d, _):
+            assert d.ask(PROFILE).status == 404 and field in d.ask(PROFILE).json()["detail"], (change, d.ask(PROFILE).body)
+
+
 def test_given_parameters_narrow_the_choice():
     with serving(profile(VERSION)) as (d, _):
         assert ask(d, budget="1s", method="points")[0] == ("points", 1, 1)
@@ -197,7 +245,7 @@ def test_profiles_that_cannot_be_trusted_are_ignored():
     other = VERSION[:-1] + ("0" if VERSION[-1] != "0" else "1")
     broken = profile(VERSION)
     broken["points"][2]["ms"] = -1
-    cases = [("{", "broken JSON"), ("[]", "format"), (profile(VERSION, format_version=2), "format_version"),
+    cases = [("{", "broken JSON"), ("[]", "format"), (profile(VERSION, format_version=3), "format_version"),
              (broken, "ms -1 is outside"), (profile(other), f"version {other}"),
              (profile(VERSION, device={**DEVICE, "name": "a real GPU"}), "a real GPU"),
              (profile(VERSION, device={**DEVICE, "driver": "tests 2"}), "tests 2"),

@@ -1,5 +1,5 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
- * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS (see frame_ns()), in steps of a
+ * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS and FAKE_SOFT_MS (see frame_ns()), in steps of a
  * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
  * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
  * takes to put them on the device, and FAKE_HANG_MS that the first frame
@@ -138,14 +138,25 @@ static int fill(struct spl_image *image, enum spl_layer layer, const struct spl_
     return 0;
 }
 
+static double samples_of(const struct spl_view *view)
+{
+    return 1e-6 * view->camera.width * view->camera.height * view->supersample * view->supersample;
+}
+
+/* FAKE_SOFT_MS a megapixel of what is soft, at lod=1, whatever the method. */
+static double soft_ms(const struct spl_view *view)
+{
+    bool soft = view->soft.count && view->soft.opacity > 0;
+    return soft ? (double)setting("FAKE_SOFT_MS", 0) * samples_of(view) / (view->lod > 1 ? view->lod : 1) : 0;
+}
+
 /* FAKE_FRAME_MS and, a megapixel of splats at lod=1, FAKE_MPX_MS: proportional to samples, a quarter of it for points,
  * less where the level is coarser. */
 static uint64_t frame_ns(const struct spl_view *view)
 {
-    double side = (double)view->supersample, samples = 1e-6 * view->camera.width * view->camera.height * side * side;
     double share = (view->method == SPL_METHOD_POINTS ? 0.25 : 1) / (view->lod > 1 ? view->lod : 1);
-    double ms = (double)setting("FAKE_FRAME_MS", 1) + (double)setting("FAKE_MPX_MS", 0) * samples * share;
-    return (uint64_t)(ms * SPL_NS_PER_MS);
+    double ms = (double)setting("FAKE_FRAME_MS", 1) + (double)setting("FAKE_MPX_MS", 0) * samples_of(view) * share;
+    return (uint64_t)((ms + soft_ms(view)) * SPL_NS_PER_MS);
 }
 
 struct spl_frame_steps {
@@ -182,6 +193,7 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
         if (steps->view.layers >> layer & 1 &&
             fill(&steps->frame.images[layer], (enum spl_layer)layer, &steps->view, err))
             return SPL_E_NOMEM;
+    steps->frame.stats.soft_ms = soft_ms(&steps->view);
     steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
     steps->frame.stats.pending = !steps->frame.stats.complete;
     return 0;

@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/work.h"
+#include "cloud/laz/find_table.h"
 #include "cloud/laz/items.h"
 
 enum {
@@ -17,7 +18,6 @@ enum {
     slice_points = 4096,
     chunks_a_worker = 2,
     round_chunks = 256,
-    table_entry_bytes = 24,
     threads_most = 64
 };
 /* No point takes more than this: twice its raw size, and what small models cost. For where no table tells a chunk's
@@ -88,49 +88,15 @@ static int make_decoder(struct spl_laz_stream *s, unsigned index, struct spl_err
     return s->decoders[index] ? SPL_OK : spl_laz_decoder_create(&s->format, &s->decoders[index], err);
 }
 
-/* Reads the table where it lies, if it lies anywhere. One that is wrong is done without where chunks are of one size.
- */
-static int open_table(struct spl_laz_stream *s, uint64_t points_at, struct spl_error *err)
+static int find_table(struct spl_laz_stream *s, uint64_t points_at, struct spl_error *err)
 {
-    struct spl_source *source = s->source;
-    struct spl_laz_fault fault = {0};
-    uint8_t bytes[8];
-    uint64_t at, size = source->size;
-    if (size - points_at < sizeof bytes)
-        return spl_source_fail_at(source, points_at, "chunk table", err, "the file ends before the table's offset");
-    int code = spl_source_read_at(source, points_at, bytes, sizeof bytes, err);
-    if (code == SPL_OK && spl_laz_get64(bytes) == UINT64_MAX)
-        code = spl_source_read_at(source, size - sizeof bytes, bytes, sizeof bytes, err);
-    if (code < 0)
-        return code;
-    s->begin = points_at + sizeof bytes;
-    at = spl_laz_get64(bytes);
-    bool interrupted = at == s->begin || at == points_at;
-    if (!interrupted && at > s->begin && at < size) {
-        uint64_t left = size - at, most = 8 + table_entry_bytes * ((at - s->begin) / s->format.record_bytes + 1);
-        size_t length = (size_t)(left < most ? left : most);
-        uint8_t *table = spl_alloc_raw(length, 1, err);
-        code = table ? spl_source_read_at(source, at, table, length, err) : SPL_E_NOMEM;
-        if (code == SPL_OK)
-            code = spl_laz_table_read(&s->table, table, length, &s->format, s->begin, at, s->points, &fault, err);
-        free(table);
-        s->has_table = code == SPL_OK;
-        if (code != SPL_E_INPUT || (err && err->code))
-            return code;
-    } else {
-        spl_laz_fail(&fault, SPL_E_INPUT, 0, "chunk table", "it is missing, since its writer was interrupted");
-        if (!interrupted)
-            spl_laz_fail(&fault, SPL_E_INPUT, points_at - at, "chunk table",
-                         "its offset %llu lies outside the points and the file's %llu bytes", (unsigned long long)at,
-                         (unsigned long long)size);
-    }
-    if (s->format.chunk_points == 0)
-        return spl_source_fail_at(source, at + fault.at, fault.field, err, "%s; chunks of varying size need one",
-                                  fault.reason);
-    fault.at += at;
-    if (!interrupted)
-        s->warning = fault;
-    return SPL_OK;
+    struct spl_laz_found_table found;
+    int code = spl_laz_table_find(s->source, &s->format, points_at, s->points, &found, err);
+    s->begin = found.begin;
+    s->table = found.table;
+    s->has_table = found.has_table;
+    s->warning = found.warning;
+    return code;
 }
 
 const struct spl_laz_fault *spl_laz_stream_get_warning(const struct spl_laz_stream *s)
@@ -156,7 +122,7 @@ int spl_laz_stream_open(struct spl_laz_stream **out, struct spl_source *source, 
     if (format->compressor == SPL_LAZ_STREAM)
         s->format.chunk_points = 0;
     else if (points > 0)
-        code = open_table(s, points_at, err);
+        code = find_table(s, points_at, err);
     if (code < 0)
         spl_laz_stream_destroy(s);
     else

@@ -2,7 +2,6 @@
  * are refused, what is off by little is told. Maps of a side that is enough for it are made for this. The caller's
  * thread. */
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -33,17 +32,6 @@ static const struct spl_named_view *find_picture(const struct spl_map_pass *p, u
         if (p->stations.of_view[v] == station && p->views->views[v].photograph)
             return &p->views->views[v];
     return NULL;
-}
-
-void spl_map_warn(const struct spl_map_pass *p, const char *format, ...)
-{
-    char text[1024];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    if (p->pack->warn)
-        p->pack->warn(p->pack->progress_context, text);
 }
 
 /* "station 3", and what stands there. */

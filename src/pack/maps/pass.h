@@ -6,6 +6,7 @@
 #include "pack/maps/edit.h"
 #include "pack/maps/maps.h"
 #include "pack/maps/sees.h"
+#include "pack/warn.h"
 
 struct spl_map_pass {
     const struct spl_pack_options *pack;
@@ -37,7 +38,7 @@ struct spl_map_pass {
 /* How many views are of some station: what "checking maps" and "maps" count besides stations. */
 size_t spl_map_count_placed(const struct spl_map_pass *p);
 
-void spl_map_warn(const struct spl_map_pass *p, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#define spl_map_warn(p, ...) spl_pack_warn((p)->pack->warn, (p)->pack->progress_context, __VA_ARGS__)
 
 /* A picture that cannot be used: handed out and left out (0), or the end. */
 int spl_map_pass_refuse(struct spl_map_pass *p, int rc, const struct spl_error *why, struct spl_error *err);

@@ -1,5 +1,5 @@
-/* What the gpu thread has, and the datasets on its device. Only gpu_thread.c and gpu_datasets.c include it; everything
- * is owned by that thread. */
+/* What the gpu thread has: turns (gpu_thread.c), the datasets on its device (gpu_datasets.c), losses of that
+ * (gpu_loss.c). Only these include it; everything is owned by that thread. */
 #ifndef SPL_SERVICE_GPU_H
 #define SPL_SERVICE_GPU_H
 
@@ -52,5 +52,30 @@ void spl_gpu_publish_residency(struct gpu *gpu);
 
 /* Puts on the device what has been read since, or some of it, and publishes it. SPL_E_DEVICE_LOST. */
 int spl_gpu_upload(struct gpu *gpu, struct spl_error *err);
+
+/* Takes over what waits beside small views. */
+void spl_gpu_take_large(struct gpu *gpu);
+
+/* Hands a job back that has ended, wherever it waited. */
+void spl_gpu_leave(struct gpu *gpu, struct spl_job *job);
+
+void spl_gpu_set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state);
+
+/* Finds who the device was lost for: the dataset of the page that was on its way to it, whoever's turn it was, else
+ * that of the frame, `drawn`, which may be NULL. */
+void spl_gpu_blame(struct gpu *gpu, struct spl_catalog_entry *drawn);
+
+/* Makes a new renderer after a loss; false when the process had better end. */
+bool spl_gpu_recover(struct gpu *gpu, const struct spl_error *why);
+
+/* Both, after a loss in no frame. */
+bool spl_gpu_reopen(struct gpu *gpu, const struct spl_error *why);
+
+/* Refuses everything from now on: the service has failed. */
+void spl_gpu_give_up(struct gpu *gpu, const struct spl_error *why);
+
+/* The losses that tests want: when, and then one if it is time. */
+void spl_gpu_plan_losses(struct gpu *gpu);
+void spl_gpu_inject(struct gpu *gpu);
 
 #endif

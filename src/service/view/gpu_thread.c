@@ -1,40 +1,22 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
  * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so a
- * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and finishes with the bytes that it would
- * have had alone. Frames of tours have the turns that nobody wants.
- *
- * Loss of the device is an event: the renderer is destroyed, every view that waits is answered with "device lost", a
- * new renderer is made from the mapped datasets (gpu_datasets.c). A dataset in whose frames or pages it is lost twice within
- * `aside_window_ns` is put aside, where there are others. More than SPL_GPU_REBUILDS_MAX losses within
- * `rebuild_window_ns` that are not explained by this end the process, for its supervisor to decide.
- *
- * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
- * lost, K times in all (1 when left out). */
-#include <inttypes.h>
+ * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and
+ * finishes with the bytes that it would have had alone. Frames of tours have the turns that nobody wants. What comes of
+ * a device that is lost is in gpu_loss.c. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/log.h"
-#include "render/fault.h"
 #include "service/view/gpu.h"
 
-static const uint64_t rebuild_window_ns = 60 * SPL_NS_PER_S, aside_window_ns = 600 * SPL_NS_PER_S;
 static const uint64_t behind_turn_ns = 10 * SPL_NS_PER_S;
 static const uint64_t small_turn_ns = 250 * SPL_NS_PER_MS; // a small view of several pieces has so long at first
 static const uint64_t slow_ns = 1000;                        // a sample: several times what views take
 static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
-static void set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state state)
-{
-    atomic_store(&pipeline->state, (int)state);
-    pipeline->options.wake(pipeline->options.wake_context);
-}
-
-/* Takes over what waits beside small views. */
-static void take_large(struct gpu *gpu)
+void spl_gpu_take_large(struct gpu *gpu)
 {
     for (struct spl_job *job; (job = spl_queue_pop(gpu->pipeline->large, 0));)
         spl_turns_add(&gpu->turns, job);
@@ -51,124 +33,10 @@ static void detach(struct gpu *gpu, struct spl_job *job)
         spl_turns_remove(&gpu->turns, job);
 }
 
-/* Hands a job back that has ended, wherever it waited. */
-static void leave(struct gpu *gpu, struct spl_job *job)
+void spl_gpu_leave(struct gpu *gpu, struct spl_job *job)
 {
     detach(gpu, job);
     spl_pipeline_finish_job(gpu->pipeline, job);
-}
-
-/* Answers everything that waits. */
-static void refuse_waiting(struct gpu *gpu)
-{
-    for (;;) {
-        take_large(gpu);
-        struct spl_job *job = spl_queue_pop(gpu->pipeline->render, 0);
-        if (!job)
-            job = TAILQ_FIRST(&gpu->turns.jobs);
-        if (!job)
-            job = gpu->behind;
-        if (!job)
-            return;
-        spl_fail(&job->err, SPL_E_DEVICE_LOST, "the device was lost; it is being reopened");
-        leave(gpu, job);
-    }
-}
-
-static void give_up(struct gpu *gpu, const struct spl_error *why)
-{
-    struct spl_pipeline *pipeline = gpu->pipeline;
-    pipeline->failure = *why;
-    spl_pipeline_close_render(pipeline);
-    refuse_waiting(gpu);
-    set_state(pipeline, SPL_PIPELINE_FAILED);
-}
-
-/* False when the bound on losses is reached; counts this one. */
-static bool may_rebuild(struct gpu *gpu)
-{
-    uint64_t now = spl_now_ns(), *slot = &gpu->losses_ns[gpu->losses % SPL_GPU_REBUILDS_MAX];
-    bool allowed = gpu->losses < SPL_GPU_REBUILDS_MAX || now - *slot > rebuild_window_ns;
-    *slot = now;
-    gpu->losses++;
-    spl_count(gpu->pipeline->options.counters, device_losses);
-    return allowed;
-}
-
-/* The device was lost for `entry`, to which the caller has a reference, or which is loading. The second time the dataset
- * is the fault, and its losses do not count against the device. */
-static void blame_entry(struct gpu *gpu, struct spl_catalog_entry *entry)
-{
-    uint64_t now = spl_now_ns(), before = entry->lost_ns;
-    entry->lost_ns = now;
-    if (entry->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, entry))
-        return;
-    struct spl_error why = {0};
-    spl_fail(&why, SPL_E_DEVICE_LOST,
-             "the device was lost twice within %d minutes while the dataset was drawn or loaded; a changed file is tried "
-             "again",
-             (int)(aside_window_ns / (60 * SPL_NS_PER_S)));
-    gpu->losses = 0;
-    if (entry->loading) {
-        spl_gpu_refuse(gpu, entry, &why);
-        return;
-    }
-    entry->aside = true;
-    entry->err = why;
-    spl_pipeline_report_change(gpu->pipeline, spl_catalog_entry_ref(entry), SPL_ENTRY_ASIDE);
-}
-
-/* Finds who the device was lost for: the dataset of the page that was on its way to it, whoever's turn it was, else that
- * of the frame, `drawn`, which may be NULL. */
-static void blame(struct gpu *gpu, struct spl_catalog_entry *drawn)
-{
-    const struct spl_dataset *dataset = gpu->renderer ? spl_renderer_get_lost_dataset(gpu->renderer) : NULL;
-    struct spl_catalog_entry *entry, *held = NULL;
-    if (!dataset && drawn)
-        blame_entry(gpu, drawn);
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    if (dataset && entry->dataset == dataset)
-        break;
-    if (!entry || (!entry->loading && !(held = spl_catalog_entry_try_ref(entry)))) // nobody's, or it is about to go
-        return;
-    blame_entry(gpu, entry);
-    spl_catalog_entry_unref(held);
-}
-
-/* Makes a new renderer after a loss; false when the process had better end. */
-static bool recover(struct gpu *gpu, const struct spl_error *why)
-{
-    struct spl_error err = *why;
-    spl_pipeline_touch(gpu->pipeline);
-    set_state(gpu->pipeline, SPL_PIPELINE_REBUILDING);
-    for (;;) {
-        spl_log_warn("device lost: %s", err.message);
-        refuse_waiting(gpu);
-        spl_gpu_tear_down(gpu);
-        if (!may_rebuild(gpu)) {
-            struct spl_error last = {0};
-            spl_fail(&last, SPL_E_DEVICE_LOST, "the device was lost more than %d times within %d s; last: %.300s",
-                     (int)SPL_GPU_REBUILDS_MAX, (int)(rebuild_window_ns / SPL_NS_PER_S), err.message);
-            give_up(gpu, &last);
-            return false;
-        }
-        err = (struct spl_error){0};
-        if (!spl_gpu_build(gpu, &err))
-            break;
-        blame(gpu, NULL);
-    }
-    spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
-    set_state(gpu->pipeline, SPL_PIPELINE_READY);
-    return true;
-}
-
-static void inject(struct gpu *gpu)
-{
-    if (!gpu->inject_left || gpu->frames < gpu->inject_at)
-        return;
-    gpu->inject_left--;
-    gpu->inject_at = gpu->frames + gpu->inject_every;
-    spl_renderer_inject_loss(gpu->renderer);
 }
 
 /* Sets the view to what its demand is best met with. A job that lacks the time is refused before it is planned. */
@@ -192,7 +60,7 @@ static int begin(struct gpu *gpu, struct spl_job *job)
 {
     if (job->entry && job->entry->aside)
         return spl_fail(&job->err, job->entry->err.code, "%s", job->entry->err.message);
-    inject(gpu);
+    spl_gpu_inject(gpu);
     int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
     if (!rc)
         spl_frame_set_cancel(job->steps, &job->dropped);
@@ -234,7 +102,7 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     bool usual = !job->request.picks && !job->request.container;
     bool cut_short = job->request.view.partial && !job->stats.complete;
     if (job->plan && usual && !job->stats.pages_loaded && !cut_short) // loading is no property of the setting
-        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS);
+        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS, job->stats.soft_ms);
 }
 
 /* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
@@ -279,7 +147,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     bool more = false;
     spl_pipeline_touch(pipeline);
     if (is_over(gpu, job)) {
-        leave(gpu, job);
+        spl_gpu_leave(gpu, job);
         return true;
     }
     resume(job);
@@ -298,9 +166,9 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     if (rc) {
         bool lost = err.code == SPL_E_DEVICE_LOST && !(job->entry && job->entry->aside);
         if (lost)
-            blame(gpu, job->entry);
-        leave(gpu, job);
-        return !lost || recover(gpu, &err);
+            spl_gpu_blame(gpu, job->entry);
+        spl_gpu_leave(gpu, job);
+        return !lost || spl_gpu_recover(gpu, &err);
     }
     if (!spl_frame_is_waiting(job->steps))
         follow(&pipeline->turn_ns, took);
@@ -322,10 +190,10 @@ static void drop_over(struct gpu *gpu)
     for (job = TAILQ_FIRST(&gpu->turns.jobs); job; job = next) {
         next = TAILQ_NEXT(job, turn);
         if (is_over(gpu, job))
-            leave(gpu, job);
+            spl_gpu_leave(gpu, job);
     }
     if (gpu->behind && gpu->behind->waits && is_over(gpu, gpu->behind))
-        leave(gpu, gpu->behind);
+        spl_gpu_leave(gpu, gpu->behind);
 }
 
 /* Has the job what it waited for? */
@@ -361,7 +229,7 @@ static uint64_t look_after_all(struct gpu *gpu)
 static struct spl_job *choose(struct gpu *gpu, bool idle)
 {
     struct spl_queue *render = gpu->pipeline->render;
-    take_large(gpu);
+    spl_gpu_take_large(gpu);
     drop_over(gpu);
     uint64_t until = look_after_all(gpu);
     struct spl_job *behind = gpu->behind && !gpu->behind->waits ? gpu->behind : NULL;
@@ -380,19 +248,12 @@ static bool wait_for_pages(struct gpu *gpu)
     return true;
 }
 
-/* After a loss in no frame. */
-static bool reopen(struct gpu *gpu, const struct spl_error *why)
-{
-    blame(gpu, NULL);
-    return recover(gpu, why);
-}
-
 static void run(struct gpu *gpu)
 {
     for (;;) {
         struct spl_error err = {0};
         spl_gpu_take_orders(gpu);
-        if (spl_gpu_upload(gpu, &err) && !reopen(gpu, &err))
+        if (spl_gpu_upload(gpu, &err) && !spl_gpu_reopen(gpu, &err))
             break;
         struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
@@ -404,7 +265,7 @@ static void run(struct gpu *gpu)
         }
         if (job && !serve(gpu, job))
             break;
-        if (loading && spl_gpu_load_page(gpu, loading, &err) && !reopen(gpu, &err))
+        if (loading && spl_gpu_load_page(gpu, loading, &err) && !spl_gpu_reopen(gpu, &err))
             break;
     }
 }
@@ -414,18 +275,15 @@ void *spl_gpu_thread_run(void *argument)
     struct gpu gpu = {.pipeline = argument};
     const struct spl_pipeline_options *options = &gpu.pipeline->options;
     struct spl_error err = {0};
-    const char *losses = getenv("SPLATD_INJECT_LOSS_AFTER");
-    if (losses && sscanf(losses, "%" SCNu64 "x%" SCNu64, &gpu.inject_every, &gpu.inject_left) == 1)
-        gpu.inject_left = 1;
-    gpu.inject_at = gpu.inject_every;
+    spl_gpu_plan_losses(&gpu);
     TAILQ_INIT(&gpu.entries);
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
         TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
     if (spl_gpu_build(&gpu, &err)) {
-        give_up(&gpu, &err);
+        spl_gpu_give_up(&gpu, &err);
     } else {
-        set_state(gpu.pipeline, SPL_PIPELINE_READY);
+        spl_gpu_set_state(gpu.pipeline, SPL_PIPELINE_READY);
         run(&gpu);
     }
     spl_gpu_tear_down(&gpu);

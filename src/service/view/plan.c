@@ -141,6 +141,7 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     if (has_changed(plan))
         read_profile(plan);
     struct spl_demand demand = request->demand;
+    demand.soft = &request->view.soft;
     demand.keep_atoms &= plan->info->atoms > 0;
     demand.keep_maps &= plan->info->maps > 0;
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
@@ -160,13 +161,11 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     return 0;
 }
 
-void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms)
+void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms, double soft_ms)
 {
     const struct spl_view *view = &request->view;
     uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params;
     params &= ~(SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps)); /* which are settings */
-    if (view->soft.count)
-        return; /* what it took says nothing of the settings that were measured */
     params &= ~SPL_PARAMS_OF_ALL;
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (params >> i & 1 && spl_view_get_param(view, i) != spl_method_param_get(i)->otherwise)
@@ -177,7 +176,10 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
                                   : view->maps == SPL_MAPS_ON ? SPL_SETTING_MAPS_ON
                                                               : SPL_SETTING_MAPS_OFF};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
-    if (index >= 0)
+    if (index >= 0 && view->soft.count)
+        spl_planner_learn_soft(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer,
+                               &view->soft, ms, soft_ms);
+    else if (index >= 0)
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);
 }
 

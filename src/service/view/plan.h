@@ -25,8 +25,8 @@ void spl_plan_set_device(struct spl_plan *plan, const struct spl_device_info *de
 int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, double left_ms, struct spl_choice *choice,
                    double *promised_ms, struct spl_error *err);
 
-/* gpu thread: a frame of `request`, planned or not, took `ms`. */
-void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms);
+/* gpu thread: a frame of `request`, planned or not, took `ms`, its soft stage `soft_ms` of them. */
+void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms, double soft_ms);
 
 /* Any thread: `ms` went by between the frame and its reply: the encoding, and the way to it and from it. */
 void spl_plan_learn_reply(struct spl_plan *plan, const struct spl_view_request *request, double ms);

@@ -152,6 +152,10 @@ static void test_what_cannot_be_loaded_is_not_saved(void **state)
 #define MAPPED(maps, atoms)                                                                                            \
     "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"atoms\": " atoms ", \"maps\": \"" maps "\", \"ms\": 8, "     \
     "\"ms_q90\": 9, \"fixed_ms\": 1, \"ms_per_mpx\": 7}"
+#define SOFT(terms, opacity) "\"soft\": {\"terms\": \"" terms "\", \"opacity\": " opacity ", \"blend\": 0.5}"
+#define SOFTENED(model)                                                                                                \
+    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"soft_model\": \"" model "\", \"ms\": 95, "               \
+    "\"ms_q90\": 99, \"soft_ms\": 20, \"fixed_ms\": 1, \"ms_per_mpx\": 7, \"psnr\": 20}"
 #define GOOD                                                                                                           \
     "{\"format\": \"splatd-profile\", \"format_version\": 1, \"splatd\": \"0.1.0\", \"dataset\": {\"id\": \"hall\", "  \
     "\"version\": \"0123456789abcdef\"}, \"device\": {\"backend\": \"egl\", \"name\": \"n\", \"driver\": \"d\", "      \
@@ -191,7 +195,7 @@ static void test_every_broken_field_is_named(void **state)
         {"80", "1e999", ""},                                // more than a double holds
         {"\"format\": \"splatd-profile\"", "\"format\": \"other\"", "format"},
         {"\"format\": \"splatd-profile\", ", "", "format"},
-        {"\"format_version\": 1", "\"format_version\": 2", "format_version"},
+        {"\"format_version\": 1", "\"format_version\": 3", "format_version"},
         {"\"format_version\": 1", "\"format_version\": 0", "format_version"},
         {"\"format_version\": 1", "\"format_version\": \"1\"", "format_version"},
         {"\"0.1.0\"", "7", "splatd"},
@@ -252,6 +256,14 @@ static void test_every_broken_field_is_named(void **state)
         {"\"future\": {}", "\"see_through\": -0.1", "see_through"},
         {"\"future\": {}", "\"halo\": 2", "halo"},
         {"\"future\": {}", "\"normal_mean\": 181", "normal_mean"},
+        {"\"future\": {}", "\"soft_ms\": 81", "soft_ms"}, // more than the frame
+        {"\"future\": {}", "\"soft_ms\": -1", "soft_ms"},
+        {"\"future\": {}", "\"soft_model\": \"express\"", "soft_model"}, // of what?
+        {"\"future\": {}", "\"soft_model\": 1", "soft_model"},
+        {"\"more\": []", "\"soft\": []", "soft"},
+        {"\"more\": []", SOFT("class:3-", "0.3"), "soft"},
+        {"\"more\": []", SOFT("class:3-5", "1.5"), "soft"},
+        {"\"more\": []", SOFT("class:3-5", "null"), "soft"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         refuse(cases[i].find, cases[i].replace, cases[i].field);
@@ -290,6 +302,43 @@ static void test_maps(void **state)
     spl_setting_apply(&profile.points[1].setting, &view);
     assert_int_equal(view.maps, SPL_MAPS_ON);
     spl_profile_finish(&profile);
+}
+
+/* Points with something soft are settings of their own, on a front of their own, and are written as they are read. */
+static void test_soft(void **state)
+{
+    (void)state;
+    char text[4096], folder[256], path[300];
+    const char *more = strstr(GOOD, "\"more\": []"), *other = strstr(GOOD, OTHER);
+    snprintf(text, sizeof text, "%.*s%s%.*s%s, %s]}", (int)(more - GOOD), GOOD, SOFT("class:3-5", "0.3"),
+             (int)(other - more - strlen("\"more\": []")), more + strlen("\"more\": []"), SOFTENED("express"),
+             SOFTENED("base"));
+    struct spl_profile profile, again;
+    assert_int_equal(spl_profile_parse(text, strlen(text), "file", &profile, NULL), 0);
+    make_folder(folder);
+    snprintf(path, sizeof path, "%s/x.profile.json", folder);
+    assert_int_equal(spl_profile_save(path, &profile, NULL), 0);
+    assert_int_equal(spl_profile_load(path, NULL, NULL, &again, NULL), 0);
+    struct spl_profile *both[] = {&profile, &again};
+    for (int i = 0; i < 2; i++) {
+        const struct spl_profile_point *p = both[i]->points;
+        assert_true(both[i]->count == 3 && both[i]->soft.count == 1 && both[i]->soft.blend == 0.5);
+        assert_string_equal(both[i]->soft.terms[0].name, "class");
+        assert_true(!p[0].setting.soft && isnan(p[0].soft_ms) && p[1].soft_ms == 20);
+        assert_string_equal(spl_setting_soft_name(p[1].setting.soft), "express");
+        assert_string_equal(spl_setting_soft_name(p[2].setting.soft), "base");
+        assert_true(p[0].front && p[1].front && p[2].front); /* slower and less like its reference than the first */
+    }
+    struct spl_view view;
+    spl_view_init(&view);
+    spl_setting_apply_soft(&profile.points[2].setting, &profile.soft, &view);
+    assert_true(view.soft.count == 1 && view.soft.model == SPL_SOFT_MODEL_BASE && view.soft.opacity == 0.3);
+    spl_setting_apply_soft(&profile.points[0].setting, &profile.soft, &view);
+    assert_int_equal(view.soft.count, 0);
+    spl_profile_finish(&profile);
+    spl_profile_finish(&again);
+    unlink(path);
+    rmdir(folder);
 }
 
 static void test_files_that_are_no_profiles(void **state)
@@ -360,6 +409,7 @@ int main(void)
         cmocka_unit_test(test_what_cannot_be_loaded_is_not_saved),
         cmocka_unit_test(test_every_broken_field_is_named),
         cmocka_unit_test(test_maps),
+        cmocka_unit_test(test_soft),
         cmocka_unit_test(test_files_that_are_no_profiles),
         cmocka_unit_test(test_where_a_profile_lies),
         cmocka_unit_test(test_front),

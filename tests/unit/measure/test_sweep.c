@@ -514,7 +514,7 @@ static void test_report(void **state)
     assert_int_equal(count_of(svg, "class=\"curve s5\""), 2);
     free(svg);
     assert_int_equal(spl_report_to_csv(&report, &csv, &length, NULL), 0);
-    assert_non_null(strstr(csv, ",on\npoints,"));
+    assert_non_null(strstr(csv, ",on,solid,\npoints,"));
     free(csv);
     char name[64];
     spl_report_setting_name(&report.profile.points[0].setting, name);
@@ -523,6 +523,27 @@ static void test_report(void **state)
     assert_string_equal(name, "splat lod=1 atoms=2");
     spl_report_setting_name(&settings[1], name);
     assert_string_equal(name, "points lod=2 2×2");
+    /* With something soft: a model beside the solid setting, with its own stage's time. */
+    struct spl_soft_params soft = {.opacity = 0.3};
+    assert_int_equal(spl_soft_parse("class:3-5", &soft, NULL), 0);
+    report.profile.points[0].setting = (struct spl_setting){.method = SPL_METHOD_POINTS, .lod = 4, .supersample = 1,
+                                                            .atoms = 8, .soft = 1 + SPL_SOFT_MODEL_BASE};
+    report.profile.points[0].soft_ms = 7.5;
+    report.profile.soft = soft;
+    spl_report_setting_name(&report.profile.points[0].setting, name);
+    assert_string_equal(name, "points lod=4 soft=base");
+    assert_int_equal(spl_report_to_csv(&report, &csv, &length, NULL), 0);
+    assert_non_null(strstr(csv, ",maps,soft_model,soft_ms\n"));
+    assert_non_null(strstr(csv, ",base,7.5\npoints,"));
+    assert_non_null(strstr(csv, ",solid,\n"));
+    free(csv);
+    assert_int_equal(spl_report_chart(&report.profile, 1, 22, NULL, &svg, &length, NULL), 0);
+    assert_non_null(strstr(svg, ">points, base<"));
+    assert_int_equal(count_of(svg, "<polyline"), 2);
+    free(svg);
+    json = spl_report_to_json(&report, NULL);
+    assert_string_equal(json_string_value(json_object_get(json_object_get(json, "soft"), "terms")), "class:3..5");
+    json_decref(json);
     spl_report_finish(&report);
     spl_dataset_close(dataset);
 }

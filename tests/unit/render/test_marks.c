@@ -77,7 +77,7 @@ struct codes {
     uint32_t *bases[1];
 };
 
-static void make_codes(struct codes *c, enum spl_stream_type type)
+static void make_codes(struct codes *c, enum spl_stream_type type, bool complete)
 {
     struct spl_bit_writer writer = {.words = c->words};
     *c = (struct codes){.chunk = {.count = 1 + (uint16_t)(uniform() * SPL_CHUNK_SPLATS)}};
@@ -91,7 +91,10 @@ static void make_codes(struct codes *c, enum spl_stream_type type)
     }
     for (uint32_t i = 0; i < c->chunk.count; i++) {
         uint32_t mask = c->width ? UINT32_MAX >> (32 - c->width) : 0;
-        spl_bits_put(&writer, uniform() < 0.1 ? mask : any_word() & mask, c->width);
+        uint32_t code = uniform() < 0.1 ? mask : any_word() & mask;
+        if (type == SPL_STREAM_STEPS && complete && code == mask && c->width)
+            code = 0;
+        spl_bits_put(&writer, code, c->width);
     }
     spl_bits_pad(&writer);
 }
@@ -108,13 +111,15 @@ static uint32_t mark_of(const struct spl_marks_chunk *judged, const struct codes
 static void numbers_are_as_they_decode(void **state)
 {
     struct spl_dataset_info info = describe();
-    uint32_t seen[4] = {0};
+    uint32_t seen[4] = {0}, whole[2] = {0};
     (void)state;
     for (int round = 0; round < rounds; round++) {
+        const bool complete = round / 3 % 2; /* whether every splat is known to have a value */
+        info.leaf_splats = complete ? 1000 : 1001;
         const int s = round % 3;
         const enum spl_stream_type type = spl_stream_type_from_name(streams[s].type);
         struct codes c;
-        make_codes(&c, type);
+        make_codes(&c, type, complete);
         /* ends that values fall on, some of them; or none */
         double at = spl_stream_decode(&streams[s], (struct spl_stream_code){c.base, c.width}, c.words, 0);
         double ends[2] = {uniform() < 0.5 && at == at ? at : 120 * uniform() - 60, 120 * uniform() - 20};
@@ -157,11 +162,14 @@ static void numbers_are_as_they_decode(void **state)
             assert_true(judged.soft || share < 0);
             assert_true(judged.solid || share >= 0);
         }
+        whole[complete] += type == SPL_STREAM_STEPS && c.width && judged.soft && !judged.solid && !judged.test_words;
         seen[!judged.soft ? 0 : judged.solid ? 1 : judged.test_words ? 2 : 3]++;
         assert_false(judged.by_cells);
     }
     for (int i = 0; i < 4; i++)
         assert_true(seen[i] > rounds / 100);
+    assert_true(whole[1] > rounds / 100); /* drawn without marks */
+    assert_int_equal(whole[0], 0);
 }
 
 /* Shapes: a camera anywhere, points within a box. */
@@ -243,8 +251,8 @@ static void any_term_will_do(void **state)
     (void)state;
     for (int round = 0; round < rounds; round++) {
         struct codes c[2];
-        make_codes(&c[0], SPL_STREAM_UINT);
-        make_codes(&c[1], SPL_STREAM_STEPS);
+        make_codes(&c[0], SPL_STREAM_UINT, false);
+        make_codes(&c[1], SPL_STREAM_STEPS, false);
         c[1].chunk.count = c[0].chunk.count = 60;
         uint32_t page[300] = {0}, count = spl_stream_words(c[0].width, 60);
         c[0].chunk.geometry_word = (uint32_t)-(int32_t)spl_chunk_words(&c[0].chunk);
