@@ -11,14 +11,14 @@ enum { wide = SPL_SOFT_TILE, high = SPL_SOFT_TILE_ROWS, span = SPL_SOFT_SPAN_MAX
 /* The samples along an axis that a sphere may reach: the tangents to its circle in that plane. */
 static void extent(double p, double z, double radius, double f, double c, uint32_t size, int *first, int *last)
 {
-    double a = z * z - radius * radius, low = 0, high = size - 1;
+    double a = z * z - radius * radius, low = 0, top = size - 1;
     if (a > 0) {
         double root = radius * sqrt(fmax(p * p + z * z - radius * radius, 0));
         low = fmax(floor(f * (p * z - root) / a + c - 1), 0);
-        high = fmin(ceil(f * (p * z + root) / a + c + 1), size - 1);
+        top = fmin(ceil(f * (p * z + root) / a + c + 1), size - 1);
     }
     *first = (int)fmin(low, size);
-    *last = (int)fmax(high, -1);
+    *last = (int)fmax(top, -1);
 }
 
 static float drawn_radius(const struct spl_frame_params *params, const struct soft_item *item)

@@ -109,7 +109,7 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
                                                        ((camera->height + rows - 1) / rows)),
                                    .samples = (uint64_t)camera->width * camera->height};
     sizes.tiles = larger(sizes.tiles, have->tiles);
-    sizes.walks = model != SPL_SOFT_MODEL_EXPRESS || have->walks;
+    sizes.walks = view->soft.model != SPL_SOFT_MODEL_EXPRESS || have->walks;
     sizes.samples = sizes.samples > have->samples ? sizes.samples : have->samples;
     sizes.found = spl_soft_is_found(view) || have->found ? sizes.samples : 0;
     uint64_t own = scratch->soft_bytes, kept = scratch->taken_bytes - own;
