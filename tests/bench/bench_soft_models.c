@@ -2,7 +2,8 @@
  * on a grid whose samples all count alike; opacity in shares of 1, colour in levels of 255 over black. What crosses:
  *   one sphere, 10 samples across its radius;
  *   two that overlap by half, of colours that differ;
- *   a crowd: 50 within a box that is four radii deep and twelve wide, of random places, radii and colours.
+ *   a crowd: 50 within a box that is four radii deep and twelve wide, of random places, radii and colours;
+ *   a pile: the same within two radii, so that most of them overlap on a ray.
  * Beside express as it is: with the cosine of eq. 19. And concentric by its number of shells. */
 #include <math.h>
 #include <stdio.h>
@@ -61,18 +62,18 @@ static int by_depth(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static size_t make_crowd(struct soft_sphere *spheres)
+static size_t make_crowd(struct soft_sphere *spheres, double half)
 {
     uint64_t state = 19;
     for (int i = 0; i < CROWD; i++) {
         struct soft_sphere *s = &spheres[i];
-        s->center[0] = random_between(&state, -6, 6);
-        s->center[1] = random_between(&state, -6, 6);
+        *s = (struct soft_sphere){.soft = 1};
+        s->center[0] = random_between(&state, -half, half);
+        s->center[1] = random_between(&state, -half, half);
         s->center[2] = random_between(&state, depth_of_scene - 2, depth_of_scene + 2);
         s->radius = random_between(&state, 0.5, 1.5);
         for (int c = 0; c < 3; c++)
             s->color[c] = random_between(&state, 0, 255);
-        s->soft = 1;
     }
     qsort(spheres, CROWD, sizeof *spheres, by_depth);
     return CROWD;
@@ -84,9 +85,10 @@ int main(void)
     const struct soft_sphere two[2] = {
         {.center = {-0.4, 0, depth_of_scene - 0.3}, .radius = 1, .color = {250, 60, 60}, .soft = 1},
         {.center = {0.4, 0.1, depth_of_scene + 0.3}, .radius = 1, .color = {60, 60, 250}, .soft = 1}};
-    struct soft_sphere crowd[CROWD];
+    struct soft_sphere crowd[CROWD], pile[CROWD];
     const struct { const char *name; const struct soft_sphere *spheres; size_t count; double half; } scenes[] = {
-        {"one", &one, 1, 1}, {"two", two, 2, 1.5}, {"crowd", crowd, make_crowd(crowd), 6}};
+        {"one", &one, 1, 1}, {"two", two, 2, 1.5}, {"crowd", crowd, make_crowd(crowd, 6), 6},
+        {"pile", pile, make_crowd(pile, 1), 1}};
     static const double opacities[] = {0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99};
     printf("| spheres | opacity | model | opacity, rms | most | colour, levels, rms | most |\n"
            "|---|---|---|---|---|---|---|\n");
