@@ -163,14 +163,12 @@ vec2 chord_of(float middle, float half_chord)
 }
 
 /* The largest radius of a list, or of all: what is far has larger ones than what is near. */
-float find_reach(uint begin, uint end)
+float find_reach(uint begin, uint end, soft_ray ray)
 {
     float reach = 0.0;
     uint last = min(end, begin + SPL_SOFT_ROUNDS / 16u);
-    for (uint i = begin; i < last; i++) {
-        int at = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
-        reach = max(reach, uintBitsToFloat(imageLoad(item_texels, at + 3).x));
-    }
+    for (uint i = begin; i < last; i++)
+        reach = max(reach, load_item(i, ray).radius);
     return last < end ? job.reach : reach * (1.0 + SPL_SOFT_SLACK);
 }
 
@@ -193,7 +191,7 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
     float t = reached, next = until, before = 0.0, after = 0.0, was_after = 0.0, weights = 0.0, was_weights = 1.0;
     vec3 color = vec3(0.0), was_color = vec3(0.0);
     bool fresh = true, going = true, done = false;
-    float largest = find_reach(begin, end);
+    float largest = find_reach(begin, end, ray);
     uint most = most_rounds(begin, ray), was = counts[kept];
     uint met[SPL_SOFT_MET], count = 0u, k = 0u, alive = 0u; /* entries; those of this walk that are not over */
     uint tail = begin, i = begin, first = begin; /* of the list: all before are met or missed; the next; where to begin */

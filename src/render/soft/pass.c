@@ -19,7 +19,8 @@ enum {
     entries_of_item = 4, // room for lists
     entries_of_window = 1 << 24,
     memory_share = 8,
-    least_share = 8,     // of the largest radius is how thin windows may be where tiles can be cut instead
+    cut_share = 8,       // of the largest radius is how thin windows may be where tiles can be cut instead,
+    least_share = 1024,  // and where not
     gather_work = 8      // of a splat, in samples that are looked at
 };
 
@@ -356,7 +357,7 @@ static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float
     plan->room = (struct spl_soft_sum){sizes->items, sizes->entries};
     plan->all = *all;
     plan->reach = reach;
-    plan->least = can_cut ? reach / least_share : 0;
+    plan->least = reach / (can_cut ? cut_share : least_share);
     plan->measure = measure;
     plan->context = pass;
     while (!rc && (more = spl_soft_thick_next(plan, &window, err)) == 1) {
