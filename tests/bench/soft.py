@@ -3,15 +3,15 @@
 
 usage: soft.py [SCAN…] [--device LIST] [--size WxH] [--frames N] [--models LIST] [--quick] [--pictures] [--keep DIR]
 
-SCAN (street, trees, autzen, powerline, courtyard, interior) says what is soft and from where one looks; the last two are
-`splatd synth`'s. Prints a table in Markdown, a line for each scan and backend: how many splats a frame draws where all is
-solid, how many spheres where some is soft, and which share that is (of panels each cell is one); the splat frame in ms,
-by the host's clock and by processor time of all threads; then layer, express and base, each as a quotient of the splat
-frame that was drawn in turn with it, by both clocks, and for express what the soft stage has of its frame. Where others
-work on the machine read processor time. What is refused, or takes longer than ten minutes, is –; base has two frames.
---quick: 640x360, 3 frames, no base. --pictures: no table; both views of each scan plain, soft, and without what is
-soft, as PNG in DIR, and the first two beside each other as JPEG (needs ffmpeg). --keep: where datasets go, and are
-found again.
+SCAN (street, trees, autzen, powerline, courtyard, interior, interior-panels) says what is soft and from where one
+looks; the last three are `splatd synth`'s. Prints a table in Markdown, a line for each scan and backend: how many
+splats a frame draws where all is solid, how many spheres where some is soft, and which share that is (of panels each
+cell is one); the splat frame in ms, by the host's clock and by processor time of all threads; then layer, express and
+base, each as a quotient of the splat frame that was drawn in turn with it, by both clocks, and for express what the
+soft stage has of its frame. Where others work on the machine read processor time. What is refused, or takes longer
+than ten minutes, is –; base has two frames. --quick: 640x360, 3 frames, no base. --pictures: no table; both views of
+each scan plain, soft, and without what is soft, as PNG in DIR, and the first two beside each other as JPEG (needs
+ffmpeg). --keep: where datasets go, and are found again.
 
 environment: SPLATD_BINARY (splatd), SPLATD_DATA (real scans; those that are not there are left out)
 """
@@ -46,8 +46,9 @@ SCANS = {
                   view([228880, 578420, 28], [228940, 578500, 8], 50)),
     "courtyard": ("courtyard", [], "box:-7,0.2,2.2,-1.5,5.4,6.5", 0.1, view([6, -6.5, 5.5], [-3, 2.6, 2.5], 50),
                   view([-0.4, -1, 1.6], [-4, 2.6, 3.1], 60)),
-    "interior": ("interior", ["--primitives", "all"], "plane:0,0,2.3,0,0,1>0 or plane:0,0.1,0,0,-1,0>0", 0.1,
-                 view([3, -4, 6.5], [4, 2.4, 0.8], 50), view([9, -3, 5], [4, 2.4, 0.8], 50)),
+    **{name: ("interior", options, "plane:0,0,2.3,0,0,1>0 or plane:0,0.1,0,0,-1,0>0", 0.1,
+              view([3, -4, 6.5], [4, 2.4, 0.8], 50), view([9, -3, 5], [4, 2.4, 0.8], 50))
+       for name, options in (("interior", []), ("interior-panels", ["--primitives", "all"]))},
 }
 
 
