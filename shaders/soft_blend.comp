@@ -17,6 +17,30 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
 
+struct soft_item {
+    float x, y, radius;
+    int key;    /* depth's word */
+    uint paint; /* colour and mark */
+};
+
+/* The item of an entry. */
+int load_entry(int entry)
+{
+    return int(imageLoad(entry_texels, entry).x);
+}
+
+soft_item load_item(int index)
+{
+    int at = SPL_SOFT_ITEM_WORDS * index;
+    soft_item item;
+    item.x = uintBitsToFloat(imageLoad(item_texels, at).x);
+    item.y = uintBitsToFloat(imageLoad(item_texels, at + 1).x);
+    item.key = int(imageLoad(item_texels, at + 2).x);
+    item.radius = uintBitsToFloat(imageLoad(item_texels, at + 3).x);
+    item.paint = imageLoad(item_texels, at + 4).x;
+    return item;
+}
+
 void main()
 {
     load_frame();
@@ -26,7 +50,7 @@ void main()
     bool has = slot < job.count;
     int list = int(job.first + 3u * (has ? slot : 0u));
     uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
-    uint end = has ? imageLoad(list_texels, list + 2).x : i;
+    uint end = has ? imageLoad(list_texels, list + 2).x : i + 1u; /* no list is empty */
     ivec2 corner = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
     corner += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE * SPL_SOFT_SAMPLES);
     int clear[SPL_SOFT_SAMPLES], solid[SPL_SOFT_SAMPLES], last = 0;
@@ -52,14 +76,16 @@ void main()
         solid[k] = seen ? int(min(depth_word(index), uint(SPL_SOFT_FARTHEST))) : 0;
         last = max(last, solid[k]);
     }
-    int item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i)).x);
+    int entry = int(i), end_entry = int(end) - 1;
+    soft_item next = load_item(load_entry(entry));
+    int following = load_entry(min(entry + 1, end_entry));
     for (;;) {
-        float x = uintBitsToFloat(imageLoad(item_texels, item).x);
-        float y = uintBitsToFloat(imageLoad(item_texels, item + 1).x);
-        int key = int(imageLoad(item_texels, item + 2).x);
-        float z = intBitsToFloat(key), own = uintBitsToFloat(imageLoad(item_texels, item + 3).x);
-        uint paint = imageLoad(item_texels, item + 4).x;
-        item = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(i) + 1).x); /* early: nothing waits for it */
+        soft_item item = next;
+        next = load_item(following); /* an item ahead: nothing of a round waits for memory */
+        following = load_entry(min(entry + 2, end_entry));
+        float x = item.x, y = item.y, z = intBitsToFloat(item.key), own = item.radius;
+        int key = item.key;
+        uint paint = item.paint;
         uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
         float radius = THIN != 0u ? soft_radius(own, z) : own, whole = soft_share(own, radius);
         float rounding = THIN != 0u ? soft_rounding(own, radius, x, y) : 0.5;
@@ -91,7 +117,7 @@ void main()
             left = max(left, solid[k]);
         }
         last = left;
-        if (++i >= end || key > last)
+        if (++entry > end_entry || key > last)
             break;
     }
     for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {

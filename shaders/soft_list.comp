@@ -13,6 +13,11 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) pair_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_TOTALS) start_texels;
 
+uint item_at(uint i)
+{
+    return imageLoad(pair_texels, int(2u * i + 1u)).x;
+}
+
 void main()
 {
     load_step();
@@ -21,9 +26,10 @@ void main()
         return;
     uint i = block * job.block + counts[kept], end = min((block + 1u) * job.block, job.count);
     uint column = counts[kept + 1u] & 255u, row = counts[kept + 1u] >> 8;
+    uint last = job.count - 1u, item = item_at(min(i, last)), next = item_at(min(i + 1u, last));
+    uint rect = imageLoad(item_texels, int(job.rects + item)).x;
     for (uint round = 0u;;) {
-        uint item = imageLoad(pair_texels, int(2u * i + 1u)).x;
-        uint rect = imageLoad(item_texels, int(job.rects + item)).x;
+        uint next_rect = imageLoad(item_texels, int(job.rects + next)).x, after = item_at(min(i + 2u, last));
         uint tile = (rect & (1u << SPL_SOFT_RECT_COLUMNS) - 1u) + row * job.columns + column, counter = block * job.digits + tile;
         uint start = WRITES != 0u ? imageLoad(start_texels, int(tile)).x : 0u;
         if (i < end) {
@@ -37,6 +43,9 @@ void main()
         column = wraps ? 0u : column + 1u;
         row = ends ? 0u : row + uint(wraps);
         i += uint(ends);
+        item = ends ? next : item; /* loaded a round ahead */
+        rect = ends ? next_rect : rect;
+        next = ends ? after : next;
         if (i >= end || ++round >= SPL_SOFT_ROUNDS)
             break;
     }
