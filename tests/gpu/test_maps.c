@@ -93,7 +93,7 @@ static void maps_match_the_reference(void **state)
                           rows[i].trims ? 0 : rows[i].distance);
         spl_renderer_set_work_at_once(renderer, i % 2 ? UINT64_MAX : 1); // in parts, or not
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
-            struct spl_view view = looking(origin, rows[i].distance, 160, 120);
+            struct spl_view view = looking(origin, rows[i].distance, 112, 84);
             char what[64];
             if (!(spl_method_get_params(method) & SPL_PARAM_BIT(maps)))
                 continue;

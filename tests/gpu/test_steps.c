@@ -88,7 +88,7 @@ static void interrupted_frames_have_the_bytes_that_they_have_alone(void **state)
     assert_int_equal(spl_renderer_add(renderer, one, NULL), SPL_OK);
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         for (size_t i = TEST_SIZE(0, 1); i < sizeof sides / sizeof *sides; i++) {
-            struct spl_view views[2] = {looking(3, sides[i] > 1 ? 103 : 403, 76), looking(2, 320, 240)};
+            struct spl_view views[2] = {looking(3, sides[i] > 1 ? 103 : 403, 76), looking(2, 240, 160)};
             const struct spl_dataset *datasets[2] = {one, other};
             struct spl_frame alone[2], small_alone, small, frames[2];
             struct spl_view little = looking(2.5, 64, 48);

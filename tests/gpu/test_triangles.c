@@ -109,34 +109,27 @@ static double meet(const double eye[3], const double d[3], const double corners[
     return isfinite(z) ? z : 0;
 }
 
-/* Meets all triangles of a chunk. */
-static void meet_chunk(const struct spl_chunk *chunk, const uint32_t *page, const double eye[3], const double d[3],
-                       struct met *met)
+/* Meets all triangles of panel i with the ray of direction d. */
+static void meet_panel(const struct spl_chunk *chunk, uint32_t i, const struct spl_panel *panel,
+                       const struct spl_relief *relief, const double eye[3], const double d[3], struct met *met)
 {
-    for (uint32_t i = 0; i < chunk->count; i++) {
-        struct spl_panel panel;
-        struct spl_relief relief;
-        spl_panels_decode(chunk, page, i, &panel);
-        spl_panels_get_relief(chunk, page, i, &relief);
-        const int squares = 1 << relief.level;
-        const double wide = side / (double)squares, first[2] = {side * panel.column, side * panel.row};
-        for (int k = 0; k < 2 * squares * squares; k++) {
-            const int x = k / 2 % squares, y = k / 2 / squares;
-            const int ends[3][2] = {{x, y}, {x + (k % 2 == 0), y + (k % 2)}, {x + 1, y + 1}};
-            double corners[3][3], at[2];
-            for (int c = 0; c < 3; c++) {
-                for (int a = 0; a < 2; a++)
-                    corners[c][a] = first[a] + wide * ends[c][a];
-                corners[c][2] = (double)relief.height[ends[c][1] * (squares + 1) + ends[c][0]] / (double)chunk->step;
-            }
-            double z = meet(eye, d, (const double(*)[3])corners, at);
-            if (!(z > 0) || (met->z > 0 && z >= met->z))
-                continue;
-            int cell[2] = {(int)fmin(fmax(at[0] - first[0], 0), side - 1),
-                           (int)fmin(fmax(at[1] - first[1], 0), side - 1)};
-            if (panel.cells[cell[1]] >> cell[0] & 1)
-                *met = (struct met){z, (uint32_t)chunk->first_id + i, {at[0] / side, at[1] / side}};
+    const int squares = 1 << relief->level;
+    const double wide = side / (double)squares, first[2] = {side * panel->column, side * panel->row};
+    for (int k = 0; k < 2 * squares * squares; k++) {
+        const int x = k / 2 % squares, y = k / 2 / squares;
+        const int ends[3][2] = {{x, y}, {x + (k % 2 == 0), y + (k % 2)}, {x + 1, y + 1}};
+        double corners[3][3], at[2];
+        for (int c = 0; c < 3; c++) {
+            for (int a = 0; a < 2; a++)
+                corners[c][a] = first[a] + wide * ends[c][a];
+            corners[c][2] = (double)relief->height[ends[c][1] * (squares + 1) + ends[c][0]] / (double)chunk->step;
         }
+        double z = meet(eye, d, (const double(*)[3])corners, at);
+        if (!(z > 0) || (met->z > 0 && z >= met->z))
+            continue;
+        int cell[2] = {(int)fmin(fmax(at[0] - first[0], 0), side - 1), (int)fmin(fmax(at[1] - first[1], 0), side - 1)};
+        if (panel->cells[cell[1]] >> cell[0] & 1)
+            *met = (struct met){z, (uint32_t)chunk->first_id + i, {at[0] / side, at[1] / side}};
     }
 }
 
@@ -144,31 +137,46 @@ static void meet_chunk(const struct spl_chunk *chunk, const uint32_t *page, cons
 static struct met *meet_all(const struct spl_dataset *dataset, const struct spl_view *view)
 {
     const struct spl_camera *c = &view->camera;
-    struct met *all = calloc((size_t)c->width * c->height, sizeof *all);
+    const uint32_t samples = c->width * c->height;
+    struct met *all = calloc(samples, sizeof *all);
+    double(*d)[3] = calloc(samples, sizeof *d);
     uint64_t chunk_count, node_count;
     size_t bytes;
     const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
     const struct spl_node *node = spl_dataset_get_nodes(dataset, &node_count);
     const uint32_t *page = spl_dataset_get_page(dataset, node->page, &bytes);
     assert_non_null(all);
+    assert_non_null(d);
     for (uint64_t k = 0; k < chunk_count; k++) {
         struct spl_panel_frame frame;
         spl_panels_get_frame(&chunks[k], &frame);
         const float *axes[3] = {frame.u, frame.v, frame.normal};
-        for (uint32_t i = 0; i < c->width * c->height; i++) {
-            double ray[3], eye[3] = {0}, d[3] = {0};
+        double eye[3] = {0};
+        for (int along = 0; along < 3; along++)
+            for (int a = 0; a < 3; a++)
+                eye[along] += (double)axes[along][a] * (c->eye[a] - node->origin[a] - (double)frame.origin[a]) /
+                              (double)frame.cell;
+        for (uint32_t i = 0; i < samples; i++) {
+            double ray[3];
             for (int a = 0; a < 3; a++)
                 ray[a] = c->rotation[a] * (i % c->width + 0.5 - c->cx) / c->fx +
                          c->rotation[3 + a] * (i / c->width + 0.5 - c->cy) / c->fy + c->rotation[6 + a];
-            for (int along = 0; along < 3; along++)
-                for (int a = 0; a < 3; a++) {
-                    double from = c->eye[a] - node->origin[a] - (double)frame.origin[a];
-                    eye[along] += (double)axes[along][a] * from / (double)frame.cell;
-                    d[along] += (double)axes[along][a] * ray[a] / (double)frame.cell;
-                }
-            meet_chunk(&chunks[k], page, eye, d, &all[i]);
+            for (int along = 0; along < 3; along++) {
+                d[i][along] = 0;
+                for (int a = 0; a < 3; a++)
+                    d[i][along] += (double)axes[along][a] * ray[a] / (double)frame.cell;
+            }
+        }
+        for (uint32_t p = 0; p < chunks[k].count; p++) {
+            struct spl_panel panel;
+            struct spl_relief relief;
+            spl_panels_decode(&chunks[k], page, p, &panel);
+            spl_panels_get_relief(&chunks[k], page, p, &relief);
+            for (uint32_t i = 0; i < samples; i++)
+                meet_panel(&chunks[k], p, &panel, &relief, eye, d[i], &all[i]);
         }
     }
+    free(d);
     return all;
 }
 
