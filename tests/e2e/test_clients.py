@@ -63,6 +63,9 @@ def test_python_views():
             for camera in POSE, {"camera": {**POSE, "fov": 60}}:
                 told = json.loads(wall.view(**camera, **SMALL, soft=soft, soft_opacity=0.5).headers["Splatd-Soft"])
                 assert told["soft"] == terms and told["soft_opacity"] == 0.5, told
+        whole = {**POSE, **SMALL, "soft": "box:-9,-9,-9,9,9,9", "soft_opacity": 0.9}  # nothing is solid
+        assert wall.pick(32.5, 24.5, **whole)["splat"] is None and wall.pick(32.5, 24.5, **whole, of="median")["splat"] is not None
+        assert wall.depth(**whole, of="first")[2][24 * 65 + 32] > 2.5
         assert wall.view(**POSE, **SMALL, soft=[]).headers["Splatd-Soft"] is None
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
         assert (

@@ -71,7 +71,7 @@ static void make_scene(struct scene *s, uint32_t count, double largest)
                                    .height = height},
                         .count = count};
     for (uint32_t i = 0; i < count; i++) {
-        double z = 0.5 + 8 * uniform();
+        double z = 1.5 + 7 * uniform();
         s->items[i] = (struct soft_item){.x = (float)(z * (uniform() - 0.5)), .y = (float)(z * (uniform() - 0.5) * 0.6),
                                          .z = (float)z, .radius = (float)(0.01 + largest * uniform()),
                                          .mark = (uint8_t)(1 + 255 * uniform())};
@@ -183,7 +183,7 @@ static void kernels_match(void **state)
             for (size_t i = 0; i < 5; i++) {
                 struct spl_soft_params soft = {.model = (enum spl_soft_model)model, .of = (enum spl_soft_of)of,
                                                .opacity = opacities[i], .blend = i % 2};
-                make_scene(&s, 300, i == 2 ? 2 : 0.5);
+                make_scene(&s, 300, i == 2 ? 0.6 : 0.2);
                 uint32_t found = matches(&s, &soft, 0, 0);
                 assert_int_equal(matches(&s, &soft, 150, 150), found);
                 assert_int_equal(matches(&s, &soft, 152, 90), found); /* items 151 and 152 differ in depth */

@@ -115,5 +115,5 @@ int spl_soft_find(struct spl_soft_order *order, const struct spl_soft_params *so
         rc = spl_soft_run(order, err); /* what was recorded reads the lists that lie there */
         rc = rc ? rc : walk(order, &look, skipped, rounds, &left, err);
     }
-    return rc;
+    return rc ? rc : spl_soft_run(order, err); /* the lists may be laid out anew */
 }

@@ -11,8 +11,9 @@
 bool spl_soft_is_found(const struct spl_view *view);
 
 /* Looks through what was listed from depth `from` (float bits) on, whose items have details, in front of the solid depth;
- * windows front to back, each from the end of the one before. `thin`: some are narrower than a sample. What was found lies in SPL_SOFT_FOUND, which is cleared (to
- * SPL_NOTHING) before the first. Runs what was recorded. */
+ * windows front to back, each from the end of the one before. `thin`: some are narrower than a sample. What was found
+ * lies in SPL_SOFT_FOUND, which is cleared (to SPL_NOTHING) before the first. Runs what was recorded, and what it
+ * records. */
 int spl_soft_find(struct spl_soft_order *order, const struct spl_soft_params *soft, uint32_t from,
                   bool thin, struct spl_error *err);
 
