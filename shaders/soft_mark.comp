@@ -49,19 +49,24 @@ uint test_numbers(uint at, uint code, uint width, bool last_none)
     return none || past > span ? 0u : mark_of(min(low, high));
 }
 
-uint test_shape(uint at, vec3 p)
+float distance_to(uint at, uint kind, vec3 p)
 {
     precise vec3 q;
     for (uint i = 0u; i < 3u; i++) /* of fixed length: it is unrolled */
         q[i] = test_float(at + 4u * i) * p.x + test_float(at + 4u * i + 1u) * p.y + test_float(at + 4u * i + 2u) * p.z +
                test_float(at + 4u * i + 3u);
-    uint flags = test_word(at + 19u), kind = flags & 3u;
     precise vec3 beyond = abs(q) - vec3(test_float(at + 12u), test_float(at + 13u), test_float(at + 14u));
     precise vec3 outside = max(beyond, 0.0);
     precise float axis = sqrt(q.x * q.x + q.y * q.y);
     precise float box = sqrt(outside.x * outside.x + outside.y * outside.y + outside.z * outside.z) +
                         min(max(max(beyond.x, beyond.y), beyond.z), 0.0);
-    float distance = kind == SPL_SHAPE_AXIS ? axis : kind == SPL_SHAPE_PLANE ? q.z : box;
+    return kind == SPL_SHAPE_AXIS ? axis : kind == SPL_SHAPE_PLANE ? q.z : box;
+}
+
+uint test_shape(uint at, vec3 p)
+{
+    uint flags = test_word(at + 19u);
+    float distance = distance_to(at, flags & 3u, p);
     float least = test_float(at + 15u), most = test_float(at + 16u);
     bool above = distance > least || ((flags & SPL_SHAPE_WITH_LEAST) != 0u && distance == least);
     bool below = distance < most || ((flags & SPL_SHAPE_WITH_MOST) != 0u && distance == most);
@@ -93,14 +98,50 @@ uint make_mark(spl_draw_chunk chunk, uint index, vec3 p)
 }
 
 #ifdef SPL_CELL_LANES
+#define UNKNOWN 256u
+
+/* The mark that all cells of the panel have, which lie within `reach` of `p`, or UNKNOWN: distances change by no more
+ * than one goes, and what floats may be off is left to the cells. Its codes are the same for all of them. */
+uint make_panel_mark(spl_draw_chunk chunk, uint index, vec3 p, float reach)
+{
+    uint first = chunk.texture, count = test_word(first), mark = 0u;
+    for (uint t = 0u; t < count; t++) {
+        uint at = test_word(first + 1u + t * SPL_TEST_WORDS + 1u), kind = test_word(first + 1u + t * SPL_TEST_WORDS);
+        if (kind != SPL_TEST_SHAPE)
+            return UNKNOWN;
+        float far = abs(p.x) + abs(p.y) + abs(p.z);
+        for (uint i = 0u; i < 3u; i++)
+            far += abs(test_float(at + 4u * i + 3u)) + test_float(at + 12u + i);
+        float distance = distance_to(at, test_word(at + 19u) & 3u, p), most = test_float(at + 16u);
+        float above = distance - reach - 1e-5 * far - test_float(at + 15u);
+        float below = most - distance - reach - 1e-5 * far, rise = test_float(at + 17u), fall = test_float(at + 18u);
+        bool none = above < -2.0 * (reach + 1e-5 * far) || below < -2.0 * (reach + 1e-5 * far);
+        bool whole = above > 0.0 && below > 0.0 && (rise == 0.0 || above * rise > 1.001) &&
+                     (fall == 0.0 || below * fall > 1.001);
+        if (!none && !whole)
+            return UNKNOWN;
+        mark = max(mark, whole ? uint(SPL_MARK_WHOLE) : 0u);
+    }
+    return mark;
+}
+
 void main()
 {
     load_frame();
     splat_run run = load_splat_run();
-    uint index = item_of(run.first), lane = run.first >> SPL_CELL;
+    uint index = item_of(run.first), lane = run.first >> SPL_CELL, known = UNKNOWN;
+#ifndef SPL_MESHES /* how far relief reaches is not known here */
+    if (SHAPES && run.end > 0u) {
+        float half_side = 0.5 * float(SPL_PANEL_SIDE);
+        known = make_panel_mark(run.chunk, index, plane_point(own_plane, own_panel.first + half_side),
+                                1.4143 * half_side * own_plane.cell);
+    }
+#endif
     for (uint word = run.end > 0u ? lane : SPL_MARKS_PANEL; word < SPL_MARKS_PANEL; word += SPL_CELL_LANES) {
         uint four = SHAPES ? 0u : make_mark(run.chunk, index, vec3(0.0)) * 0x01010101u; /* a panel has one code */
-        for (uint i = SHAPES ? 0u : 4u; i < 4u; i++) {
+        if (known != UNKNOWN)
+            four = known * 0x01010101u;
+        for (uint i = SHAPES && known == UNKNOWN ? 0u : 4u; i < 4u; i++) {
             splat s = load_splat(run.chunk, index | (4u * word + i) << SPL_CELL, true);
             four |= make_mark(run.chunk, index, s.position) << 8u * i;
         }

@@ -6,15 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/hash.h"
 #include "base/memory.h"
 
-/* A bijection of 64 bits that leaves no pattern. */
 static uint64_t rank_of(uint64_t number)
 {
-    uint64_t x = number + 0x9e3779b97f4a7c15ull;
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ull;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebull;
-    return x ^ x >> 31;
+    return spl_hash_mix(number + SPL_GOLDEN_64);
 }
 
 static void count_kind(struct spl_values *v, double value, uint64_t weight)

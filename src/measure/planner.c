@@ -207,7 +207,7 @@ static struct spl_soft_work work_of(const struct spl_setting *setting, uint32_t 
                                     enum spl_layer layer)
 {
     double samples = setting->supersample * setting->supersample * width * height;
-    return (struct spl_soft_work){1e-6 * samples, setting->lod, layer};
+    return (struct spl_soft_work){1e-6 * samples, setting->lod, layer, setting->method};
 }
 
 /* How one candidate stands to the demand. */

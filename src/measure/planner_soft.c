@@ -42,19 +42,23 @@ static uint64_t key_of(const struct spl_soft_params *soft, enum spl_layer layer)
     return key ? key : 1;
 }
 
-/* Of the same terms, else the last of the same model and layer; NULL if there is none. */
+/* Of the same terms and method, else of the same terms, else the last of the same model and layer; NULL if there is
+ * none. */
 static const struct spl_soft_cost *find(const struct spl_soft_costs *costs, const struct spl_soft_params *soft,
-                                        enum spl_layer layer, uint64_t key)
+                                        struct spl_soft_work work)
 {
-    const struct spl_soft_cost *like = NULL;
+    const uint64_t key = key_of(soft, work.layer);
+    const struct spl_soft_cost *like = NULL, *same = NULL;
     for (const struct spl_soft_cost *row = costs->rows; row < costs->rows + SPL_SOFT_COSTS_MAX; row++) {
-        if (row->key == key)
+        if (row->key == key && row->method == work.method)
             return row;
-        bool alike = row->key && row->model == soft->model && row->layer == layer && row->drawn == is_drawn(soft);
+        if (row->key == key && (!same || row->used > same->used))
+            same = row;
+        bool alike = row->key && row->model == soft->model && row->layer == work.layer && row->drawn == is_drawn(soft);
         if (alike && (!like || row->used > like->used))
             like = row;
     }
-    return like;
+    return same ? same : like;
 }
 
 static double stage_ln(const struct spl_soft_cost *row, const double x[2])
@@ -72,7 +76,7 @@ static void measure(struct spl_soft_work work, double x[2])
 double spl_soft_costs_estimate(const struct spl_soft_costs *costs, const struct spl_soft_params *soft,
                                struct spl_soft_work work, double solid_ms, double *spread)
 {
-    const struct spl_soft_cost *row = find(costs, soft, work.layer, key_of(soft, work.layer));
+    const struct spl_soft_cost *row = find(costs, soft, work);
     double x[2];
     measure(work, x);
     if (spread)
@@ -84,17 +88,17 @@ double spl_soft_costs_estimate(const struct spl_soft_costs *costs, const struct 
 
 /* A row of its own: as others of the model were, or as this first frame is. */
 static struct spl_soft_cost *take_row(struct spl_soft_costs *costs, const struct spl_soft_params *soft,
-                                      enum spl_layer layer, const double x[2], double rest, double stage)
+                                      struct spl_soft_work work, const double x[2], double rest, double stage)
 {
-    const uint64_t key = key_of(soft, layer);
-    const struct spl_soft_cost *like = find(costs, soft, layer, key);
+    const uint64_t key = key_of(soft, work.layer);
+    const struct spl_soft_cost *like = find(costs, soft, work);
     struct spl_soft_cost *row = costs->rows, fresh = {.rest = rest,
                                                       .cost = stage,
                                                       .by_samples = samples_first,
                                                       .by_lod = lod_first,
                                                       .at = {x[0], x[1]},
                                                       .spread = first_spread};
-    if (like && like->key == key)
+    if (like && like->key == key && like->method == work.method)
         return &costs->rows[like - costs->rows];
     if (like) {
         fresh.by_samples = like->by_samples;
@@ -106,7 +110,8 @@ static struct spl_soft_cost *take_row(struct spl_soft_costs *costs, const struct
     *row = fresh;
     row->key = key;
     row->model = soft->model;
-    row->layer = layer;
+    row->layer = work.layer;
+    row->method = work.method;
     row->drawn = is_drawn(soft);
     return row;
 }
@@ -133,7 +138,7 @@ void spl_soft_costs_learn(struct spl_soft_costs *costs, const struct spl_soft_pa
     measure(work, x);
     const double stage = log(fmax(fmin(soft_ms, ms), least_ms));
     const double rest = clamp(log(fmax(ms - soft_ms, 0.01 * ms) / solid_ms), -rest_most, rest_most);
-    struct spl_soft_cost *row = take_row(costs, soft, work.layer, x, rest, stage);
+    struct spl_soft_cost *row = take_row(costs, soft, work, x, rest, stage);
     const bool first = row->frames < first_frames;
     const double left = log(ms / (solid_ms * exp(row->rest) + (row->drawn ? exp(stage_ln(row, x)) : 0)));
     const double share = first ? first_gain : gain, bound = first ? ln_most : 2 * row->spread + 0.1;

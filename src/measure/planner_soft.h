@@ -1,13 +1,12 @@
-/* What soft transparency adds to a frame's time, learned by what is soft: its terms, its model, the layer and whether
- * anything of it is drawn at all.
+/* What soft transparency adds to a frame's time, learned by what is soft: its terms, its model, the layer, the solid
+ * method (behind whose holes more spheres are seen), and whether anything of it is drawn at all.
  *
- * The stage of soft spheres costs the same whatever the solid method is, and nothing of a profile says how many spheres
- * a view's terms make, so a soft view is estimated as
+ * Nothing of a profile says how many spheres a view's terms make, so a soft view is estimated as
  *     ms = solid · exp(rest) + exp(cost + by_samples · ln samples - by_lod · ln lod)
  * where `solid` is the estimate of the same view with nothing soft, and the other four are learned from frames: how
  * much of the solid work is left, what the stage takes, and how that follows size and level. Before the first frame of
- * its terms a view is taken to cost what the last other terms of its model did; before any, a guess by model. Pure;
- * owned by the planner's thread. */
+ * its terms and method a view is taken to cost what its terms did with another method, or else the last other terms of
+ * its model; before any, a guess by model. Pure; owned by the planner's thread. */
 #ifndef SPL_MEASURE_PLANNER_SOFT_H
 #define SPL_MEASURE_PLANNER_SOFT_H
 
@@ -22,6 +21,7 @@ enum { SPL_SOFT_COSTS_MAX = 32 };
 
 struct spl_soft_cost {
     uint64_t key;  /* of what is soft; 0 = free */
+    enum spl_method method;
     uint64_t used; /* when last, in frames; who was not for longest gives way */
     enum spl_soft_model model;
     enum spl_layer layer;
@@ -43,6 +43,7 @@ struct spl_soft_costs {
 struct spl_soft_work {
     double megasamples, lod;
     enum spl_layer layer;
+    enum spl_method method;
 };
 
 /* The expected time of a soft frame whose solid estimate is solid_ms, of which nothing has to be known. *spread, if not

@@ -95,9 +95,14 @@ static int render_self(const struct spl_reference *r, const struct spl_named_vie
     for (size_t i = 0; i < FILES; i++)
         view.layers |= 1u << files[i].layer;
     struct spl_frame frame;
-    int rc = spl_renderer_render(renderer, dataset, &view, &frame, err);
+    struct spl_error why = {0};
+    int rc = spl_renderer_render(renderer, dataset, &view, &frame, &why);
+    if (rc == SPL_E_LIMIT && r->soft)
+        return spl_fail_field(err, rc, why.field,
+                              "the reference of view '%s' cannot be drawn: %.300s; the first of --soft-model makes it",
+                              named->name, why.message);
     if (rc)
-        return rc;
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
     if (!frame.stats.complete)
         rc = spl_fail(err, SPL_E_LIMIT,
                       "the reference of view '%s' needs every page of the dataset on the device; raise "

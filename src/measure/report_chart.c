@@ -1,6 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * colours from maps have colours of their own between them, a soft model that of the method at its place; supersampling
- * is a dash pattern, fewer atoms than all are paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them; supersampling is a dash pattern, and so is a soft model, fewer
+ * atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,12 +32,9 @@ static struct spl_chart_curve *add_curve(struct build *b, const char *name, unsi
     return curve;
 }
 
-/* Methods first, then those that take colours from maps, with maps. A soft model has that of the method as many places
- * further on: where something is soft, what is compared is usually one method. */
+/* Methods first, then those that take colours from maps, with maps. */
 static unsigned color_of(const struct spl_setting *s)
 {
-    if (s->soft)
-        return (unsigned)s->method + s->soft;
     unsigned color = s->maps == SPL_SETTING_MAPS_ON ? SPL_METHOD_COUNT : s->method;
     for (int method = 0; s->maps == SPL_SETTING_MAPS_ON && method < (int)s->method; method++)
         color += spl_setting_has_maps((enum spl_method)method);
@@ -67,7 +64,7 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
         used += snprintf(name + used, sizeof name - (size_t)used, " %g×%g", s.supersample, s.supersample);
     if (s.atoms < ALL)
         snprintf(name + used, sizeof name - (size_t)used, " atoms=%u", s.atoms);
-    struct spl_chart_curve *curve = add_curve(b, name, color_of(&s), dash, first);
+    struct spl_chart_curve *curve = add_curve(b, name, color_of(&s), s.soft ? s.soft : dash, first);
     if (curve)
         curve->fade = 0.7 * (ALL - s.atoms) / ALL;
 }

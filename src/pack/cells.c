@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "geom/morton.h"
@@ -30,7 +31,7 @@ void spl_cells_place(const struct spl_cells *cells, uint32_t cell, int64_t at[3]
 
 static uint32_t slot_of(const struct spl_cells *cells, uint64_t key)
 {
-    return (uint32_t)(key * 0x9e3779b97f4a7c15ull >> 32) & cells->table_mask;
+    return (uint32_t)spl_hash_slot(key, cells->table_mask);
 }
 
 uint64_t spl_cells_key(int64_t x, int64_t y, int64_t z)

@@ -18,6 +18,7 @@
 #include <sys/stat.h>
 
 #include "base/array.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "cloud/cloud.h"
 #include "cloud/source.h"
@@ -54,8 +55,7 @@ struct entries {
 
 static struct place *find_place(const struct seen *seen, uint64_t device, uint64_t node)
 {
-    uint64_t hash = (node ^ device << 32 ^ device >> 32) * 0x9e3779b97f4a7c15u;
-    size_t at = (size_t)(hash >> 32) & (seen->room - 1);
+    size_t at = spl_hash_slot(node ^ device << 32 ^ device >> 32, seen->room - 1);
     while (seen->places[at].used && (seen->places[at].device != device || seen->places[at].node != node))
         at = (at + 1) & (seen->room - 1);
     return &seen->places[at];

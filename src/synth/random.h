@@ -5,12 +5,11 @@
 
 #include <stdint.h>
 
+#include "base/hash.h"
+
 static inline uint64_t hash64(uint64_t x)
 {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
-    return x ^ x >> 31;
+    return spl_hash_mix(x + SPL_GOLDEN_64);
 }
 
 /* 53 bits of `hash` in [0, 1). */

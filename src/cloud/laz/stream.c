@@ -11,7 +11,6 @@
 #include "base/parallel.h"
 #include "base/work.h"
 #include "cloud/laz/find_table.h"
-#include "cloud/laz/items.h"
 
 enum {
     round_bytes = 32 << 20,

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/array.h"
+#include "base/hash.h"
 #include "base/memory.h"
 
 void spl_panel_raster_finish(struct spl_panel_raster *r)
@@ -19,12 +20,6 @@ void spl_panel_raster_finish(struct spl_panel_raster *r)
     *r = (struct spl_panel_raster){0};
 }
 
-static size_t hash_of(int32_t column, int32_t row)
-{
-    uint64_t key = (uint64_t)(uint32_t)column << 32 | (uint32_t)row;
-    return (size_t)(key * 0x9e3779b97f4a7c15ull >> 24);
-}
-
 static bool grow_slots(struct spl_panel_raster *r)
 {
     size_t count = r->slot_count ? 2 * r->slot_count : 256;
@@ -32,7 +27,7 @@ static bool grow_slots(struct spl_panel_raster *r)
     if (!slots)
         return false;
     for (size_t i = 0; i < r->place_count; i++) {
-        size_t at = hash_of(r->places[i].column, r->places[i].row) & (count - 1);
+        size_t at = spl_hash_slot(spl_hash_pair(r->places[i].column, r->places[i].row), count - 1);
         while (slots[at])
             at = (at + 1) & (count - 1);
         slots[at] = (uint32_t)i + 1;
@@ -48,7 +43,7 @@ static uint32_t place_of(struct spl_panel_raster *r, int32_t column, int32_t row
 {
     if (2 * (r->place_count + 1) > r->slot_count && !grow_slots(r))
         return UINT32_MAX;
-    size_t at = hash_of(column, row) & (r->slot_count - 1);
+    size_t at = spl_hash_slot(spl_hash_pair(column, row), r->slot_count - 1);
     while (r->slots[at] && (r->places[r->slots[at] - 1].column != column || r->places[r->slots[at] - 1].row != row))
         at = (at + 1) & (r->slot_count - 1);
     if (!r->slots[at]) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/array.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "dataset/panels.h"
 
@@ -47,16 +48,10 @@ void spl_heights_finish(struct spl_heights *r)
     *r = (struct spl_heights){0};
 }
 
-static size_t hash_of(int32_t column, int32_t row)
-{
-    uint64_t key = (uint64_t)(uint32_t)column << 32 | (uint32_t)row;
-    return (size_t)(key * 0x9e3779b97f4a7c15ull >> 32);
-}
-
 /* Index of a vertex, or of the slot where it would be. */
 static size_t find_slot(const struct spl_heights *r, int32_t column, int32_t row)
 {
-    size_t at = hash_of(column, row) & r->mask;
+    size_t at = spl_hash_slot(spl_hash_pair(column, row), r->mask);
     while (r->slots[at] && (r->vertices[r->slots[at] - 1].column != column || r->vertices[r->slots[at] - 1].row != row))
         at = (at + 1) & r->mask;
     return at;

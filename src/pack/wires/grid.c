@@ -8,12 +8,11 @@
 #include "base/array.h"
 #include "base/memory.h"
 
-/* 21 bits an axis; wider scans wrap, which makes no difference but work. */
-static uint64_t key_of(const struct spl_wires_grid *grid, const double position[3], const int shift[3])
+uint64_t spl_wires_key(const double low[3], double edge, const double position[3], const int shift[3])
 {
     uint64_t key = 0;
     for (int c = 0; c < 3; c++) {
-        double cell = fmax(fmin(floor((position[c] - grid->low[c]) / grid->edge), 1e15), -1e15) + shift[c] + 1;
+        double cell = fmax(fmin(floor((position[c] - low[c]) / edge), 1e15), -1e15) + shift[c] + 1;
         key = key << 21 | ((uint64_t)(int64_t)cell & 0x1fffff);
     }
     return key;
@@ -33,7 +32,8 @@ int spl_wires_grid_add(struct spl_wires_grid *grid, const double position[3], ui
 {
     if (spl_array_reserve(grid->cells, grid->capacity, grid->count + 1, err))
         return SPL_E_NOMEM;
-    grid->cells[grid->count++] = (struct spl_wires_cell){key_of(grid, position, (int[3]){0}), item};
+    uint64_t key = spl_wires_key(grid->low, grid->edge, position, (int[3]){0});
+    grid->cells[grid->count++] = (struct spl_wires_cell){key, item};
     return SPL_OK;
 }
 
@@ -57,7 +57,7 @@ void spl_wires_grid_sort(struct spl_wires_grid *grid)
 size_t spl_wires_grid_find(const struct spl_wires_grid *grid, const double position[3], const int shift[3],
                            size_t *first)
 {
-    uint64_t key = key_of(grid, position, shift);
+    uint64_t key = spl_wires_key(grid->low, grid->edge, position, shift);
     size_t low = 0, high = grid->count;
     while (low < high) {
         size_t middle = low + (high - low) / 2;

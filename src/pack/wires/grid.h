@@ -18,6 +18,10 @@ struct spl_wires_grid { // zeroed before first use
     double low[3], edge; // the caller's to set: least corner, side of a cell
 };
 
+/* The key of the cell that is `shift` cells off that of `position` in a grid of cells of side `edge` from `low` on: 21
+ * bits an axis; what is wider wraps, which makes no difference but work. */
+uint64_t spl_wires_key(const double low[3], double edge, const double position[3], const int shift[3]);
+
 /* Room for `count` items in all, so that adding them takes no more; SPL_E_NOMEM. */
 int spl_wires_grid_reserve(struct spl_wires_grid *grid, size_t count, struct spl_error *err);
 

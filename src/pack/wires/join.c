@@ -13,6 +13,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "pack/wires/grid.h"
 
 static const double near = 3;      /* spacings within which a point that is alone is joined */
 static const double far = 100;     /* and beyond which nothing is */
@@ -75,15 +76,9 @@ static int compare_doubles(const void *a, const void *b)
     return (p > q) - (p < q);
 }
 
-/* 21 bits an axis; clouds of more cells wrap, which makes no difference but work. */
 static uint64_t key_of(const struct join *j, const double position[3], const int shift[3])
 {
-    uint64_t key = 0;
-    for (int c = 0; c < 3; c++) {
-        double cell = fmin(floor((position[c] - j->low[c]) / j->edge), 1e15) + shift[c] + 1;
-        key = key << 21 | ((uint64_t)cell & 0x1fffff);
-    }
-    return key;
+    return spl_wires_key(j->low, j->edge, position, shift);
 }
 
 static size_t find_cell(const struct join *j, uint64_t key)

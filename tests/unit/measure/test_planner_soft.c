@@ -172,6 +172,22 @@ static void test_a_known_view_is_promised_within_a_tenth(void **state)
     spl_planner_finish(&planner);
 }
 
+/* Through points more spheres are seen than through discs. */
+static void test_methods_learn_apart(void **state)
+{
+    (void)state;
+    struct spl_planner planner = make_planner();
+    struct spl_soft_params soft = make_soft("class:3-5", SPL_SOFT_MODEL_EXPRESS, 0.3);
+    learn(&planner, 2, side, &soft, 1, 1);
+    double splats = expect_of(&planner, 2, side, &soft), guess = expect_of(&planner, 0, side, &soft);
+    assert_true(fabs(log(guess / frame_of(0, side, 1))) < 0.05); /* until it is known, as with the other */
+    for (int i = 0; i < 20; i++)
+        learn(&planner, 0, side, &soft, 1, 4);
+    assert_true(fabs(log(expect_of(&planner, 0, side, &soft) / frame_of(0, side, 4))) < 0.05);
+    assert_true(expect_of(&planner, 2, side, &soft) == splats);
+    spl_planner_finish(&planner);
+}
+
 static void test_budgets_count_it(void **state)
 {
     (void)state;
@@ -252,6 +268,7 @@ int main(void)
         cmocka_unit_test(test_one_frame_tells_its_own_time),
         cmocka_unit_test(test_size_and_level_are_learned),
         cmocka_unit_test(test_a_known_view_is_promised_within_a_tenth),
+        cmocka_unit_test(test_methods_learn_apart),
         cmocka_unit_test(test_budgets_count_it),
         cmocka_unit_test(test_solid_frames_leave_it),
         cmocka_unit_test(test_outliers_nonsense_and_many),
