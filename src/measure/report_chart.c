@@ -1,6 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * colours from maps have colours of their own between them; supersampling is a dash pattern, and so is a soft model, fewer
- * atoms than all are paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them; supersampling is a dash pattern, and so is a soft model;
+ * fewer atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
