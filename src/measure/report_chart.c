@@ -1,6 +1,6 @@
 /* The chart of a profile: which setting is a point of which curve. Methods have the first colours, peers the next ones;
- * colours from maps have colours of their own between them; supersampling is a dash pattern, and so is a soft model, fewer
- * atoms than all are paler. Pure but for allocation; any thread. */
+ * colours from maps have colours of their own between them; supersampling is a dash pattern, and so is a soft model;
+ * fewer atoms than all are paler. Pure but for allocation; any thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +11,7 @@
 #include "shared.h"
 
 static const double supersamples[] = {1, 2, 4, 0.5, 0.25};
-enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples, ALL = SPL_TEXTURE_ATOMS };
+enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples, ALL = SPL_TEXTURE_ATOMS, DASHES = 3 };
 
 struct build {
     struct spl_chart_point *points;
@@ -64,9 +64,9 @@ static void add_settings(struct build *b, const struct spl_profile *profile, str
         used += snprintf(name + used, sizeof name - (size_t)used, " %g×%g", s.supersample, s.supersample);
     if (s.atoms < ALL)
         snprintf(name + used, sizeof name - (size_t)used, " atoms=%u", s.atoms);
-    struct spl_chart_curve *curve = add_curve(b, name, color_of(&s), s.soft ? s.soft : dash, first);
-    if (curve)
-        curve->fade = 0.7 * (ALL - s.atoms) / ALL;
+    struct spl_chart_curve *curve = add_curve(b, name, color_of(&s), s.soft ? 1 + (s.soft - 1) % DASHES : dash, first);
+    if (curve) // the fourth model has the first one's dashes, paler
+        curve->fade = s.soft > DASHES ? 0.5 : 0.7 * (ALL - s.atoms) / ALL;
 }
 
 /* A method's curves of one pass; those with maps first. */
