@@ -5,9 +5,12 @@
 
 #include "render/soft/models.h"
 
+#ifndef SPL_SOFT_TILE_ROWS
+#define SPL_SOFT_TILE_ROWS SPL_SOFT_TILE /* tiles are squares */
+#endif
+
 enum {
-    side = SPL_SOFT_TILE,
-    samples = side * side,
+    samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS,
     tile_words = 3,
     find_work = 1 << 25, // samples that are looked at in a dispatch
     dense_work = 4       // of a sphere with a density, in such samples
@@ -73,7 +76,7 @@ static int walk(struct spl_soft_order *order, const struct look *look, uint64_t 
 {
     const uint32_t tiles = order->columns * order->rows;
     const uint32_t work_of_item = look->kernel < SPL_SOFT_FIND_DENSE ? 1 : dense_work;
-    const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups / (samples / SPL_WORKGROUP);
+    const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups / (samples / SPL_WORKGROUP + 1);
     const uint32_t *starts = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_STARTS]);
     uint32_t *lists = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_LISTS]), listed = 0, begun = 0;
     uint64_t work = 0;
