@@ -12,6 +12,10 @@
 #include "common/soft.glsl"
 #include "common/soft_step.glsl"
 
+#ifndef SPL_SOFT_TILE_ROWS
+#define SPL_SOFT_TILE_ROWS SPL_SOFT_TILE /* tiles are squares */
+#endif
+
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint FIND = SPL_SOFT_FIND_FIRST;
 layout(constant_id = 1) const uint BORDER = 0;
@@ -99,8 +103,8 @@ void main()
     int list = int(job.first + 3u * (has ? slot : 0u));
     uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
     uint end = imageLoad(list_texels, list + 2).x;
-    ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) +
-               ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
+    ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
+    at += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
     has = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
     if (!has)
         return;

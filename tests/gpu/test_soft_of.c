@@ -17,7 +17,12 @@
 #include "render/soft/models.h"
 #include "support/reference_of.h"
 
-enum { width = 44, height = 27, columns = (width + 7) / 8, rows = (height + 7) / 8, tiles = columns * rows,
+#ifndef SPL_SOFT_TILE_ROWS
+#define SPL_SOFT_TILE_ROWS SPL_SOFT_TILE /* tiles are squares */
+#endif
+
+enum { width = 44, height = 27, columns = (width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,
+       rows = (height + SPL_SOFT_TILE_ROWS - 1) / SPL_SOFT_TILE_ROWS, tiles = columns * rows,
        items_max = 600, details = SPL_SOFT_ITEM_WORDS * items_max };
 
 static struct spl_gpu *gpu;
