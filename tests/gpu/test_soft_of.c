@@ -17,10 +17,6 @@
 #include "render/soft/models.h"
 #include "support/reference_of.h"
 
-#ifndef SPL_SOFT_TILE_ROWS
-#define SPL_SOFT_TILE_ROWS SPL_SOFT_TILE /* tiles are squares */
-#endif
-
 enum { width = 44, height = 27, columns = (width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,
        rows = (height + SPL_SOFT_TILE_ROWS - 1) / SPL_SOFT_TILE_ROWS, tiles = columns * rows,
        items_max = 600, details = SPL_SOFT_ITEM_WORDS * items_max };
@@ -260,6 +256,27 @@ static const float *depths(const struct spl_frame *frame)
     return frame->images[SPL_LAYER_DEPTH].pixels;
 }
 
+/* What reaches from one into the next is counted once. */
+static void windows_that_overlap_change_no_byte(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(1500, origin, 0.03);
+    for (int model = SPL_SOFT_MODEL_EXPRESS + 1; model < SPL_SOFT_MODEL_COUNT; model++)
+        for (int of = SPL_SOFT_OF_FIRST; of < SPL_SOFT_OF_COUNT; of++) {
+            struct spl_view view = looking(origin, 2.5, 80, 61);
+            view.soft.model = (enum spl_soft_model)model;
+            soften(&view, -9, 0.6, (enum spl_soft_of)of);
+            struct spl_frame whole = render(dataset, &view);
+            spl_renderer_set_soft_items(renderer, 300);
+            struct spl_frame cut = render(dataset, &view);
+            spl_renderer_set_soft_items(renderer, 0);
+            assert_same(&whole, &cut, spl_soft_model_name(view.soft.model));
+            spl_frame_finish(&whole);
+            spl_frame_finish(&cut);
+        }
+    done(dataset);
+}
+
 static void what_is_nearer_stays_nearer(void **state)
 {
     (void)state;
@@ -344,6 +361,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(kernels_match), frames_test(windows_and_lone_layers_change_no_byte),
+        frames_test(windows_that_overlap_change_no_byte),
         frames_test(what_is_nearer_stays_nearer), frames_test(layers_belong_to_one_splat),
     };
     return frames_run(argc, argv, "soft-of", tests, sizeof tests / sizeof *tests);
