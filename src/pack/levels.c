@@ -22,11 +22,12 @@
 #include "base/parallel.h"
 #include "pack/level_scalars.h"
 #include "pack/median.h"
+#include "pack/prune.h"
 
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
  */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
-enum { attempts = 6, closer_steps = 24, inner_most = 12288, pruned_inner_most = 768 };
+enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
 
 /* Surfaces of a cell: their normals differ by more than so much (cosine), or their planes by such a share of the
  * cell. The fourth takes what faces its way at all. */
@@ -225,21 +226,16 @@ static size_t cluster(struct scratch *w, size_t count, double cell, size_t limit
     return clusters - 1;
 }
 
-/* Clusters by surfaces at the cell whose number of clusters comes nearest to `aim`. */
-static size_t cluster_to(struct scratch *w, size_t count, size_t aim, double *cell)
+struct clustering {
+    struct scratch *scratch;
+    size_t count;
+};
+
+/* spl_prune_clusters() */
+static size_t cluster_surfaces(void *context, double cell)
 {
-    double fine = 0, coarse = INFINITY, best = *cell, best_off = INFINITY;
-    for (int i = 0; i < closer_steps && best_off > 0.01; i++) {
-        double clusters = (double)cluster(w, count, *cell, count, true), off = fabs(log(clusters / (double)aim));
-        if (off < best_off) {
-            best_off = off;
-            best = *cell;
-        }
-        *(clusters > (double)aim ? &fine : &coarse) = *cell;
-        *cell = isinf(coarse) ? 2 * fine : fine > 0 ? sqrt(fine * coarse) : coarse / 2;
-    }
-    *cell = best;
-    return cluster(w, count, best, count, true);
+    const struct clustering *c = context;
+    return cluster(c->scratch, c->count, cell, c->count, true);
 }
 
 static void finish_cluster(const struct cluster *k, double cell, struct spl_inner_splat *out)
@@ -350,8 +346,10 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
     double base = fmin((double)count, (surfaces ? pruned_inner_most : inner_most) / most);
     size_t limit = base * most > 2 ? (size_t)(base * most) : 2; /* two opposed splats never become one */
     double cell = 2 * median_radius(w->input, count, radii) / 1.128379, too_fine = 0;
-    if (last)
-        clusters = cluster_to(w, count, l->tree->pruned_to, &cell);
+    if (last) {
+        cell = spl_prune_find_cell(cluster_surfaces, &(struct clustering){w, count}, l->tree->pruned_to, cell);
+        clusters = cluster(w, count, cell, count, true);
+    }
     for (int attempt = 0; !last; attempt++) {
         /* In a large enough cell there are two sides, but as many surfaces as there are normals. */
         clusters = cluster(w, count, cell, limit, surfaces && attempt <= attempts);

@@ -18,6 +18,7 @@
 #define SPL_PACK_PRUNE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "dataset/dataset.h"
@@ -51,6 +52,13 @@ int spl_prune_plan(const struct spl_dataset *dataset, const struct spl_prune_opt
 /* What the radii of discs that are the finest from now on are multiplied by (spl_rewrite.leaf_radius): those of a level
  * reach over each other as scanned points must, which lie at random, while clusters lie evenly. */
 float spl_prune_leaf_radius(const struct spl_dataset *dataset);
+
+/* Into how many clusters a cell of this size puts the splats of `context`. */
+typedef size_t spl_prune_clusters(void *context, double cell);
+
+/* The cell, of those tried from `first` on, whose number of clusters comes nearest to `aim`, at least 1: of a root that
+ * is to be left alone (pack/tree.h, pruned_to). */
+double spl_prune_find_cell(spl_prune_clusters *clusters_of, void *context, size_t aim, double first);
 
 /* Writes `output`, `dataset` without what is dropped where no maps show colours. `report` may be NULL. As
  * spl_prune_plan() and spl_dataset_rewrite(). */
