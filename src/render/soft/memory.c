@@ -25,7 +25,8 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
 {
     const uint64_t word = sizeof(uint32_t);
     const uint64_t pairs = 2 * (uint64_t)sizes->items, list = pairs > sizes->entries ? pairs : sizes->entries;
-    bytes[SPL_SOFT_ITEMS] = word * (SPL_SOFT_ITEM_WORDS + 1 + (sizes->found ? SPL_SOFT_DETAIL_WORDS : 0)) * sizes->items;
+    const uint64_t item = SPL_SOFT_ITEM_WORDS + 1 + (sizes->found ? SPL_SOFT_DETAIL_WORDS : 0);
+    bytes[SPL_SOFT_ITEMS] = word * item * sizes->items;
     bytes[SPL_SOFT_PAIRS] = bytes[SPL_SOFT_OTHERS] = word * list;
     bytes[SPL_SOFT_COUNTS] = word * counters_of(sizes, software);
     const uint64_t slots = sizes->slots, buckets = 2 * (uint64_t)SPL_SOFT_BUCKETS;

@@ -17,8 +17,8 @@ double spl_soft_depth(double opacity);
 double spl_soft_base_part(double delta, double zeta);
 
 /* The same of `shells` shells of radius r (1 - i / shells), densities as in eq. 13, weighted by 1 - d / (shells r_i):
- * as eq. 15 has it where there is one shell, and not at all where there are so many that they need no weight. zeta may lie
- * outside the sphere. */
+ * as eq. 15 has it where there is one shell, and not at all where there are so many that they need no weight. zeta may
+ * lie outside the sphere. */
 double spl_soft_concentric_part(uint32_t shells, double delta, double zeta);
 
 /* A sphere that is drawn with a share s of the opacity that others have, since it is drawn wider than it is, has
@@ -30,8 +30,9 @@ double spl_soft_thin(double opacity);
 uint32_t spl_soft_shells(double radius_samples);
 
 /* Falloff of express: the polynomial nearest to the opacity of base along the whole ray, weighted by area; in the
- * middle it is `opacity`. Eq. 19, lambda (cos(pi d / r) + 1) / 2, is as near as that only where spheres are thin: off by
- * rms 0.05 at opacity 0.5, 0.2 at 0.9, the polynomial by 0.001. It costs no more, and no driver has a cosine of its own. */
+ * middle it is `opacity`. Eq. 19, lambda (cos(pi d / r) + 1) / 2, is as near as that only where spheres are thin: off
+ * by rms 0.05 at opacity 0.5, 0.2 at 0.9, the polynomial by 0.001. It costs no more, and no driver has a cosine of its
+ * own. */
 void spl_soft_falloff(double opacity, float f[SPL_SOFT_FALLOFF]);
 
 #endif

@@ -1,6 +1,6 @@
-/* Recording of what is found of soft spheres; see of.h and shaders/soft_of.comp. Lists are walked as they are blended: at
- * most so much of each in a dispatch as a software driver's loop has rounds for, then on from there; what was hidden so
- * far stays with the sample. */
+/* Recording of what is found of soft spheres; see of.h and shaders/soft_of.comp. Lists are walked as they are blended:
+ * at most so much of each in a dispatch as a software driver's loop has rounds for, then on from there; what was hidden
+ * so far stays with the sample. */
 #include "render/soft/of.h"
 
 #include "render/soft/models.h"

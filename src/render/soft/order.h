@@ -1,7 +1,7 @@
-/* The order of soft spheres: items that a kernel gathered in the order of their ids are sorted by view depth (stable, so
- * that ties fall to the lower id), listed by the tiles of SPL_SOFT_TILE samples that they reach, and blended front to
- * back over what is solid. A counting sort throughout: integers, no barrier within a workgroup, the same bytes on every
- * driver. Everything belongs to the renderer's thread.
+/* The order of soft spheres: items that a kernel gathered in the order of their ids are sorted by view depth (stable,
+ * so that ties fall to the lower id), listed by the tiles of SPL_SOFT_TILE samples that they reach, and blended front
+ * to back over what is solid. A counting sort throughout: integers, no barrier within a workgroup, the same bytes on
+ * every driver. Everything belongs to the renderer's thread.
  *
  *   items (ids) ── sort_count, sort_scan, sort_move, a digit of the depth at a time ──► pairs (depth, item) in order
  *         ── soft_list ──► count by tile ── the host: where lists start ──► lists of items ── soft_blend ──► samples

@@ -1,5 +1,6 @@
 /* Windows of depth: soft spheres that are more than fit are drawn a range after the other, front to back. A place in
- * the order of blending is depth (float bits) << 32 | slot; a window is a range of places. Pure; the caller's thread. */
+ * the order of blending is depth (float bits) << 32 | slot; a window is a range of places. Pure; the caller's
+ * thread. */
 #ifndef SPL_RENDER_SOFT_PLAN_H
 #define SPL_RENDER_SOFT_PLAN_H
 
@@ -39,8 +40,8 @@ struct spl_soft_plan {
 
 /* Begins a plan of everything in `range`, whose ends are whole depths. */
 int spl_soft_plan_begin(struct spl_soft_plan *plan, const struct spl_soft_range *range, struct spl_error *err);
-/* The next window, by rising depth, with something in it: it fits, or is a single place. *sum is what it has. Returns 1;
- * 0 after the last; an error of measure(). */
+/* The next window, by rising depth, with something in it: it fits, or is a single place. *sum is what it has. Returns
+ * 1; 0 after the last; an error of measure(). */
 int spl_soft_plan_next(struct spl_soft_plan *plan, struct spl_soft_range *window, struct spl_soft_sum *sum,
                        struct spl_error *err);
 

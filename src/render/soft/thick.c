@@ -1,5 +1,5 @@
-/* Planning of windows that overlap; see thick.h. What lies from where a window begins, less the reach, to the far end is
- * cut in buckets of depth; as many of the first as fit are held, and the window ends where the first of the rest may
+/* Planning of windows that overlap; see thick.h. What lies from where a window begins, less the reach, to the far end
+ * is cut in buckets of depth; as many of the first as fit are held, and the window ends where the first of the rest may
  * begin. Where buckets are too coarse for that, the range that they are of ends behind the one that did not fit. */
 #include "render/soft/thick.h"
 

@@ -26,8 +26,8 @@ struct spl_soft_window {
 
 #define SPL_SOFT_NO_END 3e38f
 
-/* The next window, by rising depth. Returns 1; 0 after the last; SPL_SOFT_TOO_THICK where so much overlaps from plan->from
- * on that a window of the least thickness does not fit; an error of measure(). */
+/* The next window, by rising depth. Returns 1; 0 after the last; SPL_SOFT_TOO_THICK where so much overlaps from
+ * plan->from on that a window of the least thickness does not fit; an error of measure(). */
 enum { SPL_SOFT_TOO_THICK = 2 };
 int spl_soft_thick_next(struct spl_soft_thick *plan, struct spl_soft_window *window, struct spl_error *err);
 

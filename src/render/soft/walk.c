@@ -1,7 +1,8 @@
 /* Recording of models base, concentric and layer; see order.h and shaders/soft_base.comp. An invocation walks the whole
- * list of its tile, again and again; one that takes more rounds than a kernel may goes on in the next run, where it was.
- * Tiles are laid out in groups, a dispatch each, with a word that says whether any was left and what each invocation
- * keeps. A run is bounded however long lists are, and between runs the host asks whether anybody still waits. */
+ * list of its tile, again and again; one that takes more rounds than a kernel may goes on in the next run, where it
+ * was. Tiles are laid out in groups, a dispatch each, with a word that says whether any was left and what each
+ * invocation keeps. A run is bounded however long lists are, and between runs the host asks whether anybody still
+ * waits. */
 #include "render/soft/order.h"
 
 #include "render/soft/models.h"
