@@ -4,15 +4,15 @@
  *
  * The ray is cut where it enters and leaves spheres. From an event to the next what is open stays the same; the next is
  * found by looking through all spheres that may begin before it and are not over, of which none is farther from the
- * event than the largest radius of the list. An invocation remembers which of them its ray has met, SPL_SOFT_MET at most,
- * and looks those behind up in the list again: most of a tile's spheres miss most of its samples. So there is no limit on
- * spheres that are open. A walk is one event t:
+ * event than the largest radius of the list. An invocation remembers which of them its ray has met, SPL_SOFT_MET at
+ * most, and looks those behind up in the list again: most of a tile's spheres miss most of its samples. So there is no
+ * limit on spheres that are open. A walk is one event t:
  *   the integrals at t of spheres that were open before it, less those of the same at the event before: the depth of
  *   the stretch between (they are kept as one sum: `before` and `after`);
  *   the colour of what is open behind it (eq. 11), and the next event.
  * A software driver's kernel ends after 65535 rounds of all its loops. After SPL_SOFT_ROUNDS the walk is left where it
- * is, and kept: COUNTS[progress] says that some were left, behind it lie SPL_SOFT_KEPT_WORDS of each invocation. The host
- * runs the kernel again until none is. So there is no limit on the list's length, either.
+ * is, and kept: COUNTS[progress] says that some were left, behind it lie SPL_SOFT_KEPT_WORDS of each invocation. The
+ * host runs the kernel again until none is. So there is no limit on the list's length, either.
  * Lists may be those of a window of depth: they have all that overlaps what lies before `until`. Where the next event
  * lies behind that it is not known yet, and the ray ends at the last one, to which the next window comes back: what is
  * open there it has, too. So windows cut no stretch, and change no byte. WALKS have the last event and the optical
@@ -194,7 +194,8 @@ bool see_stretches(inout walk w, soft_ray ray, uint begin, uint end, inout float
     float largest = find_reach(begin, end, ray);
     uint most = most_rounds(begin, ray), was = counts[kept];
     uint met[SPL_SOFT_MET], count = 0u, k = 0u, alive = 0u; /* entries; those of this walk that are not over */
-    uint tail = begin, i = begin, first = begin; /* of the list: all before are met or missed; the next; where to begin */
+    /* Of the list: all before are met or missed; the next; where to begin. */
+    uint tail = begin, i = begin, first = begin;
     bool meets = true;
     if (was != KEPT_NOTHING) {
         fresh = was == KEPT_FRESH;

@@ -1,7 +1,8 @@
 /* Soft spheres of the draw list, within a window of depth: counted by slots (constant 0 = 0), by buckets of depth or of
- * slots (1), or gathered as items where their slot's start (2). A slot is what an invocation walks: neighbours by id, and
- * slots rise with the chunks' first ids (chunk.texture is a chunk's first slot), so that items are in the order of ids. A
- * sphere reaches at least the sample that its centre falls on: it is drawn so wide, and the thinner (soft_share()). */
+ * slots (1), or gathered as items where their slot's start (2). A slot is what an invocation walks: neighbours by id,
+ * and slots rise with the chunks' first ids (chunk.texture is a chunk's first slot), so that items are in the order of
+ * ids. A sphere reaches at least the sample that its centre falls on: it is drawn so wide, and the thinner
+ * (soft_share()). */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"

@@ -1,6 +1,6 @@
 /* Lists of the tiles: items in their order, an entry for each tile of their rectangles; first counted (constant 0 = 0),
- * then, once it is known where each tile's list starts, written (1). It is a counting sort by tile, so that lists are in
- * the items' order. Blocks remember how far they came: a walk of SPL_SOFT_ROUNDS goes on in another dispatch. */
+ * then, once it is known where each tile's list starts, written (1). It is a counting sort by tile, so that lists are
+ * in the items' order. Blocks remember how far they came: a walk of SPL_SOFT_ROUNDS goes on in another dispatch. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/soft_step.glsl"
@@ -30,7 +30,8 @@ void main()
     uint rect = imageLoad(item_texels, int(job.rects + item)).x;
     for (uint round = 0u;;) {
         uint next_rect = imageLoad(item_texels, int(job.rects + next)).x, after = item_at(min(i + 2u, last));
-        uint tile = (rect & (1u << SPL_SOFT_RECT_COLUMNS) - 1u) + row * job.columns + column, counter = block * job.digits + tile;
+        uint tile = (rect & (1u << SPL_SOFT_RECT_COLUMNS) - 1u) + row * job.columns + column;
+        uint counter = block * job.digits + tile;
         uint start = WRITES != 0u ? imageLoad(start_texels, int(tile)).x : 0u;
         if (i < end) {
             uint before = counts[counter];

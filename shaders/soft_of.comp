@@ -1,11 +1,11 @@
 /* Which soft sphere layers and picks speak of, sample by sample, over the lists of tiles that soft_blend.comp walks. An
- * invocation is a sample. Constant 0: the first sphere that is seen at all, by its opacity in model express, which those
- * with a density are near to (SPL_SOFT_FIND_FIRST); the one with which less than half passes in express
+ * invocation is a sample. Constant 0: the first sphere that is seen at all, by its opacity in model express, which
+ * those with a density are near to (SPL_SOFT_FIND_FIRST); the one with which less than half passes in express
  * (SPL_SOFT_FIND_MEDIAN); or with which what is hidden is more than job.low in base, concentric or layer
- * (SPL_SOFT_FIND_DENSE + SPL_SOFT_BASE and so on), where what a sphere hides is counted as the ray comes by its centre, up
- * to the solid. Constants 1, 2: some items are partly solid (eq. 22), or thin. Spheres whose centres lie behind the solid
- * are none. What was hidden so far is kept, so that lists may be walked in parts and in windows of depth; what is nearer
- * than key job.high is left out, for windows that overlap. */
+ * (SPL_SOFT_FIND_DENSE + SPL_SOFT_BASE and so on), where what a sphere hides is counted as the ray comes by its centre,
+ * up to the solid. Constants 1, 2: some items are partly solid (eq. 22), or thin. Spheres whose centres lie behind the
+ * solid are none. What was hidden so far is kept, so that lists may be walked in parts and in windows of depth; what is
+ * nearer than key job.high is left out, for windows that overlap. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"

@@ -6,7 +6,8 @@
 
 #include "common/frame.glsl"
 
-/* What is narrower than a sample is drawn as wide as one, and hides as much of it as it did: opacity times area stays. */
+/* What is narrower than a sample is drawn as wide as one, and hides as much of it as it did: opacity times area
+ * stays. */
 float soft_radius(float own, float z)
 {
     precise float least = frame.low_pass * z * frame.inverse_fx;

@@ -174,8 +174,8 @@ static double off_by(const struct spl_frame *frame, const struct spl_view *view,
     return most;
 }
 
-/* Within a level of the reference in doubles; where not all of it fits at once, in windows of depth and in pieces, whose
- * bytes are the same. */
+/* Within a level of the reference in doubles; where not all of it fits at once, in windows of depth and in pieces,
+ * whose bytes are the same. */
 static void models_match_the_reference(void **state)
 {
     (void)state;
@@ -278,7 +278,8 @@ static void levels_hide_as_much(void **state)
     done(dataset);
 }
 
-/* A fiftieth of a degree at a time, all round: no picture differs from the one before by more than the content's own motion. */
+/* A fiftieth of a degree at a time, all round: no picture differs from the one before by more than the content's own
+ * motion. */
 static void a_turn_flips_nothing(void **state)
 {
     (void)state;
@@ -339,8 +340,8 @@ static void nobody_waits_for_it(void **state)
     done(dataset);
 }
 
-/* In whichever of the parts that a frame is run in: it is told, never drawn in part, and the device's next life draws the
- * same. */
+/* In whichever of the parts that a frame is run in: it is told, never drawn in part, and the device's next life draws
+ * the same. */
 static void loss_is_told(void **state)
 {
     (void)state;
@@ -423,8 +424,10 @@ static void neighbours_do_not_add_up(void **state)
     soften(&view, 1, -100, 0.3);
     for (int leans = 0; leans < 2; leans++) {
         const double lean = leans ? 0.01 : 0; // through y = 0 in the middle of the wall
-        struct spl_dataset *over = wall_of_two(2, lean, 2), *meet = wall_of_two(0, lean, 2), *one = wall_of_two(2, lean, 1);
-        struct spl_frame a = draw(renderer, over, &view), b = draw(renderer, meet, &view), c = draw(renderer, one, &view);
+        struct spl_dataset *over = wall_of_two(2, lean, 2), *meet = wall_of_two(0, lean, 2);
+        struct spl_dataset *one = wall_of_two(2, lean, 1);
+        struct spl_frame a = draw(renderer, over, &view), b = draw(renderer, meet, &view);
+        struct spl_frame c = draw(renderer, one, &view);
         assert_int_equal(b.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
         assert_int_equal(a.stats.soft_drawn, b.stats.soft_drawn);
         assert_int_equal(c.stats.soft_drawn, b.stats.soft_drawn + 4 * SPL_PANEL_SIDE);
@@ -443,7 +446,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
-        frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
+        frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference),
+        frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
         frames_test(neighbours_do_not_add_up),
     };

@@ -1,6 +1,7 @@
 /* Kernel soft_base against the reference in doubles: base and concentric over lists of tiles, with spheres that
- * overlap, are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds than a
- * kernel may take, in lists longer than that, 100,000 on a ray, in windows of depth; and layer. Colour over black and what passes, within a level of 255. One body for every backend. */
+ * overlap, are nested, lie at one depth, around the eye, in a wall, near the border to what is solid, in more rounds
+ * than a kernel may take, in lists longer than that, 100,000 on a ray, in windows of depth; and layer. Colour over
+ * black and what passes, within a level of 255. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -140,12 +141,13 @@ static void fill(const struct scene *s, double from, double to)
         items[6 * i + 5] = i;
         step.reach = fmaxf(step.reach, (float)p->radius);
     }
-    for (uint32_t t = 0; t < (s->alone ? 1 : tiles); t++) { /* every sphere in each tile: more than must be, never less */
+    for (uint32_t t = 0; t < (s->alone ? 1 : tiles); t++) { /* each sphere in each tile: more than must be, never less */
         lists[3 * t] = t % columns | t / columns << 16;
         lists[3 * t + 1] = entry;
         for (uint32_t i = 0; i < s->count; i++) {
             const struct soft_sphere *p = &s->spheres[i];
-            bool held = p->center[2] + 1.001 * (double)step.reach >= from && p->center[2] - 1.001 * (double)step.reach <= to;
+            const double reach = 1.001 * (double)step.reach;
+            bool held = p->center[2] + reach >= from && p->center[2] - reach <= to;
             if (s->look.model == SPL_SOFT_MODEL_LAYER)
                 held = p->center[2] >= from && p->center[2] < to;
             assert_true(entry < entries_max);
@@ -348,7 +350,8 @@ static void lists_longer_than_a_run_are_walked(void **state)
     for (int m = 0; m < 3; m++) {
         struct scene s = make_scene(models[m], models[m] == SPL_SOFT_MODEL_LAYER ? 0.4 : 1e-5, 1);
         s.crowded = true;
-        s.spheres[0] = (struct soft_sphere){.center = {-1, -0.75, 2.5}, .radius = 0.5, .color = {10, 200, 90}, .soft = 1};
+        s.spheres[0] = (struct soft_sphere){
+            .center = {-1, -0.75, 2.5}, .radius = 0.5, .color = {10, 200, 90}, .soft = 1};
         assert_true(matches(&s, "longer than a run") >= 2);
     }
 }

@@ -90,7 +90,8 @@ static void make_scene(struct scene *s, uint32_t count, double largest)
 /* All items for every tile; those before `cut` first, then from `again` on the others, with those nearer left out. */
 static void draw(const struct scene *s, const struct spl_soft_params *soft, uint32_t cut, uint32_t again)
 {
-    static const uint32_t dense[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE, [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
+    static const uint32_t dense[] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
+                                     [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
                                      [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
     const bool first_of_all = soft->of == SPL_SOFT_OF_FIRST, layer = soft->model == SPL_SOFT_MODEL_LAYER;
     const uint32_t find = first_of_all && !layer                  ? SPL_SOFT_FIND_FIRST
@@ -99,10 +100,12 @@ static void draw(const struct scene *s, const struct spl_soft_params *soft, uint
     float f[SPL_SOFT_FALLOFF];
     spl_soft_falloff(soft->opacity, f);
     struct spl_soft_step step = {.count = tiles, .details = details,
-                                 .low = first_of_all ? SPL_SOFT_DEPTH_SEEN : SPL_SOFT_DEPTH_HALF, .depth = (float)spl_soft_depth(soft->opacity),
+                                 .low = first_of_all ? SPL_SOFT_DEPTH_SEEN : SPL_SOFT_DEPTH_HALF,
+                                 .depth = (float)spl_soft_depth(soft->opacity),
                                  .fall_0 = f[0] * 65536, .fall_1 = f[1] * 65536, .fall_2 = f[2] * 65536,
                                  .fall_3 = f[3] * 65536, .fall_4 = f[4] * 65536};
-    uint32_t *items = spl_gpu_buffer_map(buffers[SPL_RESOURCE_ITEMS]), *lists = spl_gpu_buffer_map(buffers[SPL_RESOURCE_LISTS]);
+    uint32_t *items = spl_gpu_buffer_map(buffers[SPL_RESOURCE_ITEMS]);
+    uint32_t *lists = spl_gpu_buffer_map(buffers[SPL_RESOURCE_LISTS]);
     uint32_t *entries = spl_gpu_buffer_map(buffers[SPL_RESOURCE_SORT_FROM]);
     for (uint32_t i = 0; i < s->count; i++) {
         const uint32_t at = s->count - 1 - i; /* where it lies is not its place in the order */
@@ -166,7 +169,8 @@ static uint32_t matches(const struct scene *s, const struct spl_soft_params *sof
                               : got[0] == SPL_NOTHING;
         if (!same)
             fail_msg("%s of %s, opacity %g, blend %g, sample %d: found %u (%x), not %d", spl_soft_of_name(soft->of),
-                     spl_soft_model_name(soft->model), soft->opacity, soft->blend, i, got[1], got[0], any ? (int)is : -1);
+                     spl_soft_model_name(soft->model), soft->opacity, soft->blend, i, got[1], got[0],
+                     any ? (int)is : -1);
         found += any;
     }
     assert_true(doubtful < 20);
@@ -188,7 +192,7 @@ static void kernels_match(void **state)
                 uint32_t found = matches(&s, &soft, 0, 0);
                 assert_int_equal(matches(&s, &soft, 150, 150), found);
                 assert_int_equal(matches(&s, &soft, 152, 90), found); /* items 151 and 152 differ in depth */
-                bool none = of == SPL_SOFT_OF_MEDIAN ? model == SPL_SOFT_MODEL_LAYER ? opacities[i] <= 0.5 : i == 0 : i == 0;
+                bool none = of == SPL_SOFT_OF_MEDIAN && model == SPL_SOFT_MODEL_LAYER ? opacities[i] <= 0.5 : i == 0;
                 assert_true(none ? found == 0 : found > 20);
             }
     make_scene(&s, 0, 1);
@@ -219,7 +223,8 @@ static void assert_same(const struct spl_frame *a, const struct spl_frame *b, co
 {
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
         const struct spl_image *x = &a->images[layer], *y = &b->images[layer];
-        if (x->pixels && y->pixels && memcmp(x->pixels, y->pixels, (size_t)x->width * x->height * spl_pixel_bytes(x->type)))
+        const size_t bytes = (size_t)x->width * x->height * spl_pixel_bytes(x->type);
+        if (x->pixels && y->pixels && memcmp(x->pixels, y->pixels, bytes))
             fail_msg("%s: layer %s differs", what, spl_layer_name((enum spl_layer)layer));
     }
 }
@@ -303,8 +308,10 @@ static void what_is_nearer_stays_nearer(void **state)
         assert_true(nearer > pixels / 10 && (model == SPL_SOFT_MODEL_LAYER ? !between : between > pixels / 50));
         for (int of = 1; of < SPL_SOFT_OF_COUNT; of++) {
             static const enum spl_layer blended[] = {SPL_LAYER_COLOR, SPL_LAYER_COVERAGE};
-            for (int i = 0; i < 2; i++)
-                assert_memory_equal(frames[0].images[blended[i]].pixels, frames[of].images[blended[i]].pixels, 4 * pixels);
+            for (int i = 0; i < 2; i++) {
+                const enum spl_layer layer = blended[i];
+                assert_memory_equal(frames[0].images[layer].pixels, frames[of].images[layer].pixels, 4 * pixels);
+            }
             struct spl_frame nothing; /* of opacity 0 there is none to find */
             soften(&view, 0, 0, (enum spl_soft_of)of);
             nothing = render(dataset, &view);

@@ -1,7 +1,7 @@
-/* Sorting, listing and blending of soft spheres against plain C in the same fixed point, equal to the bit: items that are
- * random, in one place, behind one another on a sample, none, one, larger than the image, smaller than a sample, around
- * the eye, partly solid, of every opacity, behind what is solid, and in several windows of depth. One body for every
- * backend. */
+/* Sorting, listing and blending of soft spheres against plain C in the same fixed point, equal to the bit: items that
+ * are random, in one place, behind one another on a sample, none, one, larger than the image, smaller than a sample,
+ * around the eye, partly solid, of every opacity, behind what is solid, and in several windows of depth. One body for
+ * every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -136,10 +136,12 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
         uint32_t rects[1024], n = soft_rectangles(&s->params, &s->items[i], rects), key;
         memcpy(&key, &s->items[i].z, 4);
         for (uint32_t k = 0; k < n; k++, made++) {
-            uint32_t entries = ((rects[k] >> SPL_SOFT_RECT_COLUMNS & (SPL_SOFT_SPAN_MAX - 1)) + 1) * ((rects[k] >> SPL_SOFT_RECT_ROWS) + 1);
+            uint32_t entries = ((rects[k] >> SPL_SOFT_RECT_COLUMNS & (SPL_SOFT_SPAN_MAX - 1)) + 1) *
+                               ((rects[k] >> SPL_SOFT_RECT_ROWS) + 1);
             memcpy(item + SPL_SOFT_ITEM_WORDS * made, &s->items[i], 16);
-            item[SPL_SOFT_ITEM_WORDS * made + 4] = (uint32_t)s->items[i].color[0] | (uint32_t)s->items[i].color[1] << 8 |
-                                                   (uint32_t)s->items[i].color[2] << 16 | (uint32_t)s->items[i].mark << 24;
+            item[SPL_SOFT_ITEM_WORDS * made + 4] =
+                (uint32_t)s->items[i].color[0] | (uint32_t)s->items[i].color[1] << 8 |
+                (uint32_t)s->items[i].color[2] << 16 | (uint32_t)s->items[i].mark << 24;
             item[SPL_SOFT_ITEM_WORDS * made + 5] = i;
             rect[made] = rects[k];
             pair[2 * made] = key;
@@ -160,7 +162,8 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
         spl_gpu_copy(gpu, up, 0, memory.buffers[SPL_SOFT_ITEMS], 0, 4ull * SPL_SOFT_ITEM_WORDS * count);
         spl_gpu_copy(gpu, up, 4ull * SPL_SOFT_ITEM_WORDS * count, memory.buffers[SPL_SOFT_ITEMS],
                      4ull * SPL_SOFT_ITEM_WORDS * items_max, 4ull * count);
-        spl_gpu_copy(gpu, up, 4ull * (SPL_SOFT_ITEM_WORDS + 1) * count, memory.buffers[SPL_SOFT_PAIRS], 0, 8ull * count);
+        spl_gpu_copy(gpu, up, 4ull * (SPL_SOFT_ITEM_WORDS + 1) * count, memory.buffers[SPL_SOFT_PAIRS], 0,
+                     8ull * count);
     }
     spl_gpu_barrier(gpu);
     if (spl_soft_sort(&order, count, low, high, &err) || spl_soft_list(&order, count, most, &err) ||
