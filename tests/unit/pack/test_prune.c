@@ -55,8 +55,10 @@ static void write_scene(const char *path)
         write_point(f, x, noise, z, 128);
         write_point(f, x + 30 * COLOURED, noise, z, uniform(&random) < 0.5 ? 0 : 255);
     }
-    for (int i = 0; i < each; i++)
-        write_point(f, 30 * FOLIAGE + 5 * uniform(&random), 5 * uniform(&random), 5 * uniform(&random), 128);
+    for (int i = 0; i < each; i++) { /* drawn one by one: compilers differ in the order of arguments */
+        double z = 5 * uniform(&random), y = 5 * uniform(&random), x = 5 * uniform(&random);
+        write_point(f, 30 * FOLIAGE + x, y, z, 128);
+    }
     for (int i = 0; i < 3 * wire_points; i++)
         write_point(f, 30 * WIRES + 0.01 * (i % wire_points), 1.5 * (i / wire_points), 3, 128);
     assert_int_equal(fclose(f), 0);
