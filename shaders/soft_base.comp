@@ -24,8 +24,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"
-#include "common/soft.glsl"
-#include "common/soft_step.glsl"
+#include "common/soft_lists.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint MODEL = SPL_SOFT_BASE;
@@ -35,9 +34,6 @@ layout(constant_id = 2) const uint THIN = 0;   /* some are thin: soft_share() */
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
 layout(std430, binding = SPL_STORAGE_COUNTS) buffer count_buffer { uint counts[]; };
 layout(std430, binding = SPL_STORAGE_WALKS) buffer walk_buffer { uint walks[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
 
 vec3 unpack_bytes(uint word)
 {
@@ -55,17 +51,14 @@ struct soft_item {
 
 soft_item load_item(uint entry, soft_ray ray)
 {
-    int at = SPL_SOFT_ITEM_WORDS * int(imageLoad(entry_texels, int(entry)).x);
+    listed_item listed = load_listed(load_entry(int(entry)));
     soft_item item;
-    item.center.x = uintBitsToFloat(imageLoad(item_texels, at).x);
-    item.center.y = uintBitsToFloat(imageLoad(item_texels, at + 1).x);
-    item.center.z = uintBitsToFloat(imageLoad(item_texels, at + 2).x);
-    float own = uintBitsToFloat(imageLoad(item_texels, at + 3).x);
+    item.center = vec3(listed.x, listed.y, uintBitsToFloat(listed.key));
+    float own = listed.radius;
     item.radius = THIN != 0u ? soft_radius(own, item.center.z) : own;
     item.share = THIN != 0u ? soft_share(own, item.radius) : 1.0;
-    uint paint = imageLoad(item_texels, at + 4).x;
-    item.color = unpack_bytes(paint);
-    item.mark = paint >> 24;
+    item.color = unpack_bytes(listed.paint);
+    item.mark = listed.paint >> 24;
     item.inverse_radius = 1.0 / item.radius;
     item.q = soft_distance(ray, item.center, item.behind) * item.inverse_radius * item.inverse_radius;
     return item;
@@ -76,8 +69,7 @@ float depth_to(soft_item item, float edge, float zeta)
 {
     float part, whole = 1.0;
     if (MODEL == SPL_SOFT_CONCENTRIC) {
-        float samples = frame.fx * item.radius / max(item.center.z, 1e-9);
-        float shells = floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
+        float shells = soft_shells(item.radius, item.center.z);
         part = soft_concentric_part(shells, item.q, zeta);
         if (BORDER != 0u)
             whole = soft_concentric_part(shells, item.q, edge);
@@ -86,15 +78,7 @@ float depth_to(soft_item item, float edge, float zeta)
         if (BORDER != 0u)
             whole = soft_base_part(item.q, edge);
     }
-    float depth = job.depth * part;
-    if (THIN != 0u)
-        depth *= item.share * (job.thin + (1.0 - job.thin) * item.share);
-    if (BORDER != 0u && item.mark < SPL_MARK_WHOLE) {
-        float opacity = 1.0 - exp(-2.0 * job.depth * whole), soft = (float(item.mark) - 1.0) * (1.0 / 254.0);
-        float wanted = -log(max(1.0 - soft_modulate(opacity, item.q, soft) * item.share, 1.0 / 1024.0));
-        depth = 0.5 * wanted * part / max(whole, 1e-12);
-    }
-    return depth;
+    return dense_depth(part, whole, item.q, soft_of_mark(item.mark), item.share, BORDER != 0u, THIN != 0u);
 }
 
 /* What a sample has seen. */
@@ -177,8 +161,7 @@ uint most_rounds(uint begin, soft_ray ray)
 {
     uint rounds = SPL_SOFT_ROUNDS;
     if (MODEL == SPL_SOFT_CONCENTRIC) {
-        float samples = frame.fx * job.reach / max(load_item(begin, ray).center.z, 1e-9);
-        float shells = clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX));
+        float shells = soft_shells(job.reach, load_item(begin, ray).center.z);
         rounds /= 1u + (uint(shells) + 1u) * (BORDER != 0u ? 2u : 1u);
     }
     return rounds;
@@ -292,11 +275,9 @@ void main()
     const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS;
     uint id = gl_GlobalInvocationID.x, slot = id / lanes, lane = id % lanes;
     bool has = slot < job.count;
-    int list = int(job.first + 3u * (has ? slot : 0u));
-    uint place = imageLoad(list_texels, list).x, begin = imageLoad(list_texels, list + 1).x;
-    uint end = imageLoad(list_texels, list + 2).x;
-    ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS) +
-               ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
+    soft_list list = load_list(has ? slot : 0u);
+    uint begin = list.begin, end = list.end;
+    ivec2 at = list.corner + ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
     has = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
     uint kept = job.progress + 1u + SPL_SOFT_KEPT_WORDS * id;
     if (!has || counts[kept] == KEPT_END)

@@ -5,41 +5,13 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"
-#include "common/soft.glsl"
-#include "common/soft_step.glsl"
+#include "common/soft_lists.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint BORDER = 0;
 layout(constant_id = 1) const uint FIRST = 0;
 layout(constant_id = 2) const uint THIN = 0;
 layout(std430, binding = SPL_STORAGE_SOFT) buffer state_buffer { uint state[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
-
-struct soft_item {
-    float x, y, radius;
-    int key;    /* depth's word */
-    uint paint; /* colour and mark */
-};
-
-/* The item of an entry. */
-int load_entry(int entry)
-{
-    return int(imageLoad(entry_texels, entry).x);
-}
-
-soft_item load_item(int index)
-{
-    int at = SPL_SOFT_ITEM_WORDS * index;
-    soft_item item;
-    item.x = uintBitsToFloat(imageLoad(item_texels, at).x);
-    item.y = uintBitsToFloat(imageLoad(item_texels, at + 1).x);
-    item.key = int(imageLoad(item_texels, at + 2).x);
-    item.radius = uintBitsToFloat(imageLoad(item_texels, at + 3).x);
-    item.paint = imageLoad(item_texels, at + 4).x;
-    return item;
-}
 
 void main()
 {
@@ -48,11 +20,9 @@ void main()
     const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS / SPL_SOFT_SAMPLES;
     uint slot = gl_GlobalInvocationID.x / lanes, lane = gl_GlobalInvocationID.x % lanes;
     bool has = slot < job.count;
-    int list = int(job.first + 3u * (has ? slot : 0u));
-    uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
-    uint end = has ? imageLoad(list_texels, list + 2).x : i + 1u; /* no list is empty */
-    ivec2 corner = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
-    corner += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE * SPL_SOFT_SAMPLES);
+    soft_list list = load_list(has ? slot : 0u);
+    uint end = has ? list.end : list.begin + 1u;
+    ivec2 corner = list.corner + ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE * SPL_SOFT_SAMPLES);
     int clear[SPL_SOFT_SAMPLES], solid[SPL_SOFT_SAMPLES], last = 0;
     uvec3 sum[SPL_SOFT_SAMPLES];
     float ry[SPL_SOFT_SAMPLES], inverse[SPL_SOFT_SAMPLES];
@@ -76,15 +46,15 @@ void main()
         solid[k] = seen ? int(min(depth_word(index), uint(SPL_SOFT_FARTHEST))) : 0;
         last = max(last, solid[k]);
     }
-    int entry = int(i), end_entry = int(end) - 1;
-    soft_item next = load_item(load_entry(entry));
+    int entry = int(list.begin), end_entry = int(end) - 1;
+    listed_item next = load_listed(load_entry(entry));
     int following = load_entry(min(entry + 1, end_entry));
     for (;;) {
-        soft_item item = next;
-        next = load_item(following); /* an item ahead: nothing of a round waits for memory */
+        listed_item item = next;
+        next = load_listed(following); /* an item ahead: nothing of a round waits for memory */
         following = load_entry(min(entry + 2, end_entry));
-        float x = item.x, y = item.y, z = intBitsToFloat(item.key), own = item.radius;
-        int key = item.key;
+        float x = item.x, y = item.y, z = uintBitsToFloat(item.key), own = item.radius;
+        int key = int(item.key);
         uint paint = item.paint;
         uvec3 color = uvec3(paint & 255u, paint >> 8 & 255u, paint >> 16 & 255u);
         float radius = THIN != 0u ? soft_radius(own, z) : own, whole = soft_share(own, radius);
@@ -92,7 +62,7 @@ void main()
         precise float closer = 1.0 / (radius * radius);
         precise float ox = x - rx * z;
         precise float ox_squared = ox * ox, ox_along = ox * rx;
-        precise float soft = (float(paint >> 24) - 1.0) * (1.0 / 254.0);
+        float soft = soft_of_mark(paint >> 24);
         int left = 0;
         for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
             precise float oy = y - ry[k] * z;
@@ -100,15 +70,7 @@ void main()
             precise float share = (ox_squared + oy * oy - along * along * inverse[k]) * closer;
             precise float inner = 1.0 - share;
             precise float m = intBitsToFloat(max(floatBitsToInt(inner), 0));
-            precise float fall =
-                m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
-            if (BORDER != 0u) {
-                precise float linear = 1.0 - sqrt(1.0 - m);
-                precise float mixed = linear * 65536.0 * (1.0 - soft) + fall * soft;
-                fall = mixed;
-            }
-            precise float thinned = THIN != 0u ? fall * whole : fall;
-            precise float rounded = thinned + rounding;
+            precise float rounded = express_opacity(m, soft, whole, BORDER != 0u, THIN != 0u) + rounding;
             int opacity = key <= solid[k] ? clamp(int(rounded), 0, 65536) : 0;
             uint weight = (uint(clear[k] >> 8) * uint(opacity)) >> 8;
             clear[k] -= int(weight);

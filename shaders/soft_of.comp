@@ -9,8 +9,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"
-#include "common/soft.glsl"
-#include "common/soft_step.glsl"
+#include "common/soft_lists.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint FIND = SPL_SOFT_FIND_FIRST;
@@ -18,9 +17,6 @@ layout(constant_id = 1) const uint BORDER = 0;
 layout(constant_id = 2) const uint THIN = 0;
 
 layout(std430, binding = SPL_STORAGE_FOUND) buffer found_buffer { uint found[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_ITEMS) item_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) entry_texels;
-SPL_TEXEL_BUFFER(SPL_TEXELS_LISTS) list_texels;
 
 const bool CONCENTRIC = FIND == SPL_SOFT_FIND_DENSE + SPL_SOFT_CONCENTRIC;
 const bool LAYER = FIND == SPL_SOFT_FIND_DENSE + SPL_SOFT_LAYER;
@@ -36,15 +32,7 @@ struct met_item {
 uint express(met_item item)
 {
     precise float m = max(1.0 - item.q, 0.0);
-    precise float fall =
-        m * (job.fall_0 + m * (job.fall_1 + m * (job.fall_2 + m * (job.fall_3 + m * job.fall_4))));
-    if (BORDER != 0u) {
-        precise float linear = 1.0 - sqrt(1.0 - m);
-        precise float mixed = linear * 65536.0 * (1.0 - item.soft) + fall * item.soft;
-        fall = mixed;
-    }
-    precise float thinned = THIN != 0u ? fall * item.share : fall;
-    precise float rounded = thinned + item.rounding;
+    precise float rounded = express_opacity(m, item.soft, item.share, BORDER != 0u, THIN != 0u) + item.rounding;
     return uint(clamp(int(rounded), 0, 65536));
 }
 
@@ -60,17 +48,11 @@ float depth_of(met_item item, soft_ray ray, float until)
     float inverse = 1.0 / (item.radius * sqrt(ray.inverse));
     float from = clamp((frame.near - middle) * inverse, -edge, edge);
     float to = clamp((until - middle) * inverse, -edge, edge);
-    float samples = frame.fx * item.radius / max(item.z, 1e-9);
-    float shells = floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
-    float part = part_of(shells, q, to) - part_of(shells, q, from), depth = job.depth * part;
-    if (THIN != 0u)
-        depth *= item.share * (job.thin + (1.0 - job.thin) * item.share);
-    if (BORDER != 0u && item.soft < 1.0) {
-        float whole = part_of(shells, q, edge), opacity = 1.0 - exp(-2.0 * job.depth * whole);
-        float wanted = -log(max(1.0 - soft_modulate(opacity, q, item.soft) * item.share, 1.0 / 1024.0));
-        depth = 0.5 * wanted * part / max(whole, 1e-12);
-    }
-    return depth;
+    float shells = soft_shells(item.radius, item.z), whole = 1.0;
+    float part = part_of(shells, q, to) - part_of(shells, q, from);
+    if (BORDER != 0u)
+        whole = part_of(shells, q, edge);
+    return dense_depth(part, whole, q, item.soft, item.share, BORDER != 0u, THIN != 0u);
 }
 
 /* With this sphere, is it found? */
@@ -96,11 +78,8 @@ void main()
     const uint lanes = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS;
     uint id = gl_GlobalInvocationID.x, slot = id / lanes, lane = id % lanes;
     bool has = slot < job.count;
-    int list = int(job.first + 3u * (has ? slot : 0u));
-    uint place = imageLoad(list_texels, list).x, i = imageLoad(list_texels, list + 1).x;
-    uint end = imageLoad(list_texels, list + 2).x;
-    ivec2 at = ivec2(place & 65535u, place >> 16) * ivec2(SPL_SOFT_TILE, SPL_SOFT_TILE_ROWS);
-    at += ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
+    soft_list list = load_list(has ? slot : 0u);
+    ivec2 at = list.corner + ivec2(lane % SPL_SOFT_TILE, lane / SPL_SOFT_TILE);
     has = has && uint(at.x) < frame.width && uint(at.y) < frame.height;
     if (!has)
         return;
@@ -116,16 +95,16 @@ void main()
     ray.slope = slope;
     ray.inverse = inverse;
     bool seen = false;
-    int entry = 0, item_at = 0;
+    int entry = 0;
+    uint i = list.begin;
     for (;;) { /* the end is asked for at the end: see splat_depth.comp */
-        entry = int(imageLoad(entry_texels, int(i)).x);
-        item_at = SPL_SOFT_ITEM_WORDS * entry;
+        entry = load_entry(int(i));
+        listed_item listed = load_listed(entry);
         met_item item;
-        key = imageLoad(item_texels, item_at + 2).x;
+        key = listed.key;
         item.z = uintBitsToFloat(key);
-        float given = uintBitsToFloat(imageLoad(item_texels, item_at + 3).x);
-        vec2 center = vec2(uintBitsToFloat(imageLoad(item_texels, item_at).x),
-                           uintBitsToFloat(imageLoad(item_texels, item_at + 1).x));
+        float given = listed.radius;
+        vec2 center = vec2(listed.x, listed.y);
         item.radius = THIN != 0u ? soft_radius(given, item.z) : given;
         item.share = THIN != 0u ? soft_share(given, item.radius) : 1.0;
         item.rounding = THIN != 0u ? soft_rounding(given, item.radius, center.x, center.y) : 0.5;
@@ -135,17 +114,16 @@ void main()
         precise float q = (off.x * off.x + off.y * off.y - along * along * inverse) * closer;
         precise float behind = along * inverse;
         item.behind = behind;
-        precise float soft = (float(imageLoad(item_texels, item_at + 4).x >> 24) - 1.0) * (1.0 / 254.0);
         item.q = q;
-        item.soft = soft;
+        item.soft = soft_of_mark(listed.paint >> 24);
         seen = key >= job.high && key <= solid && find(item, ray, until, hidden);
-        if (seen || key > solid || ++i >= end)
+        if (seen || key > solid || ++i >= list.end)
             break;
     }
     if (seen) {
         int detail = int(job.details) + SPL_SOFT_DETAIL_WORDS * entry;
         found[own] = key;
-        found[own + 1u] = imageLoad(item_texels, item_at + 5).x;
+        found[own + 1u] = imageLoad(item_texels, SPL_SOFT_ITEM_WORDS * entry + 5).x;
         found[own + 2u] = imageLoad(item_texels, detail).x;
         found[own + 3u] = imageLoad(item_texels, detail + 1).x;
     } else {

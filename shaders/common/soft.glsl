@@ -64,6 +64,13 @@ float soft_modulate(float opacity, float q, float soft)
     return modulated;
 }
 
+/* spl_soft_shells() of a sphere's radius in samples. */
+float soft_shells(float radius, float z)
+{
+    float samples = frame.fx * radius / max(z, 1e-9);
+    return floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
+}
+
 /* spl_soft_base_part() of delta = sqrt(q): share of the depth through the centre, from the middle to zeta radii. */
 float soft_base_part(float q, float zeta)
 {
