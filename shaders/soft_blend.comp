@@ -1,7 +1,8 @@
 /* Blends the lists of tiles front to back, model express: a disc that faces the eye, whose opacity falls with the
- * distance d of the sample's ray to the centre (eq. 19; src/render/soft/models.h). All invocations of a tile walk the
- * same list, each for SPL_SOFT_SAMPLES of a column. In fixed point, so that every driver gives the same. Constants: 0:
- * some items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile; 2: some are thin. */
+ * distance d of the sample's ray to the centre (for eq. 19 a polynomial: src/render/soft/models.h). All invocations of
+ * a tile walk the same list, each for SPL_SOFT_SAMPLES of a column. In fixed point, so that every driver gives the
+ * same. Constants: 0: some items are partly solid (eq. 22); 1: the first time that a sample is blended in this tile; 2:
+ * some are thin. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/depths.glsl"

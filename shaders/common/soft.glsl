@@ -1,6 +1,7 @@
-/* Soft spheres on the ray of a sample; src/render/soft/models.h says what of, tests/support/soft_rays.c is the same
- * in doubles. Depths are along the viewing axis; a sphere's entries and exits, too, so that they compare with those of
- * what is solid. */
+/* Soft spheres on the ray of a sample: how wide they are drawn, how far off the ray they lie, and the integrals of
+ * their densities along it; src/render/soft/models.h says what of, tests/support/soft_rays.c is the same in doubles.
+ * Depths are along the viewing axis; a sphere's entries and exits, too, so that they compare with those of what is
+ * solid. */
 #ifndef SPL_SOFT_GLSL
 #define SPL_SOFT_GLSL
 

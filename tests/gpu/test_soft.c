@@ -1,6 +1,8 @@
 /* Soft spheres in whole frames: however they are cut in windows of depth or in tiles, every byte is the same; backends
- * differ by a level at most; a turn all round flips nothing; they lie over what is solid and change no other layer;
- * opacity 0 draws none; nobody waits longer for them, and a device that is lost is told. One body for every backend. */
+ * differ by a level at most; models are within a level of the reference in doubles; where too much overlaps, tiles are
+ * cut, or it is told; a level of detail hides as much as what it stands for; cells of panels count once where nodes
+ * meet; a turn all round flips nothing; they lie over what is solid and change no other layer; opacity 0 draws none;
+ * nobody waits longer for them, and a device that is lost is told. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

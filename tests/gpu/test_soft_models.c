@@ -141,7 +141,7 @@ static void fill(const struct scene *s, double from, double to)
         items[6 * i + 5] = i;
         step.reach = fmaxf(step.reach, (float)p->radius);
     }
-    for (uint32_t t = 0; t < (s->alone ? 1 : tiles); t++) { /* each sphere in each tile: more than must be, never less */
+    for (uint32_t t = 0; t < (s->alone ? 1 : tiles); t++) { /* each sphere in each tile: more than must be */
         lists[3 * t] = t % columns | t / columns << 16;
         lists[3 * t + 1] = entry;
         for (uint32_t i = 0; i < s->count; i++) {

@@ -1,6 +1,7 @@
 /* What layers and picks speak of where something is soft: kernel soft_of against plain C, sample by sample, of made-up
- * spheres in whole and in two windows; and whole frames: windows and tiles change no byte of them, the layers belong to
- * one splat, what is nearest is never behind the median, nor that behind the solid. One body for every backend. */
+ * spheres in whole and in two windows, which may overlap; and whole frames: windows, tiles and which layers are asked
+ * for change no byte of them, the layers belong to one splat, what is nearest is never behind the median, nor that
+ * behind the solid. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
