@@ -4,6 +4,7 @@ refuses. Times differ from run to run and are taken out before reports are compa
 usage: bench_resume.py resume|others     the test that takes as long as all others, or those
 environment: SPLATD_BINARY, SPLATD_WALL_TEXTURED
 """
+import csv
 import json
 import os
 import pathlib
@@ -157,9 +158,8 @@ def test_maps(folder, dataset):
         ("splat", "on"), ("splat", "off"), ("points", None)], points
     splats = {p["maps"]: p["psnr"] for p in points if p["method"] == "splat"}
     assert splats["on"] != splats["off"], splats
-    head, *rows = (out / "bench.csv").read_text().splitlines()
-    assert head.endswith(",maps") and [r.rsplit(",", 1)[1] for r in rows if r.startswith(("splat,", "points,"))] == [
-        "on", "off", ""], rows
+    rows = list(csv.DictReader((out / "bench.csv").read_text().splitlines()))
+    assert [r["maps"] for r in rows if r["method"] in ("splat", "points")] == ["on", "off", ""], rows
     assert ">splat + panorama<" in (out / "chart.svg").read_text()
     assert "another 'settings'" in splatd(*command, "--maps", "off", "--no-profile", code=2).stderr
     splatd(*command, "--maps", "off", "--method", "splat", "--profile", folder / "m.json", "--restart")
