@@ -381,11 +381,11 @@ static void loss_is_told(void **state)
 }
 
 /* A wall along x, upright where `lean` is 0, of panels of 16 cells: one in the octant below x = 0, one in that above,
- * both `reach` cells beyond where these meet. Splats in the corners say where that is. */
-static struct spl_dataset *wall_of_two(int reach, double lean, int levels)
+ * both `reach` cells beyond where these meet. Splats in the corners say where that is. `covered`: behind a large disc. */
+static struct spl_dataset *wall_of_two(int reach, double lean, int levels, bool covered)
 {
     enum { side = SPL_PANEL_SIDE };
-    struct make_splat corners[8] = {0};
+    struct make_splat corners[9] = {0};
     struct spl_panel panels[2][2] = {0};
     struct make_panels made[2] = {0};
     for (int i = 0; i < 8; i++) {
@@ -408,7 +408,8 @@ static struct spl_dataset *wall_of_two(int reach, double lean, int levels)
                     memcpy(panels[m][p].color[y][x], (uint8_t[]){220, (uint8_t)(90 * m), 40}, 3);
             }
     }
-    struct spl_dataset *dataset = make_dataset_panels(corners, 8, made, 2, levels);
+    corners[8] = (struct make_splat){.position = {0.2, -1, -0.8}, .normal = {0, -1, 0}, .radius = 1.5f};
+    struct spl_dataset *dataset = make_dataset_panels(corners, covered ? 9 : 8, made, 2, levels);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     return dataset;
 }
@@ -426,8 +427,8 @@ static void neighbours_do_not_add_up(void **state)
     soften(&view, 1, -100, 0.3);
     for (int leans = 0; leans < 2; leans++) {
         const double lean = leans ? 0.01 : 0; // through y = 0 in the middle of the wall
-        struct spl_dataset *over = wall_of_two(2, lean, 2), *meet = wall_of_two(0, lean, 2);
-        struct spl_dataset *one = wall_of_two(2, lean, 1);
+        struct spl_dataset *over = wall_of_two(2, lean, 2, false), *meet = wall_of_two(0, lean, 2, false);
+        struct spl_dataset *one = wall_of_two(2, lean, 1, false);
         struct spl_frame a = draw(renderer, over, &view), b = draw(renderer, meet, &view);
         struct spl_frame c = draw(renderer, one, &view);
         assert_int_equal(b.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
@@ -444,6 +445,26 @@ static void neighbours_do_not_add_up(void **state)
     }
 }
 
+/* Of chunks that the solid hides nothing is drawn, nor what others left where they are counted. */
+static void what_is_hidden_leaves_nothing(void **state)
+{
+    (void)state;
+    struct spl_view view = looking(origin, 3, 160, 120);
+    const double eye[3] = {0.2, -1.5, -0.8}, target[3] = {0.2, 0, -0.8}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    view.lod = 0;
+    view.camera.far = 2;
+    struct spl_dataset *bare = wall_of_two(0, 0, 2, false), *covered = wall_of_two(0, 0, 2, true);
+    soften(&view, 1, -0.6, 0.3);
+    struct spl_frame seen = draw(renderer, bare, &view), hidden = draw(renderer, covered, &view);
+    assert_int_equal(seen.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
+    assert_int_equal(hidden.stats.soft_drawn, 0);
+    spl_frame_finish(&seen);
+    spl_frame_finish(&hidden);
+    done(bare);
+    done(covered);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
@@ -451,7 +472,7 @@ int main(int argc, char **argv)
         frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference),
         frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
-        frames_test(neighbours_do_not_add_up),
+        frames_test(neighbours_do_not_add_up), frames_test(what_is_hidden_leaves_nothing),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }

@@ -73,6 +73,8 @@ static struct spl_soft_counted sum_slots(const struct spl_soft_gathering *from)
     for (uint32_t i = 0; i < from->slots; i++, words += SPL_SOFT_SLOT_WORDS) {
         const uint32_t most = words[0] >> 4 & 0x7ff;
         firsts[i] = (uint32_t)sum.items;
+        if (!words[0])
+            continue;
         sum.items += words[0] & 15;
         sum.entries += words[0] >> 16;
         sum.most = larger(sum.most, most);
@@ -89,6 +91,10 @@ int spl_soft_count(const struct spl_soft_gathering *from, const struct spl_soft_
                    struct spl_soft_counted *sum, struct spl_error *err)
 {
     const struct spl_soft_step step = window_step(from, window);
+    /* of chunks that are hidden nothing is counted: what another tile left there would be drawn */
+    spl_gpu_fill(from->order->gpu, from->order->memory->buffers[SPL_SOFT_SLOTS], 0,
+                 (uint64_t)from->slots * SPL_SOFT_SLOT_WORDS * sizeof(uint32_t), 0);
+    spl_gpu_barrier(from->order->gpu);
     int rc = gather(from, COUNT_SLOTS, &step, err);
     rc = rc ? rc : spl_soft_run(from->order, err);
     if (!rc)
