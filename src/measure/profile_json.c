@@ -188,7 +188,7 @@ static int read_soft(const json_t *root, const char *name, struct spl_soft_param
         return 0;
     soft->opacity = json_number_value(json_object_get(json, "opacity"));
     soft->blend = json_number_value(json_object_get(json, "blend"));
-    soft->cover = json_is_number(cover) ? json_number_value(cover) : 1; /* profiles that were written before have none */
+    soft->cover = json_is_number(cover) ? json_number_value(cover) : 1; /* older profiles have none */
     if (!terms || !json_is_number(json_object_get(json, "opacity")) || !json_is_number(json_object_get(json, "blend")))
         return spl_fail_field(err, SPL_E_INPUT, "soft",
                               "%s: 'soft' needs a text 'terms', numbers 'opacity' and 'blend'", name);
