@@ -32,13 +32,16 @@ uint found_word(uint at, int word)
     return imageLoad(found_texels, int(SPL_SOFT_FOUND_WORDS * at) + word).x;
 }
 
-/* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. */
+/* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. Both are
+ * scaled: what lies behind is hidden by soft_cover (map_near) at most. */
 vec4 soft_over(uint at)
 {
     int word = int(SPL_SOFT_STATE_WORDS * at);
     vec4 state = vec4(imageLoad(soft_texels, word).x, imageLoad(soft_texels, word + 1).x,
                       imageLoad(soft_texels, word + 2).x, imageLoad(soft_texels, word + 3).x);
-    return state * (1.0 / float(SPL_SOFT_CLEAR));
+    precise vec4 over = state * (1.0 / float(SPL_SOFT_CLEAR));
+    precise vec4 scaled = over * frame.map_near;
+    return scaled;
 }
 
 /* Sums have specks; colours that maps were added to are sums of floats. */

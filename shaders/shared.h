@@ -353,7 +353,7 @@ struct spl_frame_params {
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
-    SPL_F32 map_near;                     /* range of code 1 */
+    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };

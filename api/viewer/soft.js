@@ -73,6 +73,9 @@ const percent = (share) => `${(100 * share).toFixed(share > 0 && share < 0.1 ? 1
 
 const short = (x) => `${Number(x.toPrecision(4))}`;
 
+/** What has a slider, and its label. */
+const SLIDERS = {soft_opacity: ["soft-opacity-label", "Strength"], soft_cover: ["soft-cover-label", "Cover"]};
+
 export class Soft extends EventTarget {
   /** Fires "change" when what is read() has changed. The table of methods must be there. */
   constructor() {
@@ -81,7 +84,7 @@ export class Soft extends EventTarget {
     this.params = table.parameters.filter(({soft}) => soft);
     this.of = []; // what speaks of coordinates and layers, where something is soft
     for (const parameter of this.params) {
-      if (parameter.name === "soft_opacity") continue; // has its slider
+      if (SLIDERS[parameter.name]) continue;
       const [label, help, control] = [
         document.createElement("label"),
         document.createElement("small"),
@@ -130,7 +133,7 @@ export class Soft extends EventTarget {
         control = $(`control-${name}`),
         text = wanted[name] === undefined || wanted[name] === usual ? "" : wanted[name];
       if (control instanceof HTMLSelectElement) choose(control, text);
-      else control.value = name === "soft_opacity" ? (wanted[name] ?? usual) : text;
+      else control.value = SLIDERS[name] ? (wanted[name] ?? usual) : text;
     }
     this.recognise(wanted.soft ?? "");
   }
@@ -193,7 +196,7 @@ export class Soft extends EventTarget {
     for (const name of ["soft-threshold", "soft-threshold-label"]) $(name).hidden = !slider;
     $("soft-histogram").toggleAttribute("hidden", !(slider && attribute)); // SVG has no property of that name
     $("soft-kinds").hidden = !kinds;
-    for (const name of ["control-soft_opacity", "soft-opacity-label"]) $(name).hidden = !what;
+    for (const [name, [label]] of Object.entries(SLIDERS)) $(`control-${name}`).hidden = $(label).hidden = !what;
     for (const element of this.of) element.hidden = !what;
     if (slider) {
       const {low, high} = attribute
@@ -259,7 +262,8 @@ export class Soft extends EventTarget {
       `${$("soft-what").value === ":height" ? "Height" : "Threshold"} ${short(slider.valueAsNumber)}` +
       (below === null ? "" : `: ${percent(above ? 1 - below : below)} soft`);
     slider.setAttribute("aria-valuetext", $("soft-threshold-label").textContent);
-    $("soft-opacity-label").textContent = `Strength ${Number($("control-soft_opacity").value)}`;
+    for (const [name, [label, text]] of Object.entries(SLIDERS))
+      $(label).textContent = `${text} ${Number($(`control-${name}`).value)}`;
     const [low, high] = [Number(slider.min), Number(slider.max)];
     $("soft-histogram")
       .querySelectorAll("rect")

@@ -101,6 +101,8 @@ enum spl_param_changes {
            "layer: the first sphere alone, for comparison")                                                            \
     REAL(soft_opacity, soft.opacity, 0, 1, 0.3, SPL_CHANGES_SOFT,                                                      \
          "of a soft sphere at its centre; 0: what is soft is not drawn")                                               \
+    REAL(soft_cover, soft.cover, 0, 1, 1, SPL_CHANGES_SOFT,                                                            \
+         "share of what soft spheres hide together; less than 1: however dense, they never hide all of what is solid") \
     REAL(soft_blend, soft.blend, 0, 1e9, 0, SPL_CHANGES_SOFT,                                                          \
          "how far beyond the ends of a term spheres are still partly solid, in what it measures; 0: a sharp border")  \
     CHOICE(of, soft.of, soft_of, SPL_SOFT_OF_SOLID, SPL_CHANGES_SOFT,                                                  \
@@ -116,8 +118,8 @@ enum spl_method_param {
 #define SPL_PARAM_BIT(name) (1u << SPL_PARAM_##name)
 /* Those that every method takes: its row names them as well. */
 #define SPL_PARAMS_OF_ALL                                                                                              \
-    (SPL_PARAM_BIT(soft_model) | SPL_PARAM_BIT(soft_opacity) | SPL_PARAM_BIT(soft_blend) |        \
-     SPL_PARAM_BIT(of))
+    (SPL_PARAM_BIT(soft_model) | SPL_PARAM_BIT(soft_opacity) | SPL_PARAM_BIT(soft_cover) |                             \
+     SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(of))
 
 enum spl_param_kind { SPL_PARAM_REAL, SPL_PARAM_WHOLE, SPL_PARAM_CHOICE };
 

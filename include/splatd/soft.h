@@ -63,6 +63,8 @@ struct spl_soft_params {
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
                        at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border. Classes have none */
     enum spl_soft_of of; /* depth of a sphere is that of its centre; the rest is its splat's */
+    double cover;        /* share, 0 (nothing of it is seen) to 1, by which what the spheres of a sample hold back
+                            together, and their colour, is scaled: the most that they ever hide of what is solid */
 };
 
 /* Reads terms, joined by " or ", and appends them to `out`:
@@ -77,7 +79,7 @@ SPL_API int spl_soft_parse(const char *text, struct spl_soft_params *out, struct
  * spl_soft_check() is never longer than SPL_SOFT_TEXT_MAX. */
 SPL_API int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes);
 
-/* Are terms, model, opacity, blend and of in range? SPL_E_USAGE names the field. */
+/* Are terms, model, opacity, blend, of and cover in range? SPL_E_USAGE names the field. */
 SPL_API int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err);
 
 SPL_END_DECLARATIONS

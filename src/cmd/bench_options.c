@@ -201,6 +201,8 @@ static const struct spl_cmd_option options[] = {
     {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express", .take = take_soft_models},
     {"soft-opacity", "X", "of a soft sphere at its centre", .fallback = "0.3",
      SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.opacity, 0, 1)},
+    {"soft-cover", "X", "share of what soft spheres hide together", .fallback = "1",
+     SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.cover, 0, 1)},
     {"soft-blend", "X", "how far beyond the ends of a term spheres are partly solid", .fallback = "0",
      SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.blend, 0, 1e9)},
     {"memory-limit", "MIB", "device memory, or 2G and such; less than the dataset needs measures paging",
@@ -311,7 +313,7 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
                         "own render");
     if (!a->soft_model_count)
         a->soft_models[a->soft_model_count++] = SPL_SOFT_MODEL_EXPRESS;
-    a->softs[0] = (struct spl_soft_params){.opacity = a->soft.opacity};
+    a->softs[0] = (struct spl_soft_params){.opacity = a->soft.opacity, .cover = a->soft.cover};
     a->bench.softs = a->softs;
     a->sweep.softs = a->softs;
     a->bench.soft_count = 1;

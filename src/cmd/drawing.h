@@ -50,6 +50,7 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
         {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \
         {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
+        {"soft-cover", "X", NULL, .take = spl_cmd_take_param},                                                         \
         {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \
         SPL_METHOD_PARAMS(SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW)                                     \
         {"method", "NAME", NULL, .take = spl_cmd_take_method}

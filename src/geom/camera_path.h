@@ -12,7 +12,7 @@
 enum { SPL_CAMERA_PATH_MAX = 100000 }; /* cameras */
 
 /* What may change along a path beside the camera: numbers that a key may say. */
-enum { SPL_PATH_VALUES = 2 };
+enum { SPL_PATH_VALUES = 3 };
 struct spl_path_value {
     const char *name;
     double least, most;

@@ -181,13 +181,14 @@ static int read_soft_model(const json_t *object, const struct spl_profile *profi
 /* What is soft where points have a model; left out where none has. */
 static int read_soft(const json_t *root, const char *name, struct spl_soft_params *soft, struct spl_error *err)
 {
-    const json_t *json = json_object_get(root, "soft");
+    const json_t *json = json_object_get(root, "soft"), *cover = json_object_get(json, "cover");
     const char *terms = json_string_value(json_object_get(json, "terms"));
     struct spl_error why = {0};
     if (!json)
         return 0;
     soft->opacity = json_number_value(json_object_get(json, "opacity"));
     soft->blend = json_number_value(json_object_get(json, "blend"));
+    soft->cover = json_is_number(cover) ? json_number_value(cover) : 1; /* older profiles have none */
     if (!terms || !json_is_number(json_object_get(json, "opacity")) || !json_is_number(json_object_get(json, "blend")))
         return spl_fail_field(err, SPL_E_INPUT, "soft",
                               "%s: 'soft' needs a text 'terms', numbers 'opacity' and 'blend'", name);
@@ -388,7 +389,8 @@ static json_t *soft_to_json(const struct spl_soft_params *soft)
     if (!soft->count)
         return NULL;
     spl_soft_print(soft, terms, sizeof terms);
-    return json_pack("{s:s, s:f, s:f}", "terms", terms, "opacity", soft->opacity, "blend", soft->blend);
+    return json_pack("{s:s, s:f, s:f, s:f}", "terms", terms, "opacity", soft->opacity, "cover", soft->cover, "blend",
+                     soft->blend);
 }
 
 json_t *spl_profile_to_json(const struct spl_profile *profile)

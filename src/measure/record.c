@@ -171,8 +171,8 @@ static json_t *plan_soft(const struct spl_soft_params *soft)
     if (!soft)
         return NULL;
     spl_soft_print(soft, terms, sizeof terms);
-    return json_pack("{s:s, s:s, s:f, s:f}", "terms", terms, "model", spl_soft_model_name(soft->model), "opacity",
-                     soft->opacity, "blend", soft->blend);
+    return json_pack("{s:s, s:s, s:f, s:f, s:f}", "terms", terms, "model", spl_soft_model_name(soft->model), "opacity",
+                     soft->opacity, "cover", soft->cover, "blend", soft->blend);
 }
 
 json_t *spl_record_plan(const struct spl_sweep *sweep, uint64_t reference_hash, struct spl_error *err)

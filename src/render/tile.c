@@ -294,6 +294,7 @@ int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint3
     struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
+    params.map_near = (float)tile->view->soft.cover; /* no other word of its slot is free */
     return spl_tile_dispatch_items(tile, &key, &params, tile->width * tile->height, err);
 }
 

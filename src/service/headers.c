@@ -97,8 +97,10 @@ static void add_soft(struct spl_headers *headers, const struct spl_soft_params *
         used += (size_t)snprintf(terms + used, sizeof terms - used, "%s\"%s\"", i ? "," : "", text);
     }
     spl_headers_add(headers, "Splatd-Soft",
-                    "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%.17g,\"soft_blend\":%.17g,\"of\":\"%s\"}",
-                    terms, spl_soft_model_name(soft->model), soft->opacity, soft->blend, spl_soft_of_name(soft->of));
+                    "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%.17g,\"soft_cover\":%.17g,"
+                    "\"soft_blend\":%.17g,\"of\":\"%s\"}",
+                    terms, spl_soft_model_name(soft->model), soft->opacity, soft->cover, soft->blend,
+                    spl_soft_of_name(soft->of));
 }
 
 void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_request *request,

@@ -10,8 +10,8 @@ with splats, found by false position, in one of two meanings:
   contrast   mean |image - image without the crown| over the crown's pixels;
   detail     how much of the crown's own detail there is: of what the crown adds to the exact image, and of what it adds to the image
              (luma, each less its blurred self), the second's regression on the first. An even veil has none.
-`base` has the strength that was found for `express`. `capped` is no setting that there is, but what one would give: express at DENSE,
-of which the strength is the share that spheres hold back together at most.
+`base` has the strength that was found for `express`. `capped` is express with soft_opacity DENSE, of which the strength is soft_cover: the
+share that spheres hold back together at most.
 The crown's pixels: at least half of each is covered by it, it is in front of what else is there, and behind it is no sky.
 PSNR and SSIM (api/measures.md) over those alone; `behind` against the scene without crown, `crown` against the scene as it is.
 OUT keeps scans, truth, datasets and pictures (PNG: exact, each way, left out, exact without; JPEG: splat, layer, express, left out);
@@ -234,11 +234,11 @@ class Place:
     def draw(self, model, opacity):
         if model == "first":
             return np.round(opacity * self.solid + (1 - opacity) * self.second)
-        if model == "capped":
-            return np.round(opacity * self.draw("express", DENSE) + (1 - opacity) * self.bare)
         key = (model, opacity)
         if key not in self.kept:
-            soft = {"soft": "class:5", "soft_model": model, "soft_opacity": repr(opacity)} if model else {}
+            how = ({"soft_opacity": DENSE, "soft_cover": repr(opacity)} if model == "capped" else
+                   {"soft_model": model, "soft_opacity": repr(opacity)})
+            soft = {"soft": "class:5", **how} if model else {}
             self.kept[key] = self.send(self.scene, **self.camera, background="%02x%02x%02x" % SKY, **soft)[..., :3]
         return self.kept[key]
 

@@ -779,6 +779,10 @@ def test_what_is_soft():
         tab.run("document.querySelector('#control-soft_opacity').focus()")
         tab.key("ArrowRight")
         assert next_link(tab, lambda now: "soft_opacity" in now)["soft_opacity"] == "0.31"
+        tab.run("document.querySelector('#control-soft_cover').focus()")
+        tab.key("ArrowLeft")
+        assert next_link(tab, lambda now: "soft_cover" in now)["soft_cover"] == "0.99"
+        assert tab.text("#soft-cover-label") == "Cover 0.99"
         tab.choose("#control-soft_model", "layer")
         next_link(tab, lambda now: now.get("soft_model") == "layer")
         assert tab.text("label[for=control-of]") == "Picks and layers of"

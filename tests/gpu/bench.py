@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory() as folder:
     table = must(*compared)
     report = json.loads((folder / "compared/bench.json").read_text())
     profile = json.loads((folder / "a.profile.json").read_text())
-    assert report["soft"] == profile["soft"] == {"terms": f"{soft[1]} or {soft[3]}", "opacity": 0.3, "blend": 0}, report["soft"]
+    assert report["soft"] == profile["soft"] == {"terms": f"{soft[1]} or {soft[3]}", "opacity": 0.3, "cover": 1, "blend": 0}, report["soft"]
     assert profile["format_version"] == 2
     for points in (report["points"], profile["points"]):
         assert [p.get("soft_model") for p in points] == [None, "base", "express"], points

@@ -158,6 +158,65 @@ static void soft_lies_over_the_solid(void **state)
     done(dataset);
 }
 
+/* soft_cover mixes what is drawn with what is solid alone, in colour, coverage and alpha, and changes nothing else. */
+static void no_crowd_hides_more_than_the_cover(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(6000, origin, 0.08);
+    struct spl_renderer_options options = {.size = sizeof options, .device = "egl"};
+    struct spl_renderer *other = NULL;
+    if (spl_renderer_create(&options, &other, NULL) == SPL_OK)
+        assert_int_equal(spl_renderer_add(other, dataset, NULL), SPL_OK);
+    for (int i = 0; i < 4; i++) {
+        const double covers[] = {0, 0.3, 0.7, 1}, cover = covers[i];
+        struct spl_view view = looking(origin, 3, 101, 75);
+        view.supersample = i % 2 ? 2 : 1;
+        view.background[3] = i < 2 ? 255 : 0;
+        soften(&view, 1, 0, 0);
+        view.soft.model = i != 2 ? SPL_SOFT_MODEL_EXPRESS : SPL_SOFT_MODEL_LAYER;
+        view.soft.of = SPL_SOFT_OF_MEDIAN;
+        struct spl_frame none = draw(renderer, dataset, &view);
+        view.soft.opacity = 0.6;
+        struct spl_frame all = draw(renderer, dataset, &view);
+        view.soft.cover = cover;
+        struct spl_frame part = draw(renderer, dataset, &view);
+        if (other) {
+            struct spl_frame second = draw(other, dataset, &view);
+            assert_true(worst_level(&part, &second) <= 1);
+            spl_frame_finish(&second);
+        }
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+            const struct spl_image *x = &all.images[layer], *y = &part.images[layer];
+            if (cover == 1 || (layer != SPL_LAYER_COLOR && layer != SPL_LAYER_COVERAGE))
+                assert_memory_equal(x->pixels, y->pixels, (size_t)x->width * x->height * spl_pixel_bytes(x->type));
+        }
+        const struct spl_frame *frames[3] = {&none, &all, &part};
+        size_t dense = 0;
+        for (size_t p = 0; p < 101 * 75; p++) {
+            double coverage[3], color[3][4];
+            for (int f = 0; f < 3; f++) {
+                const uint8_t *rgba = (const uint8_t *)frames[f]->images[SPL_LAYER_COLOR].pixels + 4 * p;
+                coverage[f] = (double)((const float *)frames[f]->images[SPL_LAYER_COVERAGE].pixels)[p];
+                for (int c = 0; c < 4; c++)
+                    color[f][c] = rgba[c] * (c < 3 ? rgba[3] / 255.0 : 1);
+            }
+            assert_true(fabs(coverage[2] - cover * coverage[1] - (1 - cover) * coverage[0]) < 1e-5);
+            for (int c = 0; c < 4; c++) /* all three are rounded, colour by alpha twice */
+                assert_true(fabs(color[2][c] - cover * color[1][c] - (1 - cover) * color[0][c]) <= (c < 3 ? 2.01 : 1.01));
+            dense += coverage[0] == 0 && coverage[1] > 0.99;
+        }
+        assert_true(dense > 25 || i == 2); /* of which 1 - cover is seen through */
+        spl_frame_finish(&none);
+        spl_frame_finish(&all);
+        spl_frame_finish(&part);
+    }
+    if (other) {
+        spl_renderer_remove(other, dataset);
+        spl_renderer_destroy(other);
+    }
+    done(dataset);
+}
+
 /* Levels by which a frame of black background is off at most. */
 static double off_by(const struct spl_frame *frame, const struct spl_view *view, const struct soft_sphere *spheres,
                      size_t count)
@@ -408,7 +467,7 @@ static struct spl_dataset *wall_of_two(int reach, double lean, int levels, bool 
                     memcpy(panels[m][p].color[y][x], (uint8_t[]){220, (uint8_t)(90 * m), 40}, 3);
             }
     }
-    corners[8] = (struct make_splat){.position = {0.2, -1, -0.8}, .normal = {0, -1, 0}, .radius = 1.5f};
+    corners[8] = (struct make_splat){.position = {0.2, 1.9, -0.8}, .normal = {0, 1, 0}, .radius = 1.5f};
     struct spl_dataset *dataset = make_dataset_panels(corners, covered ? 9 : 8, made, 2, levels);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     return dataset;
@@ -450,12 +509,13 @@ static void what_is_hidden_leaves_nothing(void **state)
 {
     (void)state;
     struct spl_view view = looking(origin, 3, 160, 120);
-    const double eye[3] = {0.2, -1.5, -0.8}, target[3] = {0.2, 0, -0.8}, up[3] = {0, 0, 1};
+    const double eye[3] = {0.2, 3, -0.8}, target[3] = {0.2, 0, -0.8}, up[3] = {0, 0, 1};
     assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
     view.lod = 0;
-    view.camera.far = 2;
+    view.camera.far = 4; // not the corners
     struct spl_dataset *bare = wall_of_two(0, 0, 2, false), *covered = wall_of_two(0, 0, 2, true);
-    soften(&view, 1, -0.6, 0.3);
+    soften(&view, 0, -0.6, 0.3);
+    view.soft.terms[0].shape[4] = -1; // y < 0.6
     struct spl_frame seen = draw(renderer, bare, &view), hidden = draw(renderer, covered, &view);
     assert_int_equal(seen.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
     assert_int_equal(hidden.stats.soft_drawn, 0);
@@ -469,8 +529,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(windows_change_no_byte), frames_test(tiles_leave_no_seams), frames_test(backends_agree),
-        frames_test(soft_lies_over_the_solid), frames_test(models_match_the_reference),
-        frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
+        frames_test(soft_lies_over_the_solid), frames_test(no_crowd_hides_more_than_the_cover),
+        frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
         frames_test(neighbours_do_not_add_up), frames_test(what_is_hidden_leaves_nothing),
     };

@@ -28,7 +28,8 @@ QUERIES = [
     ("soft=plane:0,0,0,0,0,1", "soft"), ("soft=uncertainty>1%20and%20class:3", "soft"), ("soft=%3e", "soft"), ("soft=%zz", "soft"),
     ("soft=uncertainty>" + "1" * 5000, "soft"), ("soft=uncertainty>1&soft=x", "soft"), ("soft", "soft"),
     ("soft_model=exact", "soft_model"), ("soft_model=", "soft_model"), ("soft_opacity=2", "soft_opacity"), ("soft_opacity=-0.1", "soft_opacity"),
-    ("soft_opacity=nan", "soft_opacity"), ("soft_blend=-1", "soft_blend"), ("soft_blend=2e9", "soft_blend"), ("soft_of=first", "soft_of"),
+    ("soft_opacity=nan", "soft_opacity"), ("soft_cover=1.5", "soft_cover"), ("soft_cover=-0.1", "soft_cover"),
+    ("soft_cover=nan", "soft_cover"), ("soft_cover=", "soft_cover"), ("soft_blend=-1", "soft_blend"), ("soft_blend=2e9", "soft_blend"), ("soft_of=first", "soft_of"),
     ("of=second", "of"), ("of=", "of"), ("of=FIRST", "of"), ("of=1", "of"), ("of=first&of=median", "of"), ("of", "of"), ("soft=class:3&of=both", "of"),
     ("budget=0", "budget"), ("budget=-5", "budget"), ("budget=fast", "budget"), ("budget=5m", "budget"),
     ("budget=", "budget"), ("budget=1e3", "budget"), ("budget=nan", "budget"), ("budget=601s", "budget"),
@@ -57,7 +58,7 @@ BODIES = [
     ('{"soft":5}', "soft"), ('{"soft":""}', "soft"), ('{"soft":["uncertainty>1",2]}', "soft"), ('{"soft":[""]}', "soft"),
     ('{"soft":[["uncertainty>1"]]}', "soft"), ('{"soft":["nothing>1"]}', "soft"), ('{"camera":{"soft":"uncertainty>1"}}', "soft"),
     ('{"soft":{"uncertainty":1}}', "soft"), ('{"soft_opacity":"0.5"}', "soft_opacity"), ('{"soft_model":0}', "soft_model"),
-    ('{"soft_blend":[1]}', "soft_blend"), ('{"of":1}', "of"), ('{"of":"none"}', "of"), ('{"of":["first"]}', "of"), ('{"camera":{"of":"first"}}', "of"), ('{"soft":"uncertainty>\\u00fc"}', "soft"),
+    ('{"soft_cover":"1"}', "soft_cover"), ('{"soft_cover":2}', "soft_cover"), ('{"soft_blend":[1]}', "soft_blend"), ('{"of":1}', "of"), ('{"of":"none"}', "of"), ('{"of":["first"]}', "of"), ('{"camera":{"of":"first"}}', "of"), ('{"soft":"uncertainty>\\u00fc"}', "soft"),
     ('{"budget":0}', "budget"), ('{"budget":"0ms"}', "budget"), ('{"budget":[5]}', "budget"),
     ('{"budget":true}', "budget"), ('{"psnr":"38"}', "psnr"), ('{"camera":{"psnr":38}}', "psnr"), ("[" * 100000, "body"),
 ]

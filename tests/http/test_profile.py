@@ -152,7 +152,7 @@ def test_a_profile_says_what_soft_models_cost():
     what = {"terms": "axis:0,0,0,0,0,1<0.5", "opacity": 0.3, "blend": 0}
     with serving(profile(VERSION, format_version=2, points=points, soft=what)) as (d, _):
         served = d.ask(PROFILE).json()
-        assert served["soft"] == what and served["format_version"] == 2
+        assert served["soft"] == {**what, "cover": 1} and served["format_version"] == 2
         assert [p.get("soft_model") for p in served["points"]] == [None] * 6 + ["express", "base"] * 3
         assert [p["front"] for p in served["points"]][:6] == [True, False, True, True, True, True]  # as without them
         texts = [e.text for e in xml.etree.ElementTree.fromstring(d.ask(PROFILE + "?format=svg").body).iter()

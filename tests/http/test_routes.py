@@ -69,7 +69,7 @@ def test_datasets_are_described():
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
 
-SOFT = ["soft_model", "soft_opacity", "soft_blend", "of"]
+SOFT = ["soft_model", "soft_opacity", "soft_cover", "soft_blend", "of"]
 
 
 def test_methods_are_those_of_the_document():

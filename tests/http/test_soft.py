@@ -17,7 +17,8 @@ def soft(reply):
 def test_what_is_soft_comes_back():
     with Daemon(REAL) as d:
         query = f"width=16&height=16&soft=0.25%3Cclass&soft={AXIS}&soft_opacity=0.5&soft_model=concentric"
-        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5, "soft_blend": 0, "of": "solid"}
+        whole = {"soft": ["class>0.25", AXIS], "soft_model": "concentric", "soft_opacity": 0.5,
+                 "soft_cover": 1, "soft_blend": 0, "of": "solid"}
         first = d.ask(f"{VIEW}?{query}")
         assert first.status == 200 and soft(first) == whole, first.headers
         assert soft(d.ask(f"{VIEW}?{query}", "HEAD")) == whole
@@ -25,8 +26,8 @@ def test_what_is_soft_comes_back():
         assert again.headers["Splatd-Cache"] == "hit" and soft(again) == whole
         pick = d.ask(f"{PICK}?x=8&y=8&{query}")
         assert pick.status == 200 and soft(pick) == whole
-        asked = {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.75, "soft_blend": 0.5, "of": "median"}
-        assert soft(d.ask(f"{PICK}?x=8&y=8&soft={AXIS}&soft_model=base&soft_opacity=0.75&soft_blend=0.5&of=median")) == asked
+        asked = {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.75, "soft_cover": 0.25, "soft_blend": 0.5, "of": "median"}
+        assert soft(d.ask(f"{PICK}?x=8&y=8&soft={AXIS}&soft_model=base&soft_opacity=0.75&soft_cover=0.25&soft_blend=0.5&of=median")) == asked
         assert soft(d.post({"x": 8, "y": 8, **asked}, PICK)) == asked
         for text in ["class>3", "class:*", "plane:0,0,1,0,0,1>=0", "box:-1,-1,-1,1,1,1", AXIS + " or " + AXIS]:
             reply = d.post({"width": 8, "height": 8, "soft": text, "soft_blend": 0.1, "soft_model": "layer"})
@@ -73,7 +74,8 @@ def test_a_budget_leaves_it_alone():
     with Daemon(FAKE) as d:
         reply = d.ask(f"{VIEW}?width=16&height=16&budget=500ms&soft={AXIS}&soft_opacity=0.9&soft_model=base")
         assert reply.status == 200 and reply.headers["Splatd-Chosen"], reply.headers
-        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_blend": 0, "of": "solid"}
+        assert soft(reply) == {"soft": [AXIS], "soft_model": "base", "soft_opacity": 0.9, "soft_cover": 1,
+                               "soft_blend": 0, "of": "solid"}
 
 
 def test_a_device_that_is_lost_among_soft_spheres():
@@ -108,8 +110,8 @@ def test_it_counts_where_something_is_soft():
     with Daemon(REAL) as d:
         def tag(query):
             return d.ask(f"{VIEW}?width=16&height=16&{query}", "HEAD").headers["ETag"]
-        assert tag("soft_opacity=0.9&soft_model=layer&of=first") == tag("")
-        tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_model=base",
+        assert tag("soft_opacity=0.9&soft_cover=0.5&soft_model=layer&of=first") == tag("")
+        tags = [tag(query) for query in ("", f"soft={AXIS}", f"soft={AXIS}&soft_opacity=0.9", f"soft={AXIS}&soft_cover=0.5", f"soft={AXIS}&soft_model=base",
                                          f"soft={AXIS}&method=points", f"layer=id&soft={AXIS}", f"layer=id&soft={AXIS}&of=first",
                                          f"layer=id&soft={AXIS}&of=median", "soft=class>0.5")]
         assert len(set(tags)) == len(tags), tags

@@ -200,10 +200,10 @@ def test_what_is_soft_fades_between_keyframes():
     """Each frame is the view with the strength that lies between its keys'."""
     soft = {"soft": "plane:0,0,1,0,0,1>0", **SMALL}
     with Folder() as folder, Daemon(REAL, "--tours", str(folder)) as d:
-        uri = begin(d, {"path": {"keyframes": [look(3, soft_opacity=1), look(3, soft_opacity=0)]}, "frames": 5,
+        uri = begin(d, {"path": {"keyframes": [look(3, soft_opacity=1), look(3, soft_opacity=0, soft_cover=0.5)]}, "frames": 5,
                         "settings": soft})["uri"]
         for frame, opacity in zip(frames_of(d, ended(d, uri)), (1, 0.75, 0.5, 0.25, 0)):
-            assert d.post({**look(3), **soft, "soft_opacity": opacity}).body == frame, opacity
+            assert d.post({**look(3), **soft, "soft_opacity": opacity, "soft_cover": 0.5}).body == frame, opacity
 
 
 def test_every_format_and_member_is_taken():
@@ -259,6 +259,7 @@ def test_bad_tours_are_refused_by_field():
         ({"path": {"keyframes": [look(3), look(4, soft_opacity=1.5)]}}, "keyframes[1].soft_opacity"),
         ({"path": {"keyframes": [look(3, soft_opacity="0.5")]}}, "keyframes[0].soft_opacity"),
         ({"path": {"keyframes": [look(3, soft_blend=-1)]}}, "keyframes[0].soft_blend"),
+        ({"path": {"keyframes": [look(3, soft_cover=2)]}}, "keyframes[0].soft_cover"),
         ({"path": {"keyframes": [look(3, soft="uncertainty>1")]}}, "keyframes[0].soft"),
         ({"path": {"keyframes": [look(3)]}, "settings": {"soft": "uncertainty"}}, "settings.soft"),
         ({"path": {"keyframes": [look(3)]}, "settings": {"soft_model": "exact"}}, "settings.soft_model"),

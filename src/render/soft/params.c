@@ -101,6 +101,8 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
     if (!(soft->opacity >= 0 && soft->opacity <= 1))
         return spl_fail_field(err, SPL_E_USAGE, "soft_opacity", "soft_opacity %g is not within 0 and 1",
                               soft->opacity);
+    if (!(soft->cover >= 0 && soft->cover <= 1))
+        return spl_fail_field(err, SPL_E_USAGE, "soft_cover", "soft_cover %g is not within 0 and 1", soft->cover);
     if (!(soft->blend >= 0 && isfinite(soft->blend)))
         return spl_fail_field(err, SPL_E_USAGE, "soft_blend", "soft_blend %g is not 0 or more", soft->blend);
     if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)

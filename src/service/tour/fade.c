@@ -1,4 +1,4 @@
-/* soft_opacity and soft_blend along a path. Their ranges are those of the methods' table, so that every frame's view has
+/* soft_opacity, soft_cover and soft_blend along a path. Their ranges are those of the methods' table, so that every frame's view has
  * passed what spl_view_check() asks of them. Pure functions, any thread. */
 #include "service/tour/fade.h"
 
@@ -7,7 +7,8 @@
 
 #include "base/memory.h"
 
-static const enum spl_method_param params[SPL_PATH_VALUES] = {SPL_PARAM_soft_opacity, SPL_PARAM_soft_blend};
+static const enum spl_method_param params[SPL_PATH_VALUES] = {SPL_PARAM_soft_opacity, SPL_PARAM_soft_cover,
+                                                                SPL_PARAM_soft_blend};
 
 void spl_fade_get_values(struct spl_path_value values[SPL_PATH_VALUES])
 {

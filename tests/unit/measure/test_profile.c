@@ -322,7 +322,8 @@ static void test_soft(void **state)
     struct spl_profile *both[] = {&profile, &again};
     for (int i = 0; i < 2; i++) {
         const struct spl_profile_point *p = both[i]->points;
-        assert_true(both[i]->count == 3 && both[i]->soft.count == 1 && both[i]->soft.blend == 0.5);
+        assert_true(both[i]->count == 3 && both[i]->soft.count == 1 && both[i]->soft.blend == 0.5 &&
+                    both[i]->soft.cover == 1); /* which the text does not say */
         assert_string_equal(both[i]->soft.terms[0].name, "class");
         assert_true(!p[0].setting.soft && isnan(p[0].soft_ms) && p[1].soft_ms == 20);
         assert_string_equal(spl_setting_soft_name(p[1].setting.soft), "express");

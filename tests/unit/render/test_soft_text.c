@@ -147,6 +147,26 @@ static void test_sixteen_of_the_longest_fit(void **state)
     assert_int_equal(spl_soft_parse("class:1", &soft, NULL), SPL_E_LIMIT);
 }
 
+static void test_ranges_are_checked(void **state)
+{
+    (void)state;
+    static const struct {
+        double opacity, cover, blend;
+        const char *field; /* NULL = all is well */
+    } cases[] = {
+        {0, 0, 0, NULL}, {1, 1, 1e9, NULL}, {0.3, 0.5, 0, NULL}, {1.1, 1, 0, "soft_opacity"}, {NAN, 1, 0, "soft_opacity"},
+        {0.3, 1.001, 0, "soft_cover"}, {0.3, -0.001, 0, "soft_cover"}, {0.3, NAN, 0, "soft_cover"},
+        {0.3, INFINITY, 0, "soft_cover"}, {0.3, 1, -1, "soft_blend"}, {0.3, 1, INFINITY, "soft_blend"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_soft_params soft = {.opacity = cases[i].opacity, .cover = cases[i].cover, .blend = cases[i].blend};
+        struct spl_error err = {0};
+        assert_int_equal(spl_soft_check(&soft, &err), cases[i].field ? SPL_E_USAGE : SPL_OK);
+        if (cases[i].field)
+            assert_string_equal(err.field, cases[i].field);
+    }
+}
+
 static void test_what_is_wrong_is_named(void **state)
 {
     (void)state;
@@ -227,6 +247,7 @@ int main(void)
         cmocka_unit_test(test_lists_and_or_add_terms),
         cmocka_unit_test(test_what_is_printed_reads_as_the_same),
         cmocka_unit_test(test_sixteen_of_the_longest_fit),
+        cmocka_unit_test(test_ranges_are_checked),
         cmocka_unit_test(test_what_is_wrong_is_named),
         cmocka_unit_test(test_there_are_bounds),
     };

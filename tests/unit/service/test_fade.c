@@ -89,11 +89,11 @@ static void what_no_key_says_is_of_the_settings(void **state)
     struct spl_error err;
     expect("{\"keyframes\":[" KEY(0, "") "," KEY(1, "") "]}", ",\"frames\":2", (double[]){0.3, 0.3});
     expect("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2") "," KEY(1, "") "]}", ",\"frames\":2", (double[]){0.3, 0.3});
-    assert_int_equal(read_spec("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2") "," KEY(1, ",\"soft_blend\":4") "]}",
+    assert_int_equal(read_spec("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2,\"soft_cover\":1") "," KEY(1, ",\"soft_blend\":4,\"soft_cover\":0.5") "]}",
                                ",\"frames\":3", &spec, &err), 0);
     struct spl_view view = spec.view.view;
     spl_fade_apply(spec.fades[1], &view);
-    assert_true(view.soft.blend == 3 && view.soft.opacity == 0.3 && view.soft.count == 1);
+    assert_true(view.soft.blend == 3 && view.soft.cover == 0.75 && view.soft.opacity == 0.3 && view.soft.count == 1);
     spl_tour_spec_finish(&spec);
 }
 
@@ -106,6 +106,7 @@ static void what_is_out_of_range_is_named(void **state)
         {"{\"keyframes\":[" KEY(0, "") "," KEY(1, ",\"soft_opacity\":1.5") "]}", "keyframes[1].soft_opacity", "1.5"},
         {"{\"keyframes\":[" KEY(0, ",\"soft_opacity\":-1") "]}", "keyframes[0].soft_opacity", "-1"},
         {"{\"keyframes\":[" KEY(0, ",\"soft_opacity\":\"1\"") "]}", "keyframes[0].soft_opacity", "not text"},
+        {"{\"keyframes\":[" KEY(0, ",\"soft_cover\":1.5") "]}", "keyframes[0].soft_cover", "1.5"},
         {"{\"keyframes\":[" KEY(0, ",\"soft_blend\":null") "]}", "keyframes[0].soft_blend", "not null"},
         {"{\"keyframes\":[" KEY(0, ",\"soft_blend\":1e10") "]}", "keyframes[0].soft_blend", "1e+10"},
         {"{\"keyframes\":[" KEY(0, ",\"soft\":\"u>1\"") "]}", "keyframes[0].soft", "unknown"},

@@ -79,7 +79,7 @@ static void what_means_the_same_has_one_key(void **state)
         {"fx=100&width=64&height=64",
          "{\"camera\":{\"fx\":100,\"fy\":100,\"cx\":32,\"cy\":32},\"width\":64,\"height\":64}"},
         {"eye=5,0,0", "crs=EPSG:4326&eye=5,0,0"},
-        {"", "soft_opacity=0.7&soft_model=base&soft_blend=2&of=first"}, /* nothing is soft */
+        {"", "soft_opacity=0.7&soft_cover=0.5&soft_model=base&soft_blend=2&of=first"}, /* nothing is soft */
         {"", "{\"soft\":[],\"soft_opacity\":0.7}"},
         {"layer=id&soft=u>0.5", "{\"soft\":\"u>0.5\",\"of\":\"solid\",\"layer\":\"id\"}"},
         {"soft=class:3-5,9", "soft=class:3..5&soft=class:9"},
@@ -163,6 +163,7 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
         "soft=class:3&soft=u>0.5", /* the order of terms may count */
         "soft=u>0.5&soft_opacity=0.7",
         "soft=u>0.5&soft_model=base",
+        "soft=u>0.5&soft_cover=0.5",
         "soft=u>0.5&soft_blend=1",
         "layer=depth&soft=u>0.5&of=first",
         "layer=depth&soft=u>0.5&of=median",

@@ -311,6 +311,8 @@ static void queries_are_refused_by_name(void **state)
         {"soft_opacity=1.1", "soft_opacity"},
         {"soft_model=exact", "soft_model"},
         {"soft_blend=-1", "soft_blend"},
+        {"soft_cover=1.1", "soft_cover"},
+        {"soft_cover=-0.5", "soft_cover"},
         {"soft_of=1", "soft_of"},
         {"of=second", "of"},
         {"of=", "of"},

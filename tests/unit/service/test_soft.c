@@ -52,12 +52,12 @@ static void every_way_of_asking_means_the_same(void **state)
 {
     (void)state;
     static const char *const ways[] = {
-        "soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2",
-        "soft=class:3..5&soft_opacity=0.7&soft=uncertainty%3Eq0.9&soft_model=base&soft_blend=2",
-        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
-        "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_blend\":2}",
-        "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_blend=2",
-        ("@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,"
+        "soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_cover=0.25&soft_blend=2",
+        "soft=class:3..5&soft_opacity=0.7&soft_cover=0.25&soft=uncertainty%3Eq0.9&soft_model=base&soft_blend=2",
+        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,\"soft_blend\":2}",
+        "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,\"soft_blend\":2}",
+        "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_cover=0.25&soft_blend=2",
+        ("@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,"
          "\"soft_blend\":2}"),
     };
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
@@ -66,7 +66,7 @@ static void every_way_of_asking_means_the_same(void **state)
         assert_true(soft.terms[0].least == 3 && soft.terms[0].most == 5);
         assert_string_equal(soft.terms[1].name, "uncertainty");
         assert_int_equal(soft.terms[1].measure, SPL_SOFT_QUANTILE);
-        assert_true(soft.model == SPL_SOFT_MODEL_BASE && soft.opacity == 0.7 && soft.blend == 2);
+        assert_true(soft.model == SPL_SOFT_MODEL_BASE && soft.opacity == 0.7 && soft.cover == 0.25 && soft.blend == 2);
     }
 }
 
@@ -76,7 +76,7 @@ static void nothing_is_soft_by_itself(void **state)
     static const char *const ways[] = {"", "{}", "{\"soft\":[]}", "@x=1&y=1"};
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
         struct spl_soft_params soft = soft_asked(ways[i]);
-        assert_true(!soft.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && !soft.blend);
+        assert_true(!soft.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && soft.cover == 1 && !soft.blend);
     }
 }
 
@@ -142,7 +142,7 @@ static void headers_say_what_a_body_would(void **state)
     assert_true(*at);
     at += strlen(at) + 1;
     assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.10000000000000001,"
-                            "\"soft_blend\":0,\"of\":\"solid\"}");
+                            "\"soft_cover\":1,\"soft_blend\":0,\"of\":\"solid\"}");
     struct spl_soft_params again = soft_asked(at);
     assert_memory_equal(again.terms, r.view.soft.terms, sizeof again.terms);
     free(headers.text);
