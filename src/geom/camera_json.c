@@ -123,7 +123,7 @@ static int number_from_json(struct spl_value *value, const json_t *json, const c
     if (!json_is_number(json))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must hold numbers, not %s", name, spl_json_type_name(json));
     if (value->count < SPL_VALUE_NUMBERS)
-        value->n[value->count] = json_number_value(json);
+        value->n[value->count] = json_number_value(json) + 0.0; /* no -0, as in text */
     value->count++;
     return 0;
 }

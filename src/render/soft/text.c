@@ -74,6 +74,7 @@ static bool read_number(struct reader *r, double *out)
     const char *end = spl_decimal_parse(r->at, out);
     if (!end)
         return false;
+    *out += 0.0; /* no -0 */
     r->at = end[-1] == '.' && *end == '.' ? end - 1 : end;
     return true;
 }

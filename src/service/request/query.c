@@ -50,7 +50,7 @@ static int parse_number(const char *text, size_t length, const char *name, bool 
     if (spl_decimal_parse(copy, &number) != copy + length)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is not a number%s", name, copy,
                               several ? "; join them by commas, without blanks" : "");
-    *out = number;
+    *out = number + 0.0; /* no -0: a reply of the one is the other's, too */
     return 0;
 }
 

@@ -102,6 +102,7 @@ static void test_what_is_printed_reads_as_the_same(void **state)
     static const struct {
         const char *text, *printed;
     } cases[] = {
+        {"uncertainty>-0", "uncertainty>0"},
         {"uncertainty>0.4", "uncertainty>0.4"},
         {"uncertainty>=q.9", "uncertainty>=q0.9"},
         {"class:3-5,9", "class:3..5 or class:9"},
