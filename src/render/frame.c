@@ -341,8 +341,10 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
         rc = spl_frame_make_images(job->frame, job->view, err);
     if (!rc)
         rc = draw_tile(tile, err);
-    if (rc == SPL_FRAME_TOO_MUCH)
+    if (rc == SPL_FRAME_TOO_MUCH || (rc == SPL_FRAME_PAUSED && !job->pause.words))
         know_whole(job, tile, count_work(tile));
+    if (rc == SPL_FRAME_PAUSED)
+        add_times(tile, stats);
     if (rc)
         return rc;
     clock = spl_now_ns();

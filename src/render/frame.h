@@ -7,6 +7,7 @@
 #include "base/work.h"
 #include "render/hold.h"
 #include "render/renderer.h"
+#include "render/soft/pause.h"
 #include "render/tiling.h"
 
 /* What is known of a tile that is too much work, for its pieces. */
@@ -28,6 +29,7 @@ struct spl_frame_job {
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
     struct spl_frame_whole whole;
+    struct spl_soft_pause pause;   /* what of the piece is walked */
 };
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */
@@ -45,8 +47,10 @@ int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, 
 /* Renders `tile` into the job's images, which it makes, and adds to its stats. Blocks until it is done;
  * SPL_SLOT_PENDING where it has pages to wait for, and nothing was drawn; SPL_FRAME_TOO_MUCH where it is too much work
  * for a step and may be cut, and nothing was drawn: job->whole is set, and its pieces are to be drawn.
+ * SPL_FRAME_PAUSED where it gave way in the middle: it is to be drawn again, and goes on where job->pause has what was
+ * walked; else it is to be cut.
  * SPL_E_TIMEOUT where the view's deadline had passed before. */
-enum { SPL_FRAME_TOO_MUCH = SPL_SLOT_PENDING + 1 };
+enum { SPL_FRAME_TOO_MUCH = SPL_SLOT_PENDING + 1, SPL_FRAME_PAUSED };
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
 
 /* Milliseconds since *from, which becomes now. */

@@ -60,6 +60,8 @@ struct spl_renderer {
     uint64_t least_piece;      /* samples of a piece, at least */
 };
 
+struct spl_soft_pause;
+
 /* One tile being recorded. */
 struct spl_tile {
     struct spl_renderer *renderer;
@@ -72,6 +74,7 @@ struct spl_tile {
     struct spl_frame_params params;              /* common to all dispatches of the tile, but for map_* */
     struct spl_gpu_buffer *map;                  /* that map_* are of; NULL = none so far */
     const atomic_bool *cancelled;                // may be NULL; borrowed
+    struct spl_soft_pause *pause;                // the frame's
     uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */

@@ -1,9 +1,10 @@
 /* A frame from its first tile to its last, one tile a step, or a piece of one that is too much work for a step.
  *
  * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of the
- * next tile and of the pieces of this one, and the fill plan, which is the whole image's, are all on the host. So frames
- * may take turns, and a tile is the same whatever was drawn before it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for
- * its first pages has none. Belongs to the renderer's thread. */
+ * next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill plan, which
+ * is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was drawn before
+ * it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for its first pages
+ * has none. Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,7 @@
 #include "render/method.h"
 #include "render/pick.h"
 #include "render/readback.h"
+#include "render/turns.h"
 #include "render/view.h"
 
 enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
@@ -36,6 +38,8 @@ struct spl_frame_steps {
     uint32_t row;  /* of `enlarged`, the next */
     uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
     bool prepared; /* its plan is made, for which it may have waited */
+    bool slow;     /* a piece of this tile gave way and was too large to be kept: others are cut before they do */
+    bool paused;   /* the last step gave way in the middle of a piece */
 };
 
 /* The frame that is handed out at the end. */
@@ -186,19 +190,51 @@ void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel
     steps->job.cancelled = spl_cancel_get_flag(cancel);
 }
 
+void spl_frame_set_gives_way(struct spl_frame_steps *steps, spl_frame_gives_way *asked, void *context)
+{
+    steps->job.pause.asked = asked;
+    steps->job.pause.context = context;
+}
+
+bool spl_frame_is_paused(const struct spl_frame_steps *steps)
+{
+    return steps->paused;
+}
+
+/* Until walks of it can be kept, but for what is drawn around it. */
+static void cut_slow(struct spl_frame_steps *steps)
+{
+    const uint64_t side = (uint64_t)steps->view.supersample;
+    for (;;) {
+        const struct spl_piece *next = &steps->pieces.left[steps->pieces.count - 1];
+        if ((uint64_t)next->width * next->height * side * side <= SPL_SOFT_KEPT_SAMPLES / 4 ||
+            !spl_pieces_cut(&steps->pieces))
+            return;
+    }
+}
+
 /* Draws the next piece; what is too much is cut until it is not. */
 static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
 {
     struct spl_frame_job *job = &steps->job;
+    if (steps->slow)
+        cut_slow(steps);
     for (;;) {
         struct spl_tile tile = {.renderer = job->renderer,
                                 .resident = job->resident,
                                 .view = &steps->view,
-                                .cancelled = job->cancelled};
+                                .cancelled = job->cancelled,
+                                .pause = &job->pause};
         spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
         int rc = spl_frame_render_tile(job, &tile, err);
+        steps->paused = rc == SPL_FRAME_PAUSED;
+        if (steps->paused && !job->pause.words) {
+            steps->slow = true;
+            spl_pieces_cut(&steps->pieces);
+        }
         if (rc != SPL_FRAME_TOO_MUCH)
             return rc;
+        spl_soft_pause_drop(&job->pause);
         bool cut = spl_pieces_cut(&steps->pieces);
         spl_assert(cut); // a pixel is never too much
     }
@@ -214,10 +250,11 @@ static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
     const struct spl_piece tile = spl_tiling_get_tile(&job->tiling, camera, steps->x, steps->y);
     if (!steps->pieces.count) {
         job->whole = (struct spl_frame_whole){0};
+        steps->slow = false;
         spl_pieces_begin(&steps->pieces, &tile);
     }
     if ((rc = draw_piece(steps, err)))
-        return rc;
+        return steps->paused ? SPL_OK : rc;
     spl_pieces_remove(&steps->pieces);
     if (steps->pieces.count)
         return SPL_OK;
@@ -275,6 +312,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
 {
     uint64_t clock = spl_now_ns();
     steps->view.deadline_ns = deadline_ns;
+    steps->paused = false;
+    spl_soft_pause_begin(&steps->job.pause);
     int rc = go_on(steps, deadline_ns, err);
     steps->frame.stats.total_ms += spl_since_ms(&clock);
     *more = rc >= 0 && spl_frame_get_samples_left(steps);
@@ -311,6 +350,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         *made = (struct spl_frame){0};
     }
     spl_hold_finish(&steps->job.hold);
+    spl_soft_pause_drop(&steps->job.pause);
     spl_frame_finish(&steps->frame);
     spl_frame_finish(&steps->enlarged);
     free(steps);

@@ -2,7 +2,7 @@
  * differ by a level at most; models are within a level of the reference in doubles; where too much overlaps, tiles are
  * cut, or it is told; a level of detail hides as much as what it stands for; cells of panels count once where nodes
  * meet; a turn all round flips nothing; they lie over what is solid and change no other layer; opacity 0 draws none;
- * nobody waits longer for them, and a device that is lost is told. One body for every backend. */
+ * nobody waits longer for them, others come between in the middle of a pixel, and a device that is lost is told. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,6 +15,7 @@
 #include "base/clock.h"
 #include "gpu/frames.h"
 #include "render/fault.h"
+#include "render/turns.h"
 #include "shared.h"
 #include "support/soft_scene.h"
 
@@ -525,6 +526,82 @@ static void what_is_hidden_leaves_nothing(void **state)
     done(covered);
 }
 
+/* Says yes every so many times that it is asked, ever more rarely, so that who gives way gets on. */
+static bool now_and_then(void *context, uint64_t walked_ns, uint64_t prepared_ns)
+{
+    (void)walked_ns;
+    (void)prepared_ns;
+    uint32_t *asked = context;
+    ++*asked;
+    return (*asked & (*asked - 1)) == 0 || *asked % 53 == 0;
+}
+
+static struct spl_frame draw_giving_way(const struct spl_dataset *dataset, const struct spl_view *view,
+                                        const struct spl_dataset *other, size_t *pauses)
+{
+    struct spl_view between = looking(origin, 3, 40, 30); // others use the same memory
+    struct spl_frame_steps *steps;
+    struct spl_frame frame, theirs;
+    uint32_t asked = 0;
+    bool more = true;
+    soften(&between, 1, -100, 0.7);
+    between.soft.model = SPL_SOFT_MODEL_BASE;
+    assert_int_equal(spl_frame_begin(renderer, dataset, view, &steps, NULL), SPL_OK);
+    spl_frame_set_gives_way(steps, now_and_then, &asked);
+    for (*pauses = 0; more;) {
+        uint64_t left = spl_frame_get_samples_left(steps);
+        assert_int_equal(spl_frame_step(steps, SPL_NEVER, &more, NULL), SPL_OK);
+        while (more && spl_frame_is_waiting(steps))
+            spl_renderer_wait(renderer, SPL_NEVER);
+        if (!spl_frame_is_paused(steps))
+            continue;
+        assert_true(more && spl_frame_get_samples_left(steps) == left);
+        ++*pauses;
+        theirs = draw(renderer, other, &between);
+        spl_frame_finish(&theirs);
+    }
+    spl_frame_end(steps, &frame);
+    return frame;
+}
+
+/* In the middle of a piece, of a pixel too; in windows and in one; where it is too large to be kept it is cut. */
+static void giving_way_changes_no_byte(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(1500, origin, 0.06), *other = random_cube(300, origin, 0.1);
+    static const struct {
+        uint32_t width, height, items;
+        enum spl_soft_model model;
+        uint32_t layers;
+    } rows[] = {{48, 36, 0, SPL_SOFT_MODEL_BASE, 0},
+                {48, 36, 900, SPL_SOFT_MODEL_CONCENTRIC, 1 << SPL_LAYER_DEPTH},
+                {1, 1, 0, SPL_SOFT_MODEL_BASE, 0},
+                {400, 300, 0, SPL_SOFT_MODEL_BASE, 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view view = looking(origin, 2.2, rows[i].width, rows[i].height);
+        size_t pauses;
+        soften(&view, 1, i % 2 ? 0 : -100, 0.2);
+        view.layers = 1 << SPL_LAYER_COLOR | rows[i].layers;
+        view.soft.of = SPL_SOFT_OF_MEDIAN;
+        view.soft.model = rows[i].model;
+        view.lod = 0;
+        spl_renderer_set_soft_items(renderer, rows[i].items);
+        struct spl_frame whole = draw(renderer, dataset, &view);
+        spl_renderer_set_work_at_once(renderer, 1);
+        struct spl_frame paused = draw_giving_way(dataset, &view, other, &pauses);
+        spl_renderer_set_work_at_once(renderer, UINT64_MAX);
+        if (pauses < 2)
+            fail_msg("%zu: %zu pauses", i, pauses);
+        assert_same(&whole, &paused, "in turns");
+        assert_int_equal(paused.stats.tiles, 1);
+        spl_frame_finish(&whole);
+        spl_frame_finish(&paused);
+    }
+    spl_renderer_set_soft_items(renderer, 0);
+    done(dataset);
+    done(other);
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
@@ -533,6 +610,7 @@ int main(int argc, char **argv)
         frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
         frames_test(neighbours_do_not_add_up), frames_test(what_is_hidden_leaves_nothing),
+        frames_test(giving_way_changes_no_byte),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }

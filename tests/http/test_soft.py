@@ -3,6 +3,8 @@ something soft, and is refused where the dataset has nothing of it."""
 import json
 import math
 import struct
+import threading
+import time
 
 from harness import FAKE, REAL, VIEW, Daemon, run
 
@@ -68,6 +70,29 @@ def test_layers_and_picks_speak_of_what_is_asked_for():
             assert not a > b and not b > c and not (math.isnan(a) and not math.isnan(c)), (a, b, c)
         assert sum(not math.isnan(z) for z in nearest) > sum(not math.isnan(z) for z in half) > sum(not math.isnan(z) for z in solid)
         assert d.view(**near).body == d.view(**near, of="first").body, "colours stay what they are"
+
+
+SLOW = dict(width=96, height=54, soft=AXIS, soft_model="base")  # 5184 samples: 2 s at 386 s a megapixel
+
+
+def test_who_takes_long_gives_way():
+    """In the middle of an image too small to be cut: others come between, and it ends as if they had not."""
+    with Daemon(FAKE, FAKE_SOFT_MS=386000) as d:
+        ended = []
+        thread = threading.Thread(target=lambda: ended.append(d.view(**SLOW)))
+        thread.start()
+        time.sleep(0.2)
+        for i in range(3):
+            assert d.view(width=16 + i, height=16).status == 200
+        assert not ended, "a view of a moment waited for one of two seconds"
+        thread.join()
+        assert ended[0].status == 200, ended[0].body
+
+
+def test_a_batch_says_which_view():
+    with Daemon(FAKE) as d:
+        batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "views": [{}, {"soft": "nothing_like_it>3"}]}))
+        assert batch.status == 400 and batch.json()["field"] == "views[1].soft", batch.body
 
 
 def test_a_budget_leaves_it_alone():

@@ -1,6 +1,6 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
  * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS and FAKE_SOFT_MS (see frame_ns()), in steps of a
- * tile like the real one's; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
+ * tile like the real one's, which those of soft models base and concentric end early where that is asked for; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
  * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
  * takes to put them on the device, and FAKE_HANG_MS that the first frame
  * ignores its deadline for, as a hanging driver does; FAKE_LOSE_LOADING pages of one dataset in which the device is lost.
@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "render/fault.h"
+#include "render/turns.h"
 
 struct spl_renderer {
     struct spl_device_info device;
@@ -166,6 +167,10 @@ struct spl_frame_steps {
     const struct spl_cancel *cancel; // may be NULL
     uint64_t left;     /* samples */
     uint64_t there_ns; /* when its pages are */
+    uint64_t drawn_ns; /* of the tile, before it gave way */
+    bool paused;
+    spl_frame_gives_way *asked; // may be NULL
+    void *context;
 };
 
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
@@ -185,6 +190,24 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
 void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel)
 {
     steps->cancel = cancel;
+}
+
+void spl_frame_set_gives_way(struct spl_frame_steps *steps, spl_frame_gives_way *asked, void *context)
+{
+    steps->asked = asked;
+    steps->context = context;
+}
+
+bool spl_frame_is_paused(const struct spl_frame_steps *steps)
+{
+    return steps->paused;
+}
+
+static bool gives_way(const struct spl_frame_steps *steps, uint64_t began)
+{
+    const struct spl_soft_params *soft = &steps->view.soft;
+    bool walks = soft->count && (soft->model == SPL_SOFT_MODEL_BASE || soft->model == SPL_SOFT_MODEL_CONCENTRIC);
+    return walks && steps->asked && steps->asked(steps->context, spl_now_ns() - began, 0);
 }
 
 static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
@@ -223,8 +246,15 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
     }
-    uint64_t until = spl_now_ns() + (uint64_t)((double)frame_ns(&steps->view) * share);
+    const uint64_t began = spl_now_ns(), whole = (uint64_t)((double)frame_ns(&steps->view) * share);
+    const uint64_t until = began + (whole > steps->drawn_ns ? whole - steps->drawn_ns : 0);
+    steps->paused = false;
     while (spl_remaining_ns(until)) {
+        if ((steps->paused = gives_way(steps, began))) {
+            steps->drawn_ns += spl_now_ns() - began;
+            *more = true;
+            return 0;
+        }
         if (!spl_remaining_ns(deadline_ns))
             return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
         if (spl_cancel_is_set(steps->cancel))
@@ -232,6 +262,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
         usleep(500);
     }
     steps->left -= tile;
+    steps->drawn_ns = 0;
     *more = steps->left;
     return *more ? 0 : make_images(steps, err);
 }

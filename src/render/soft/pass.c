@@ -1,7 +1,8 @@
 /* The soft stage of a tile; see pass.h. More spheres than fit (room.c) are drawn a window of depth after the other,
  * which changes no byte; of models that cut spheres, windows overlap. Where too many overlap even so, the tile is to be
  * cut. The host waits for counts and for the lengths of lists; in between it asks whether anybody still waits for the
- * frame. Belongs to the renderer's thread. */
+ * frame, and while models that cut spheres are walked whether others wait longer than they should (pause.h). Belongs to
+ * the renderer's thread. */
 #include "render/soft/pass.h"
 
 #include <inttypes.h>
@@ -13,6 +14,7 @@
 #include "render/method.h"
 #include "render/soft/gather.h"
 #include "render/soft/of.h"
+#include "render/soft/pause.h"
 #include "render/soft/thick.h"
 
 enum {
@@ -23,10 +25,13 @@ enum {
 struct pass {
     struct spl_tile *tile;
     struct spl_soft_order order;
-    struct spl_soft_gathering from;
+    struct spl_soft_gathering gathering;
     bool blends, finds;
     uint32_t found_to; // depth up to which spheres were looked for
     bool begun;        // something was blended
+    bool walks;        // spheres are cut just now
+    float from;        // the window of depth that is drawn: walks before it are done
+    struct spl_soft_walked of;
 };
 
 bool spl_soft_is_drawn(const struct spl_tile *tile)
@@ -35,14 +40,36 @@ bool spl_soft_is_drawn(const struct spl_tile *tile)
     return list->first_soft_chunk < list->first_mark_chunk;
 }
 
+/* The device ran. SPL_FRAME_PAUSED: others shall have it now, and what was walked is kept, unless it is to be cut. */
+static int give_way(struct pass *pass, struct spl_error *err)
+{
+    struct spl_soft_pause *pause = pass->tile->pause;
+    if (!pass->walks || !spl_soft_pause_is_due(pause, pass->tile))
+        return SPL_OK;
+    pass->walks = false;
+    int rc = spl_soft_pause_keep(pause, pass->tile, &pass->of, pass->from, err);
+    return rc ? rc : SPL_FRAME_PAUSED;
+}
+
 static int tile_work(void *context, uint64_t work, struct spl_error *err)
 {
-    return spl_tile_add_work(((struct pass *)context)->tile, work, err);
+    struct pass *pass = context;
+    const uint64_t before = pass->tile->work;
+    int rc = spl_tile_add_work(pass->tile, work, err);
+    return rc || pass->tile->work == before + work ? rc : give_way(pass, err);
 }
 
 static int tile_run(void *context, struct spl_error *err)
 {
-    return spl_tile_run(((struct pass *)context)->tile, err);
+    struct pass *pass = context;
+    int rc = spl_tile_run(pass->tile, err);
+    return rc ? rc : give_way(pass, err);
+}
+
+static bool is_walked(const struct pass *pass)
+{
+    const enum spl_soft_model model = pass->tile->view->soft.model;
+    return pass->blends && (model == SPL_SOFT_MODEL_BASE || model == SPL_SOFT_MODEL_CONCENTRIC);
 }
 
 /* Draws a window that was counted; models but express what of it lies before `until`. */
@@ -51,10 +78,13 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
 {
     const struct spl_soft_params *soft = &pass->tile->view->soft;
     const uint32_t items = (uint32_t)sum->items;
-    int rc = spl_soft_gather(&pass->from, window, err);
+    int rc = spl_soft_gather(&pass->gathering, window, err);
     rc = rc ? rc : spl_soft_sort(&pass->order, items, sum->low, sum->high, err);
     rc = rc ? rc : spl_soft_list(&pass->order, items, sum->most, err);
     spl_assert(rc != SPL_SOFT_CROWDED);
+    pass->walks = !rc && is_walked(pass);
+    if (pass->walks)
+        spl_soft_pause_walk(pass->tile->pause);
     if (!rc && pass->blends)
         rc = spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,
                                                                    .opacity = soft->opacity,
@@ -63,6 +93,7 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
                                                                    .border = soft->blend > 0,
                                                                    .thin = sum->thin,
                                                                    .first = !pass->begun}, err);
+    pass->walks = false;
     if (!rc && pass->finds)
         rc = spl_soft_find(&pass->order, soft, pass->found_to, sum->thin, err);
     pass->found_to = (uint32_t)(window->end >> 32);
@@ -94,11 +125,11 @@ static int draw_windows(struct pass *pass, const struct spl_soft_range *all, str
         return SPL_E_NOMEM;
     plan->room = (struct spl_soft_sum){sizes->items, sizes->entries};
     plan->measure = spl_soft_measure;
-    plan->context = &pass->from;
+    plan->context = &pass->gathering;
     int rc = spl_soft_plan_begin(plan, all, err);
     while (!rc && (rc = spl_soft_plan_next(plan, &window, &planned, err)) == 1) {
         struct spl_soft_counted sum;
-        rc = spl_soft_count(&pass->from, &window, &sum, err);
+        rc = spl_soft_count(&pass->gathering, &window, &sum, err);
         rc = rc ? rc : draw(pass, &window, &sum, SPL_SOFT_NO_END, err);
     }
     free(plan);
@@ -132,11 +163,13 @@ static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float
     plan->reach = reach;
     plan->least = reach / (can_cut ? cut_share : least_share);
     plan->measure = spl_soft_measure;
-    plan->context = &pass->from;
+    plan->context = &pass->gathering;
+    plan->from = pass->from;
     while (!rc && (more = spl_soft_thick_next(plan, &window, err)) == 1) {
         struct spl_soft_counted sum;
-        rc = spl_soft_count(&pass->from, &window.held, &sum, err);
+        rc = spl_soft_count(&pass->gathering, &window.held, &sum, err);
         rc = rc ? rc : draw(pass, &window.held, &sum, window.until, err);
+        pass->from = window.until;
     }
     if (!rc && more == SPL_SOFT_TOO_THICK && !can_cut)
         rc = refuse(pass, plan->from, reach, err);
@@ -145,6 +178,42 @@ static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float
     else if (!rc)
         rc = more;
     free(plan);
+    return rc;
+}
+
+static uint32_t word_of(float number)
+{
+    uint32_t word;
+    memcpy(&word, &number, sizeof word);
+    return word;
+}
+
+/* Gives walks back that were kept. What they are of follows from what is to be drawn: where pages have come or gone since,
+ * it is drawn anew. */
+static int go_on(struct pass *pass, const struct spl_soft_counted *sum, struct spl_error *err)
+{
+    struct spl_tile *tile = pass->tile;
+    const struct spl_draw_list *list = &tile->renderer->list;
+    bool kept = false;
+    pass->of = (struct spl_soft_walked){.place = {(uint64_t)tile->x << 32 | tile->y,
+                                                  (uint64_t)tile->width << 32 | tile->height},
+                                        .items = sum->items,
+                                        .entries = sum->entries,
+                                        .chunks = list->chunk_count,
+                                        .splats = list->drawn[SPL_CHUNK_DISCS],
+                                        .low = sum->low,
+                                        .high = sum->high,
+                                        .most = sum->most,
+                                        .reach = word_of(sum->reach)};
+    if (!is_walked(pass))
+        return SPL_OK;
+    const float from = tile->pause->from;
+    int rc = spl_soft_pause_give_back(tile->pause, tile, &pass->of, &kept, err);
+    if (kept && !pass->finds) /* what is found is not kept */
+        pass->from = from;
+    /* the parameters may have lain where the walks came by */
+    memcpy((char *)spl_gpu_buffer_map(pass->order.frame.buffer) + pass->order.frame.offset, &tile->params,
+           sizeof tile->params);
     return rc;
 }
 
@@ -185,7 +254,7 @@ int spl_soft_record(struct spl_tile *tile, uint32_t group, struct spl_error *err
     const struct spl_soft_range all = {(uint64_t)low << 32, (uint64_t)(high + 1) << 32};
     struct spl_soft_counted sum;
     pass.order.context = &pass;
-    pass.from = (struct spl_soft_gathering){.tile = tile,
+    pass.gathering = (struct spl_soft_gathering){.tile = tile,
                                             .order = &pass.order,
                                             .slots = list->chunks[last].texture + spl_soft_slots_of(list, last),
                                             .details = pass.finds};
@@ -201,10 +270,11 @@ int spl_soft_record(struct spl_tile *tile, uint32_t group, struct spl_error *err
                      tile->samples * SPL_SOFT_WALK_WORDS * sizeof(uint32_t), 0);
     int rc = spl_tile_put_params(tile, &tile->params, &pass.order.frame, err);
     rc = rc ? rc : occlude(tile, wide, err);
-    rc = rc ? rc : spl_soft_count(&pass.from, &all, &sum, err);
+    rc = rc ? rc : spl_soft_count(&pass.gathering, &all, &sum, err);
+    rc = rc ? rc : go_on(&pass, &sum, err);
     if (!rc && sum.items <= sizes->items && sum.entries <= sizes->entries)
         rc = draw(&pass, &all, &sum, SPL_SOFT_NO_END, err);
-    else if (!rc && pass.blends && (model == SPL_SOFT_MODEL_BASE || model == SPL_SOFT_MODEL_CONCENTRIC))
+    else if (!rc && is_walked(&pass))
         rc = draw_thick(&pass, &all, sum.reach, err);
     else if (!rc)
         rc = draw_windows(&pass, &all, err);

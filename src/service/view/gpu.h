@@ -15,6 +15,7 @@ struct gpu {
     uint64_t losses;
     uint64_t frames, inject_every, inject_left, inject_at;
     struct spl_turns turns;                  /* large views */
+    const struct spl_job *drawn;             // whose turn it is; NULL between turns
     struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
     TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
     uint64_t pages_loaded, pages_evicted;    /* of this renderer, as published */

@@ -2,17 +2,20 @@
  *
  * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so a
  * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and
- * finishes with the bytes that it would have had alone. Frames of tours have the turns that nobody wants. What comes of
+ * finishes with the bytes that it would have had alone. A frame that takes long in the middle of a piece gives way there,
+ * where others wait (render/turns.h). Frames of tours have the turns that nobody wants. What comes of
  * a device that is lost is in gpu_loss.c. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
+#include "render/turns.h"
 #include "service/view/gpu.h"
 
 static const uint64_t behind_turn_ns = 10 * SPL_NS_PER_S;
 static const uint64_t small_turn_ns = 250 * SPL_NS_PER_MS; // a small view of several pieces has so long at first
+static const uint64_t walk_turn_ns = 100 * SPL_NS_PER_MS; // of a piece that gives way in its middle, at least
 static const uint64_t slow_ns = 1000;                        // a sample: several times what views take
 static const uint64_t look_around_ns = 250 * SPL_NS_PER_MS; // while views wait for pages: somebody may have left
 
@@ -56,14 +59,34 @@ static bool is_over(const struct gpu *gpu, struct spl_job *job)
     return spl_job_is_over(job);
 }
 
+/* Would others have a turn if this one ended? */
+static bool others_wait(struct gpu *gpu)
+{
+    const struct spl_job *job;
+    if (spl_queue_get_length(gpu->pipeline->render) || spl_queue_get_length(gpu->pipeline->large))
+        return true;
+    TAILQ_FOREACH(job, &gpu->turns.jobs, turn)
+    if (job != gpu->drawn && !(job->waits && spl_frame_is_waiting(job->steps)))
+        return true;
+    return false;
+}
+
+/* What was prepared is prepared again after that: at most half of the time goes there. */
+static bool gives_way(void *context, uint64_t walked_ns, uint64_t prepared_ns)
+{
+    return walked_ns >= walk_turn_ns && walked_ns >= prepared_ns && others_wait(context);
+}
+
 static int begin(struct gpu *gpu, struct spl_job *job)
 {
     if (job->entry && job->entry->aside)
         return spl_fail(&job->err, job->entry->err.code, "%s", job->entry->err.message);
     spl_gpu_inject(gpu);
     int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
-    if (!rc)
+    if (!rc) {
         spl_frame_set_cancel(job->steps, &job->dropped);
+        spl_frame_set_gives_way(job->steps, gives_way, gpu);
+    }
     return rc;
 }
 
@@ -106,9 +129,11 @@ static void complete(struct gpu *gpu, struct spl_job *job)
 }
 
 /* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
- * what is large. */
+ * what is large, and what gave way in the middle of a piece behind all that did not, who had less before who had more. */
 static uint64_t count_left(const struct spl_job *job)
 {
+    if (spl_frame_is_paused(job->steps))
+        return UINT64_MAX / 2 + job->frame_ns;
     uint64_t left = spl_frame_get_samples_left(job->steps), drawn = job->samples > left ? job->samples - left : 0;
     uint64_t slow = drawn ? job->frame_ns / drawn / slow_ns : 0;
     return slow > 1 ? (left < UINT64_MAX / slow ? left * slow : UINT64_MAX) : left;
@@ -125,11 +150,12 @@ static void put_aside(struct gpu *gpu, struct spl_job *job)
         spl_turns_add(&gpu->turns, job);
 }
 
-/* Who stands behind others has no deadline, but does not hold them up for longer than a view may take. */
+/* Who stands behind others has no deadline, but does not take longer for a piece than a view may. */
 static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
 {
-    const uint64_t longest = gpu->pipeline->options.turn_ns, now = spl_now_ns(), deadline = job->deadline_ns;
-    uint64_t end = now + (longest ? longest : behind_turn_ns);
+    const uint64_t given = gpu->pipeline->options.turn_ns, now = spl_now_ns(), deadline = job->deadline_ns;
+    const uint64_t longest = given ? given : behind_turn_ns;
+    uint64_t end = now + (job->piece_ns < longest ? longest - job->piece_ns : 0);
     return job->behind && end < deadline ? end : deadline;
 }
 
@@ -137,7 +163,7 @@ static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
 static bool goes_on(const struct spl_job *job, uint64_t since)
 {
     return !job->large && !job->behind && !job->in_turns && !spl_frame_is_waiting(job->steps) &&
-           spl_now_ns() - since < small_turn_ns;
+           !spl_frame_is_paused(job->steps) && spl_now_ns() - since < small_turn_ns;
 }
 
 /* Renders a tile of one job, or a piece of it, and passes it on after the last; false when the thread must end. */
@@ -155,12 +181,15 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     uint64_t clock = spl_now_ns();
     if (!rc && !job->steps)
         rc = begin(gpu, job);
+    gpu->drawn = job;
     if (!rc)
         do
             rc = spl_frame_step(job->steps, get_turn_end(gpu, job), &more, &job->err);
         while (!rc && more && goes_on(job, clock));
     uint64_t took = spl_now_ns() - clock;
+    gpu->drawn = NULL;
     job->frame_ns += took;
+    job->piece_ns = !rc && spl_frame_is_paused(job->steps) ? job->piece_ns + took : 0;
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
     if (rc) {

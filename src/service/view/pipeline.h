@@ -56,6 +56,7 @@ struct spl_job {
     double promised_ms;             /* the same */
     uint64_t began_ns, rendered_ns; /* of the frame, planning included; began_ns moves on by what others took between */
     uint64_t frame_ns;              /* of its tiles */
+    uint64_t piece_ns;              /* of the piece in which it gave way */
     struct spl_error err;
 };
 

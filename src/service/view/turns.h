@@ -4,7 +4,8 @@
  * with the fewest samples left goes next, so that what is nearly done is done, and one of two tiles does not wait for
  * one of sixty. Every SPL_TURNS_EVERY-th turn is a large view's, whatever small ones wait, and every second of these
  * that of the one that came first, so that each gets on and ends. Small views whose work is cut into pieces and takes
- * long stand here, too, and samples that take long count for more (gpu_thread.c). Views that wait for pages, small ones
+ * long stand here, too, and samples that take long count for more (gpu_thread.c); who gave way in the middle of a piece
+ * comes behind all others, but for the turns of who came first. Views that wait for pages, small ones
  * too, stand here and have no turn. Pure bookkeeping; owned by the gpu thread. */
 #ifndef SPL_SERVICE_TURNS_H
 #define SPL_SERVICE_TURNS_H
