@@ -10,6 +10,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
 import zipfile
 
 import openapi
@@ -49,6 +50,22 @@ def ended(d, uri, state="done"):
     tour = d.ask(uri).json()
     assert tour["state"] == state, tour
     return tour
+
+
+SLOW = dict(width=96, height=54, soft="axis:0,0,0,0,0,1<0.5", soft_model="base")  # 20 s a frame at 3860 s a megapixel
+
+
+def test_a_slow_frame_gives_way_and_goes_with_its_tour():
+    with Folder() as tours, Daemon(FAKE, "--tours", tours, FAKE_SOFT_MS=3860000) as d:
+        slow = begin(d, body(settings=SLOW))["uri"]
+        time.sleep(0.3)  # its first frame is being drawn
+        for i in range(3):
+            assert d.view(width=16 + i, height=16).status == 200
+        assert d.ask(slow).json()["state"] == "rendering" and d.ask(slow).json()["frames_done"] == 0
+        assert d.ask(slow, "DELETE").status == 204
+        began = time.monotonic()
+        ended(d, begin(d, body(2))["uri"])
+        assert time.monotonic() - began < 8, "the frames of a tour that was removed were drawn on"
 
 
 def read_stream(d, uri, begun=None):

@@ -82,11 +82,20 @@ static void end_if_failed(struct spl_tour *tour)
         end(tour, SPL_TOUR_FAILED);
 }
 
+/* Nobody wants the tour's frames any more: what is being drawn ends, as when a client has left. */
+static void drop_jobs(struct spl_tour *tour)
+{
+    for (size_t i = 0; i < SPL_TOUR_IN_FLIGHT; i++)
+        if (tour->tours->jobs[i] && tour->tours->jobs[i]->owner == tour)
+            spl_cancel_set(&tour->tours->jobs[i]->dropped);
+}
+
 void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why)
 {
     if (tour->failure.code || spl_tour_has_ended(tour) || tour->removed)
         return;
     tour->failure = *why;
+    drop_jobs(tour);
     hide_folder(tour->tours, tour->failure.message);
     end_if_failed(tour);
 }
@@ -130,11 +139,21 @@ static void reopen(struct spl_tour *tour, size_t frame, const struct spl_error *
         spl_tour_fail(tour, err);
 }
 
+/* Puts `now` in the place of `before` among those in flight. */
+static void replace_job(struct spl_tours *tours, const struct spl_job *before, struct spl_job *now)
+{
+    size_t i = 0;
+    while (tours->jobs[i] != before)
+        spl_assert(++i < SPL_TOUR_IN_FLIGHT);
+    tours->jobs[i] = now;
+}
+
 /* A frame came back from the pipeline. */
 static void take_job(struct spl_job *job)
 {
     struct spl_tour *tour = job->owner;
     struct spl_tours *tours = tour->tours;
+    replace_job(tours, job, NULL);
     tours->in_flight--;
     tour->in_flight--;
     if (job->err.code) {
@@ -230,6 +249,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
         spl_job_destroy(job);
         return false;
     }
+    replace_job(tours, NULL, job);
     tour->frames[frame] = SPL_FRAME_IN_FLIGHT;
     tour->in_flight++;
     tours->in_flight++;
@@ -344,6 +364,7 @@ void spl_tours_remove(struct spl_tour *tour)
     tour->bytes = 0;
     tour->removed = true;
     atomic_store(&tour->cancelled, true);
+    drop_jobs(tour);
     changed(tour);
     spl_tour_let_go(tour);
 }

@@ -61,6 +61,7 @@ struct spl_tours {
     int lock; /* of the directory, held for life */
     TAILQ_HEAD(spl_tour_list, spl_tour) all;
     size_t count, in_flight, writing, wishes;
+    struct spl_job *jobs[SPL_TOUR_IN_FLIGHT]; /* in flight; NULL = none. The pipeline's: to be dropped, not read */
     uint64_t bytes, writing_bytes; /* on disk; at most on the way there */
     bool stopping, making_video;
     uv_timer_t sweep_timer, stream_timer;
