@@ -68,6 +68,13 @@ def test_a_slow_frame_gives_way_and_goes_with_its_tour():
         assert time.monotonic() - began < 8, "the frames of a tour that was removed were drawn on"
 
 
+def test_what_the_dataset_lacks_is_refused_at_once():
+    with Folder() as tours, Daemon(FAKE, "--tours", tours) as d:
+        refused = begin(d, body(settings=dict(SMALL, soft="nothing_like_it>3")), 400)
+        assert refused["field"] == "settings.soft" and "nothing_like_it" in refused["detail"], refused
+        assert not d.ask("/v1/tours").json()["tours"]
+
+
 def read_stream(d, uri, begun=None):
     """Reads a stream to its end; `begun` is set once its first byte is there."""
     connection = d.connect(120)

@@ -14,6 +14,7 @@
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
+#include "service/view/views.h"
 
 struct spl_tour_wish {
     uv_work_t work;
@@ -44,6 +45,8 @@ static void reply(struct request *request, struct spl_tour_wish *wish)
     char location[64];
     if (!err->code && (!entry || entry->info->version != wish->entry->info->version))
         spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' was replaced or dropped just now", id);
+    if (!err->code)
+        spl_view_check_part(&wish->spec.view, entry->info, "settings", err);
     if (err->code || spl_tours_add(wish->tours, entry, &wish->body, wish->body_length, &wish->spec, &tour, err)) {
         spl_reply_error(request, err);
         return;

@@ -240,10 +240,13 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         spl_view_blame(&err);
         goto refuse;
     }
-    for (size_t i = 0; i < batch->views.count; i++)
-        if (spl_view_check_dataset(&batch->views.views[i], call->entry->info, &err) ||
+    for (size_t i = 0; i < batch->views.count; i++) {
+        char part[32];
+        snprintf(part, sizeof part, "views[%zu]", i);
+        if (spl_view_check_part(&batch->views.views[i], call->entry->info, part, &err) ||
             spl_view_has_no_room(service, &batch->views.views[i], &err))
             goto refuse;
+    }
     if (!(batch->items = spl_alloc(batch->views.count, sizeof *batch->items, &err)))
         goto refuse;
     batch->service = service;

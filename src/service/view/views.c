@@ -115,6 +115,16 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
                          : spl_view_check_layers(&view->view, info, err);
 }
 
+int spl_view_check_part(struct spl_view_request *view, const struct spl_dataset_info *info, const char *part,
+                        struct spl_error *err)
+{
+    struct spl_error why = {0};
+    char field[sizeof why.field + 32];
+    int rc = spl_view_check_dataset(view, info, &why);
+    snprintf(field, sizeof field, "%s%s%s", part, why.field[0] ? "." : "", why.field);
+    return rc ? spl_fail_field(err, rc, field, "%s", why.message) : 0;
+}
+
 /* Large views have their own share, in which those on their way count: replies that nobody reads keep no small view
  * from being made. */
 bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view, struct spl_error *err)

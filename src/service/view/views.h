@@ -44,6 +44,9 @@ void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_i
 /* What views, batches and tours of them check alike. The first: a URL that names a version means that one, whatever is
  * served by now; layers that the dataset does not have are refused, or, of picks, left out. */
 int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err);
+/* The same of one that is part of something: errors name `part`.field. */
+int spl_view_check_part(struct spl_view_request *view, const struct spl_dataset_info *info, const char *part,
+                        struct spl_error *err);
 bool spl_view_has_no_room(const struct spl_service *service, const struct spl_view_request *view,
                           struct spl_error *err); /* too much waits for clients */
 struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);
