@@ -526,6 +526,40 @@ static void what_is_hidden_leaves_nothing(void **state)
     done(covered);
 }
 
+/* A small image takes little memory beside what a renderer has in any case; where that is not there either, it is told
+ * as what the device has no room for, which is no parameter's fault. */
+static void little_memory_is_enough_or_told(void **state)
+{
+    (void)state;
+    struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 1 << 14};
+    struct spl_dataset *dataset = random_cube(2000, origin, 0.05);
+    struct spl_view view = looking(origin, 3, 24, 16), solid = view;
+    struct spl_renderer *small;
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    soften(&view, 1, -100, 0.3);
+    assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+    assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
+    frame = draw(small, dataset, &solid);
+    spl_frame_finish(&frame);
+    const uint64_t least = spl_renderer_get_memory(small);
+    spl_renderer_destroy(small);
+    for (int i = 0; i < 2; i++) {
+        options.memory_limit = least + (i ? 1 << 16 : 3 << 20);
+        assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_add(small, dataset, NULL), SPL_OK);
+        int rc = spl_renderer_render(small, dataset, &view, &frame, &err);
+        if (!i && rc)
+            fail_msg("%s", err.message);
+        assert_int_equal(rc, i ? SPL_E_LIMIT : SPL_OK);
+        spl_frame_finish(&frame);
+        spl_renderer_destroy(small);
+    }
+    assert_string_equal(err.field, "");
+    assert_non_null(strstr(err.message, "memory-limit"));
+    done(dataset);
+}
+
 /* Says yes every so many times that it is asked, ever more rarely, so that who gives way gets on. */
 static bool now_and_then(void *context, uint64_t walked_ns, uint64_t prepared_ns)
 {
@@ -610,7 +644,7 @@ int main(int argc, char **argv)
         frames_test(models_match_the_reference), frames_test(a_turn_flips_nothing), frames_test(nobody_waits_for_it),
         frames_test(loss_is_told), frames_test(crowds_are_cut_or_told), frames_test(levels_hide_as_much),
         frames_test(neighbours_do_not_add_up), frames_test(what_is_hidden_leaves_nothing),
-        frames_test(giving_way_changes_no_byte),
+        frames_test(little_memory_is_enough_or_told), frames_test(giving_way_changes_no_byte),
     };
     return frames_run(argc, argv, "soft", tests, sizeof tests / sizeof *tests);
 }

@@ -1,24 +1,32 @@
 /* Device memory of soft transparency; see order.h. Sizes follow from how many items and entries are held at once; the
- * counters are as many as keep every invocation a table of its own. Belongs to the renderer's thread. */
+ * counters are as many as keep every invocation a table of its own, and a small image has few. Belongs to the
+ * renderer's thread. */
 #include "render/soft/order.h"
 #include "render/soft/plan.h"
 
 /* Invocations that walk blocks: a software driver has few cores, and each has a counter for every tile. */
 enum { software_threads = 128, gpu_threads = 1024, tables_at_least = 16 };
-enum { digits_max = 2048, sort_threads = 1024 };
+enum { digits_max = 2048, sort_threads = 1024, sort_block = 2048 };
+enum { walked_words = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS * SPL_SOFT_KEPT_WORDS + 1 }; // of a tile: walk.c
 
 static uint32_t threads_of(bool software)
 {
     return software ? software_threads : gpu_threads;
 }
 
+static uint64_t larger(uint64_t a, uint64_t b)
+{
+    return a > b ? a : b;
+}
+
 static uint64_t counters_of(const struct spl_soft_sizes *sizes, bool software)
 {
-    const uint64_t sort = (uint64_t)digits_max * sort_threads, few = (uint64_t)tables_at_least * sizes->tiles;
-    uint64_t all = (uint64_t)threads_of(software) * sizes->tiles;
-    const uint64_t most = few > 4 * sort ? few : 4 * sort;
-    all = all < most ? all : most;
-    return (all > sort ? all : sort) + 2 * (uint64_t)gpu_threads;
+    const uint64_t full = (uint64_t)digits_max * sort_threads, most = larger(tables_at_least * (uint64_t)sizes->tiles,
+                                                                             4 * full);
+    const uint64_t sort = (uint64_t)digits_max * (sizes->items / sort_block + 1);
+    const uint64_t walks = sizes->walks ? (uint64_t)walked_words * sizes->tiles : 0, least = larger(sort, walks);
+    const uint64_t all = (uint64_t)threads_of(software) * sizes->tiles;
+    return larger(all < most ? all : most, least < full ? least : full) + 2 * (uint64_t)gpu_threads;
 }
 
 static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t bytes[SPL_SOFT_BUFFERS])
