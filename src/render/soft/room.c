@@ -67,7 +67,7 @@ static void choose_entries(struct spl_soft_sizes *sizes, uint64_t bytes, uint64_
     while (sizes->entries < entries_of_window) {
         struct spl_soft_sizes more = *sizes;
         more.entries *= 2;
-        if ((uint64_t)more.entries * sizeof(uint32_t) > binding || spl_soft_memory_bytes(&more, software) > bytes)
+        if (2 * (uint64_t)more.entries * sizeof(uint32_t) > binding || spl_soft_memory_bytes(&more, software) > bytes)
             return;
         *sizes = more;
     }
