@@ -34,11 +34,12 @@ done
 # An old RPATH, unlike RUNPATH, also holds for the libraries of libraries.
 options=(-Dvideo=disabled -Dtests=$tests -Dbuildtype=release -Db_ndebug=false
     "-Dc_link_args=['-Wl,--disable-new-dtags,-rpath,\$ORIGIN/../lib']")
+mkdir -p "$build"
 if [ -f "$build/build.ninja" ]; then
     meson configure "$build" "${options[@]}"
 else
     meson setup "$build" "$top" "${options[@]}"
-fi >"$build.log" 2>&1 || { cat "$build.log" >&2; exit 1; }
+fi >"$build/setup.log" 2>&1 || { cat "$build/setup.log" >&2; exit 1; }
 ninja -C "$build" --quiet
 
 rm -rf "$out"

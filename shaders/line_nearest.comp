@@ -26,7 +26,7 @@ void draw(splat_run run, splat a, splat b)
     capsule c = make_capsule(cut_piece(a.position, b.position), run.chunk, run.low, run.high);
     uvec2 payloads = uvec2(payload(run.chunk, a), payload(run.chunk, b));
     capsule_walk walk = begin_walk(c);
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         float z;
         bool second;
         float distance = capsule_sample(c, walk, z, second);

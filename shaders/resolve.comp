@@ -142,7 +142,7 @@ void main()
     uvec3 color = uvec3(0u);
     vec4 mixed = vec4(0.0); /* with soft spheres: colour times share, share */
     vec3 normal = vec3(0.0);
-    for (uint i = 0u;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (uint i = 0u;;) { /* the end is asked for at the end: see common/walk.glsl */
         pixel_sample s = load_sample(corner, i);
         uint at = s.at, bits = s.bits;
         vec4 soft = vec4(0.0);

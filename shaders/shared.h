@@ -26,6 +26,8 @@
 #define SPL_RUN_BITS 2
 #define SPL_LANES 8
 #define SPL_WORKGROUP 64
+/* On hardware a workgroup of its own size draws an entry's discs: shaders/common/walk.glsl. */
+#define SPL_SHARED_LANES 128
 
 /* The self-test's page lies this many times its own size into its buffer. */
 #define SPL_SELFTEST_PAGE 3

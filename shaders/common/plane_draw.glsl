@@ -153,7 +153,7 @@ void draw_samples(panel_draw d, uint lane, uint lanes)
     int rows = int((float(lanes) + 0.5) * inverse_width), row = int((float(lane) + 0.5) * inverse_width);
     ivec2 step = ivec2(int(lanes) - rows * width, rows);
     ivec2 at = d.first + ivec2(int(lane) - row * width, row);
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         draw_sample(d, at);
         at += step;
         bool wrap = at.x > d.last.x;

@@ -163,10 +163,20 @@ splat_run load_run_of(uint entry)
 #define SPL_RUN_STEP SPL_LANES
 #define SPL_DRAWN SPL_DRAWN_SPLAT
 
+/* The invocation's entry of the dispatch. */
+uint own_entry()
+{
+#ifdef SPL_SHARED
+    return gl_WorkGroupID.x;
+#else
+    return gl_GlobalInvocationID.x / SPL_LANES;
+#endif
+}
+
 /* The invocation's run, from its own first splat on. */
 splat_run load_splat_run()
 {
-    splat_run r = load_run_of(gl_GlobalInvocationID.x / SPL_LANES);
+    splat_run r = load_run_of(own_entry());
     r.first += gl_GlobalInvocationID.x % SPL_LANES;
     return r;
 }

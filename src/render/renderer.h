@@ -57,6 +57,7 @@ struct spl_renderer {
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
     uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
     uint64_t work_a_step;      /* that a step of a frame has, unless its piece is small; see work.c */
+    bool shares;               /* discs are drawn by the kernels for hardware: shaders/common/walk.glsl */
     uint64_t least_piece;      /* samples of a piece, at least */
 };
 
@@ -133,6 +134,7 @@ enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS
 enum { SPL_CONSTANT_MARKED = 3 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
+    uint32_t lanes; /* of SPL_WORKGROUP invocations, that share an entry; 0 = as the dispatch has it */
 };
 
 /* Those of `key` that the tile's chunks need, and the first. */
