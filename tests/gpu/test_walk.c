@@ -176,7 +176,5 @@ int main(int argc, char **argv)
         frames_test(discs_are_the_same),   frames_test(textures_are_the_same), frames_test(trimmed_are_the_same),
         frames_test(cells_are_the_same),
     };
-    if (getenv("WALK_FILTER"))
-        cmocka_set_test_filter(getenv("WALK_FILTER"));
     return frames_run(argc, argv, "walk", tests, sizeof tests / sizeof *tests);
 }
