@@ -55,6 +55,9 @@ fi
 for program in "${programs[@]}"; do
     [ -f "$program" ] && [ -x "$program" ] && cp "$program" "$out/bin/"
 done
+if $tests; then # what loads the daemon
+    cp "$(command -v wrk)" "$(command -v curl)" "$out/bin/"
+fi
 strip "$out"/bin/*
 
 # All libraries but the C library's own, which belongs to the system. The C++ runtime is the system's too where it has
