@@ -85,6 +85,7 @@ static double judge(const struct spl_view_sample *s, double azimuth, double elev
             facing = -((double)s->normal[i][0] * axes[2][0] + (double)s->normal[i][1] * axes[2][1] +
                        (double)s->normal[i][2] * axes[2][2]);
         all += weight;
+        weight *= pow(fabs(facing), 1.5); /* from straight ahead it shows most */
         if ((s->sides && facing <= 0) || x < 0 || x >= raster || y < 0 || y >= rows ||
             dot(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
             continue;
@@ -182,13 +183,15 @@ int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_vi
     if (!rc) {
         get_axes(azimuth, elevation, axes);
         find_eye(s, axes, tangent, values, eye);
-        double middle[3], depth_of = 0;
-        for (int c = 0; c < 3; c++)
-            middle[c] = 0.5 * (s->low[c] + s->high[c]) - eye[c];
-        depth_of = dot(axes[2], middle);
+        double middle[3], square = 0;
         for (int c = 0; c < 3; c++) {
-            eye[c] -= (margin - 1) * depth_of * axes[2][c];
-            target[c] = eye[c] + margin * depth_of * axes[2][c];
+            middle[c] = 0.5 * (s->low[c] + s->high[c]) - eye[c];
+            square += 0.25 * (s->high[c] - s->low[c]) * (s->high[c] - s->low[c]);
+        }
+        double at = dot(axes[2], middle), depth_of = fmax(margin * at, sqrt(square)); /* not in a single point */
+        for (int c = 0; c < 3; c++) {
+            eye[c] -= (depth_of - at) * axes[2][c];
+            target[c] = eye[c] + depth_of * axes[2][c];
         }
         rc = spl_view_fit(s, eye, target, up, beyond, 20, 90, view->fit, err);
     }

@@ -57,6 +57,8 @@ static double walk(const double *sorted, size_t count, size_t from, int step, do
 static int find_box(struct spl_view_sample *s, const struct spl_points *p, size_t count, struct spl_error *err)
 {
     double *sorted[3] = {0}, extent = 0, radius = 10 * (double)p->radius[p->count / 2];
+    for (int a = 0; a < 3; a++) /* what doubles tell apart there */
+        radius = fmax(radius, 1e-14 * fabs(s->at[count / 2][a]));
     size_t first = count / tail, last = count - 1 - count / tail;
     int rc = 0;
     for (int a = 0; !rc && a < 3; a++) {
