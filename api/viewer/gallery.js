@@ -43,9 +43,15 @@ export class Gallery {
     this.urls = [];
   }
 
+  /** In other colours. */
+  redraw() {
+    this.show(this.datasets);
+  }
+
   /** As GET /v1/datasets lists them. */
   show(datasets) {
     this.clear();
+    this.datasets = datasets;
     this.element.hidden = false;
     this.list.append(...datasets.map((dataset) => this.card(dataset)));
   }
@@ -88,7 +94,8 @@ export class Gallery {
     this.busy++;
     try {
       const width = devicePixelRatio > 1 ? 640 : 320;
-      const reply = await ask(`${dataset.thumbnail}?${query({width, v: dataset.version})}`);
+      const background = getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", "");
+      const reply = await ask(`${dataset.thumbnail}?${query({width, background, v: dataset.version})}`);
       const url = URL.createObjectURL(await reply.blob());
       if (turn !== this.turn) return URL.revokeObjectURL(url);
       this.urls.push(url);

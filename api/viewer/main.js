@@ -311,5 +311,8 @@ $("toggle").addEventListener("click", () => fold($("toggle"), $("panel"), $("pan
 $("accuracy").addEventListener("click", () => fold($("accuracy"), $("chart"), $("chart").hidden));
 addEventListener("keydown", (event) => event.key === "Escape" && points.list.length && points.clear());
 addEventListener("hashchange", open);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.refresh());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  if (gallery.shown) gallery.redraw();
+  else stage.refresh();
+});
 open();

@@ -612,11 +612,11 @@ def test_the_first_view_fits_the_window():
 
 
 def test_wrong_links_say_so():
-    with page(f"{SITE}/?dataset=wall", ready="document.querySelector('.problem')", complaints="400") as tab:
+    with page(f"{SITE}/?dataset=wall", ready="document.querySelector('.problem') !== null", complaints="400") as tab:
         assert "dataset" in tab.text(".problem p")
         tab.press_on(".problem a")
         tab.until(REST)
-    with page(f"{SITE}/nowhere", ready="document.querySelector('.problem')", complaints="404", dark=True) as tab:
+    with page(f"{SITE}/nowhere", ready="document.querySelector('.problem') !== null", complaints="404", dark=True) as tab:
         assert tab.text("h1") == "Not Found" and all(name for _, name in tab.names())
 
 

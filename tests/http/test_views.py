@@ -228,6 +228,7 @@ def test_thumbnails():
         assert d.ask(path, headers={"If-None-Match": tag}).status == 304
         assert d.ask(path, "HEAD").headers["ETag"] == tag and d.ask(path).headers["Splatd-Cache"] == "hit"
         version = d.ask("/v1/datasets/wall").json()["version"]
+        assert d.ask(f"{path}?background=ff0000").body != small.body
         large = d.ask(f"{path}?width=640&v={version}")
         assert camera(large)["width"] == 640 and "immutable" in large.headers["Cache-Control"]
         for query, field in (("width=15", "width"), ("width=1281", "width"), ("height=9", "height"), ("eye=1,2,3", "eye"),

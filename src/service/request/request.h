@@ -43,7 +43,7 @@ int spl_view_request_from_json(const char *body, size_t length, const struct spl
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
 
-/* GET …/thumbnail.jpg: the default view; `query` holds width and v. */
+/* GET …/thumbnail.jpg: the default view; `query` holds width, background and v. */
 int spl_thumbnail_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
                                      const struct spl_camera_limits *limits, struct spl_view_request *out,
                                      struct spl_error *err);
