@@ -81,12 +81,12 @@ static double judge(const struct spl_view_sample *s, double azimuth, double elev
         int x = (int)((dot(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
             y = (int)((dot(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
         double facing = 1, weight = (double)s->area[i];
-        if (s->normal)
+        if (s->sides)
             facing = -((double)s->normal[i][0] * axes[2][0] + (double)s->normal[i][1] * axes[2][1] +
                        (double)s->normal[i][2] * axes[2][2]);
         all += weight;
-        weight *= pow(fabs(facing), 1.5); /* from straight ahead it shows most */
-        if ((s->sides && facing <= 0) || x < 0 || x >= raster || y < 0 || y >= rows ||
+        weight *= pow(fmax(facing, 0), 1.5); /* from straight ahead it shows most */
+        if (facing <= 0 || x < 0 || x >= raster || y < 0 || y >= rows ||
             dot(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
             continue;
         filled[y][x] = true;
