@@ -5,12 +5,13 @@ import json
 import math
 import os
 import pathlib
+import socket
 import subprocess
 import tempfile
 import time
 
 import openapi
-from harness import FAKE, REAL, WALL, Daemon, Reply, run
+from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, run
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/json"}
@@ -188,12 +189,16 @@ def test_who_may_and_what():
             assert put(d, f"v{i}", DOOR).status == 201
         full = put(d, "v64", DOOR)
         assert full.status == 400 and full.json()["field"] == "name" and put(d, "v63", DOOR).status == 200
-        home.chmod(0o555)
-        try:
-            if os.geteuid():  # root writes all the same
-                assert put(d, "v0", {**DOOR, "fov": 20}).status == 500 and views(d)["v0"]["fov"] == 50
-        finally:
-            home.chmod(0o755)
+        (home / "wall.views.json").rename(home / "before")
+        (home / "wall.views.json" / "in the way").mkdir(parents=True)
+        for reply in (put(d, "v0", {**DOOR, "fov": 20}), delete(d, "v0")):
+            assert reply.status == 500 and str(home) not in reply.json()["detail"], reply.body
+        assert views(d)["v0"]["fov"] == 50 and not [p for p in home.iterdir() if p.name.startswith(".")]
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:  # a new version is on its way
+            s.sendall(f"PUT /v1/datasets/wall HTTP/1.1\r\nHost: a\r\nAuthorization: {AUTH['Authorization']}\r\n"
+                      "Content-Length: 5000\r\n\r\n".encode())
+            eventually(lambda: put(d, "v0", DOOR).status == 503)
+            assert delete(d, "v0").status == 503
     with Daemon(FAKE) as d:  # nobody is an admin without --tokens
         assert put(d, "door", DOOR, {}).status == 403
 
@@ -237,6 +242,9 @@ def test_thumbnails():
             assert reply.status == 400 and reply.json()["field"] == field, reply.body
         assert d.ask(f"{path}?v=0123456789abcdef").status == 404
         assert d.ask("/v1/datasets/nothing/thumbnail.jpg").status == 404
+    for setting, arguments, status in (({"FAKE_ROOM_PX": "0"}, (), 507), ({"FAKE_FRAME_MS": "2000"}, ("--deadline", "100"), 503)):
+        with Daemon(FAKE, *arguments, **setting) as d:
+            assert d.ask(path).status == status
 
 
 def test_the_default_view_fits_narrow_images():
