@@ -41,10 +41,16 @@ class Dataset:
         self.service, self.info, self.id = service, info, info["id"]
         low, high = info["bounds"]["min"], info["bounds"]["max"]
         self.center = [(a + b) / 2 for a, b in zip(low, high)]
+        self.title, self.description = info.get("title"), info.get("description")  # None where nobody has said any
+        self.views = {view["name"]: view for view in info.get("views", [])}
 
     def view(self, **params):
         """One view. Parameters as in api/openapi.yaml; vectors, and several terms of soft, are lists. A `camera` is a dict, in any convention."""
         return View(*self.ask(self.info["view"], params))
+
+    def thumbnail(self, width=320):
+        """The default view, small: a View with a JPEG at 16:9."""
+        return View(*self.ask(f"{self.info['uri']}/thumbnail.jpg", {"width": width}))
 
     def depth(self, layer="depth", **params):
         """(width, height, array of floats row by row): in the dataset's unit, NaN where nothing is."""

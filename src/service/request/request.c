@@ -156,13 +156,30 @@ void spl_values_resolve_version(const struct values *values, struct spl_view_req
     out->version = v->given ? (uint64_t)v->n[0] << 32 | (uint64_t)v->n[1] : 0;
 }
 
+int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
+                           struct spl_camera_defaults *own, struct spl_error *err)
+{
+    const struct spl_value *view = &values->v[PARAM_view];
+    if (!view->given)
+        return 0;
+    if (!(*defaults)->names)
+        return spl_fail_field(err, SPL_E_INPUT, "view", "there are no views by name here; leave view out");
+    *own = **defaults;
+    int rc = own->names->find(own->names, view->word, own, err);
+    *defaults = own;
+    return rc;
+}
+
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
     *out = (struct spl_view_request){0};
     spl_view_init(&out->view);
+    struct spl_camera_defaults own;
     int rc;
-    if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
+    out->named = given(values, PARAM_view);
+    if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
+        (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) ||
         (rc = spl_values_resolve_soft(values, defaults, &out->view, err)) || (rc = resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))

@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "base/decimal.h"
+#include "dataset/saved_views.h"
 #include "image/color.h"
 
 #define LAYER_NAMES "color, depth, range, normal, id, coverage, primitive"
@@ -35,6 +36,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
                        : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
+                       : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background and v"
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
@@ -74,6 +76,15 @@ static int parse_duration(struct spl_value *value, const char *name, const char 
     if (spl_decimal_parse(text, &count) != unit || scale == 0)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is no time; write 50ms, 0.05s or 50", name, text);
     value->n[0] = scale * count;
+    return 0;
+}
+
+static int parse_name(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    if (!spl_view_name_is_valid(text))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.64s' is no name of a view: " SPL_VIEW_NAME_FORMS, name,
+                              text);
+    snprintf(value->word, sizeof value->word, "%s", text);
     return 0;
 }
 
@@ -175,6 +186,8 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_layers(value, name, text, err);
     if (kind == SPL_KIND_CHOICE)
         return parse_choice(value, name, text, err);
+    if (kind == SPL_KIND_NAME)
+        return parse_name(value, name, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

@@ -22,6 +22,7 @@ enum {
     SPL_KIND_CONTAINER,
     SPL_KIND_DURATION, /* ms */
     SPL_KIND_VERSION,  /* upper and lower 32 bits */
+    SPL_KIND_NAME,     /* of a view */
     SPL_KIND_SOFT,     /* terms, which are kept beside the numbers */
 };
 
@@ -72,6 +73,9 @@ int spl_values_from_body(struct values *values, const char *body, size_t length,
  * soft. */
 int spl_values_add_soft(struct values *values, const char *text, struct spl_error *err);
 int spl_values_add_soft_json(struct values *values, const json_t *json, struct spl_error *err);
+/* `defaults`, or with `view` those of that view, in *own. SPL_E_INPUT, field "view". */
+int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
+                           struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */
 int spl_values_resolve_soft(const struct values *values, const struct spl_camera_defaults *defaults,
                             struct spl_view *view, struct spl_error *err);
