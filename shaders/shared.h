@@ -279,6 +279,15 @@ struct spl_draw_chunk {
 #define SPL_MESH_LANES 32
 #define SPL_MESH_WINDOW 112
 
+/* What of its light a sample keeps, of SPL_SHADE_WHOLE (shade.comp); kinds of it, as splatd/color.h has them. */
+#define SPL_SHADE_WHOLE 65536u
+#define SPL_SHADES_EDL 2u
+#define SPL_SHADES_HEADLIGHT 4u
+#define SPL_SHADES_SUN 8u
+/* Eye-dome lighting: half of what can be lost is where the sum over four pairs of samples of how much deeper than their
+ * mean it lies, as a share of its depth, is one over this. */
+#define SPL_SHADE_DEPTH 40.0f
+
 /* Marks: a byte a splat, four a word from the low end: SPL_CHUNK_SPLATS of a chunk of discs, SPL_MARKS_PANEL words of
  * each panel or mesh, a byte a cell, row by row. 0 = solid; else soft, 1 + SPL_MARK_MOST times the share W of eq. 22 of
  * Soft-Transparency, which is 1 (SPL_MARK_WHOLE) beyond the range in which a splat is partly solid. */
@@ -353,7 +362,8 @@ struct spl_frame_params {
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
-    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide */
+    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide; shade:
+                                             strength; map_sides: samples that are looked away; map_pose: the sun */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };

@@ -72,6 +72,7 @@ enum spl_param_changes {
     SPL_CHANGES_TEXTURES,   /* colours alone, and those of datasets with textures */
     SPL_CHANGES_MAPS,       /* colours and silhouettes, and those of datasets with maps of stations */
     SPL_CHANGES_PRIMITIVES, /* what is seen where, and that of datasets with lines or panels */
+    SPL_CHANGES_SHADE,      /* colours alone, and those of views that eye-dome lighting shades (splatd/color.h) */
     SPL_CHANGES_SOFT,       /* what is seen where, and that of views with a term of what is soft (splatd/soft.h) */
 };
 
@@ -107,7 +108,10 @@ enum spl_param_changes {
          "how far beyond the ends of a term spheres are still partly solid, in what it measures; 0: a sharp border")  \
     CHOICE(of, soft.of, soft_of, SPL_SOFT_OF_SOLID, SPL_CHANGES_SOFT,                                                  \
            "what layers but color and coverage, and picks, speak of; solid: what is solid alone; first: the nearest, " \
-           "soft or solid; median: the sphere that lets less than half through, else the solid")
+           "soft or solid; median: the sphere that lets less than half through, else the solid")                       \
+    REAL(edl_strength, shade.strength, 0, 1, 0.5, SPL_CHANGES_SHADE,                                                   \
+         "share of its light that the deepest gap loses, with shade edl")                                              \
+    COUNT(edl_radius, shade.radius, 1, 5, 2, SPL_CHANGES_SHADE, "pixels that are looked away for it")
 
 enum spl_method_param {
 #define SPL_PARAM_VALUE(name, ...) SPL_PARAM_##name,
@@ -119,7 +123,7 @@ enum spl_method_param {
 /* Those that every method takes: its row names them as well. */
 #define SPL_PARAMS_OF_ALL                                                                                              \
     (SPL_PARAM_BIT(soft_model) | SPL_PARAM_BIT(soft_opacity) | SPL_PARAM_BIT(soft_cover) |                             \
-     SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(of))
+     SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(of) | SPL_PARAM_BIT(edl_strength) | SPL_PARAM_BIT(edl_radius))
 
 enum spl_param_kind { SPL_PARAM_REAL, SPL_PARAM_WHOLE, SPL_PARAM_CHOICE };
 

@@ -194,7 +194,8 @@ static uint64_t count_work(const struct spl_tile *tile)
     uint32_t groups = 0;
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
         groups |= tile->view->layers >> layer & 1 ? 1u << group_of_layer[layer] : 0;
-    return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
+    const bool lit = spl_tile_get_shades(tile) & (SPL_SHADE_HEADLIGHT | SPL_SHADE_SUN);
+    return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups) + lit);
 }
 
 /* Too much for a step */
@@ -224,12 +225,15 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         struct spl_error why = {0};
         rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
         rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+        const uint64_t shaded = spl_tile_get_shades(tile) ? tile->samples : 0;
+        rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
             rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
             rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+            rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);
         if (rc || !again)
@@ -260,7 +264,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
-    bool first = true;
+    bool first = true, soft = true;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
     int rc = spl_tile_take_rounds(tile, err);
     rc = rc ? rc : spl_tile_dispatch_marks(tile, err);
@@ -271,10 +275,14 @@ static int record(struct spl_tile *tile, struct spl_error *err)
                 layers |= 1u << layer & wanted;
         if (!layers)
             continue;
-        rc = spl_method_row(tile->view->method)->record(tile, group, first, err);
-        if (!rc && first && spl_soft_is_drawn(tile))
+        if (group == SPL_SUMS_COLOR)
+            rc = spl_tile_light(tile, &first, err);
+        rc = rc ? rc : spl_method_row(tile->view->method)->record(tile, group, first, err);
+        if (!rc && group == SPL_SUMS_COLOR)
+            rc = spl_tile_deepen(tile, err);
+        if (!rc && soft && spl_soft_is_drawn(tile))
             rc = spl_soft_record(tile, group, err);
-        first = false;
+        first = soft = false;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
             if (layers >> layer & 1)
                 rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);

@@ -30,6 +30,7 @@ struct spl_scratch {
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
     struct spl_gpu_buffer *tests;    /* uint[], grown on demand */
     struct spl_gpu_buffer *marks;    /* bytes, grown on demand; what is in use is written in every tile */
+    struct spl_gpu_buffer *shades;   /* 4 bytes a sample, made with the first tile that is shaded; may be NULL */
     struct spl_soft_memory soft;     /* of soft spheres, from when there are any: soft/pass.h */
     uint64_t soft_bytes;             /* that it takes */
 };
@@ -96,6 +97,9 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
  * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err);
+/* Makes room for the factors of a shaded tile of so many samples; 0 needs none. Errors as of upload. */
+int spl_scratch_make_shades(struct spl_scratch *scratch, struct spl_residency *residency, uint64_t samples,
+                            struct spl_error *err);
 
 /* Begins an area and returns its memory, for who clears it. What holds between dispatches is ended by who began it. */
 bool spl_tile_may_begin(const struct spl_tile *tile, enum spl_area area); /* is its block free? */
@@ -193,6 +197,13 @@ void spl_tile_set_map(struct spl_tile *tile, uint32_t station);
 bool spl_tile_has_map_colors(const struct spl_tile *tile, uint32_t group);
 /* Records them, and a barrier: the group's sums (of method nearest payloads) become sums of floats. */
 int spl_tile_dispatch_maps(struct spl_tile *tile, struct spl_error *err);
+/* tile_shade.c: the kinds that colours of the tile are shaded by (SPL_SHADE_*), 0 where it has none; samples that
+ * shading looks away. light() records what of it comes from normals, which it draws for it, before the group of colours
+ * (`first` as of a method's record()); deepen() what comes from depths, behind it. */
+uint32_t spl_tile_get_shades(const struct spl_tile *tile);
+uint32_t spl_shade_get_reach(const struct spl_view *view, const struct spl_dataset_info *info);
+int spl_tile_light(struct spl_tile *tile, bool *first, struct spl_error *err);
+int spl_tile_deepen(struct spl_tile *tile, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */

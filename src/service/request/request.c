@@ -85,6 +85,12 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (rc)
         return rc;
     spl_values_resolve_splats(values, view);
+    if (given(values, PARAM_shade)) {
+        const double *shade = values->v[PARAM_shade].n;
+        view->shade.kinds = (uint32_t)shade[0];
+        view->shade.sun[0] = shade[1];
+        view->shade.sun[1] = shade[2];
+    }
     view->supersample = get(values, PARAM_supersample, 1);
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)

@@ -89,6 +89,16 @@ static int parse_version(struct spl_value *value, const char *name, const char *
     return 0;
 }
 
+static int parse_shade(struct spl_value *value, const char *text, struct spl_error *err)
+{
+    struct spl_shade_params shade = {0};
+    int rc = spl_shade_parse(text, &shade, err);
+    value->n[0] = shade.kinds;
+    value->n[1] = shade.sun[0];
+    value->n[2] = shade.sun[1];
+    return rc;
+}
+
 /* Of a method's parameter. */
 static int parse_choice(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
@@ -175,6 +185,8 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_layers(value, name, text, err);
     if (kind == SPL_KIND_CHOICE)
         return parse_choice(value, name, text, err);
+    if (kind == SPL_KIND_SHADE)
+        return parse_shade(value, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

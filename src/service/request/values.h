@@ -22,6 +22,7 @@ enum {
     SPL_KIND_CONTAINER,
     SPL_KIND_DURATION, /* ms */
     SPL_KIND_VERSION,  /* upper and lower 32 bits */
+    SPL_KIND_SHADE,    /* kinds, azimuth and elevation of the sun */
     SPL_KIND_SOFT,     /* terms, which are kept beside the numbers */
 };
 

@@ -82,6 +82,14 @@ static void add_terms(struct form *form, const struct spl_soft_params *soft)
     add(form, hash.low64);
 }
 
+/* What it comes to, so that what is so by itself and what is asked for have one key. */
+static void add_shade(struct form *form, const struct spl_shade_params *shade, uint32_t kinds)
+{
+    add(form, kinds);
+    add_number(form, kinds & SPL_SHADE_SUN ? shade->sun[0] : 0);
+    add_number(form, kinds & SPL_SHADE_SUN ? shade->sun[1] : 0);
+}
+
 static void add_encoding(struct form *form, const struct spl_view_request *request, enum spl_layer layer)
 {
     struct spl_encode_options options = spl_view_get_encoding(request, layer), *encode = &options;
@@ -107,15 +115,18 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
     bool colored = view->layers >> SPL_LAYER_COLOR & 1;
+    const uint32_t shades = colored && !request->picks ? spl_shade_for(&view->shade, dataset) : 0;
     uint32_t params = spl_method_get_params(view->method);
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {
         const struct spl_method_param_info *param = spl_method_param_get(i);
         bool counts = params >> i & 1 && spl_method_param_counts(param, dataset) &&
                       (colored || param->changes != SPL_CHANGES_TEXTURES) &&
+                      (shades & SPL_SHADE_EDL || param->changes != SPL_CHANGES_SHADE) &&
                       (view->soft.count || param->changes != SPL_CHANGES_SOFT);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
     add_terms(&form, &view->soft);
+    add_shade(&form, &view->shade, shades);
     add(&form, colored ? background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {
