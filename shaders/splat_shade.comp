@@ -17,6 +17,7 @@
 #include "common/texture.glsl"
 #else
 #include "common/clip.glsl"
+#include "common/paint.glsl"
 #endif
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -29,7 +30,11 @@ void draw(splat_run run, splat s)
         return;
     uvec3 value = uvec3(0u);
     if (GROUP == SPL_SUMS_COLOR)
+#ifdef SPL_TEXTURED
         value = load_color(run.chunk, s.index);
+#else
+        value = shown_color(run.chunk, s);
+#endif
     else if (GROUP == SPL_SUMS_NORMAL)
         value = uvec3(s.normal * 127.0 + 127.5);
     disc d = make_disc(s, run.low, run.high);

@@ -38,6 +38,7 @@ struct spl_view {
     enum spl_shapes shapes;     /* the same */
     struct spl_soft_params soft; /* what is soft, of every method */
     struct spl_shade_params shade; /* of colours: how what is solid is shaded, the same */
+    struct spl_color_params color; /* what they show, the same */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

@@ -96,6 +96,20 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
     return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
 }
 
+int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "color_by", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse_range(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "range", "%s: %s", option, why.message) : SPL_OK;
+}
+
 int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     struct spl_error why = {0};
@@ -176,6 +190,13 @@ void spl_cmd_print_soft(FILE *out, size_t column)
 
 void spl_cmd_print_colors(FILE *out, size_t column)
 {
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --color-by WHAT"), column,
+                          "what colours show: rgb, class, intensity or any attribute, height, normal, "
+                          "plane:x,y,z,nx,ny,nz, flat:COLOUR; rgb+intensity: times the splats' own (rgb)");
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --range LOW..HIGH"), column,
+                          "of values, which a ramp reaches from and to: 0..200, or shares of the splats, q0.02..q0.98 "
+                          "(the latter of attributes; of heights all there are)");
+    print_changing(out, SPL_CHANGES_COLORS, column);
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
                           "for shape: none, edl (darker where what lies around is nearer), headlight, "
                           "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, else none)");

@@ -84,7 +84,10 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
 {
     const struct spl_method_row *method = spl_method_row(job->view->method);
     uint32_t maps = spl_dataset_get_info(job->resident->dataset)->maps ? spl_view_get_maps(job->view) : 0;
-    bool textured = spl_view_is_textured(job->view) && !maps;
+    const bool painted = job->paint.kind && job->view->layers >> SPL_LAYER_COLOR & 1;
+    bool textured = spl_view_is_textured(job->view) && !maps && !painted;
+    maps &= ~(painted ? SPL_MAP_COLORS : 0u);
+    const bool lines = method->lines || spl_view_draws_lines(job->view);
     return (struct spl_select_params){
         .dataset = job->resident->dataset,
         .camera = camera,
@@ -93,7 +96,8 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .discs = method->discs,
         .panels = spl_view_draws_panels(job->view),
         .meshes = spl_view_draws_meshes(job->view),
-        .lines = method->lines || spl_view_draws_lines(job->view),
+        .lines = lines && !(painted && job->paint.stream >= 0), // they have no attributes, the splats they stand for do
+        .paint = painted ? &job->paint : NULL,
         .tables = ask_tables,
         .resident = ask_page,
         .atoms = textured ? job->view->disc.atoms : 0,
@@ -324,6 +328,8 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     int rc = spl_gpu_begin(gpu, err);
     if (rc)
         return rc;
+    if (tile->paint)
+        spl_paint_see(tile->paint, &tile->camera, spl_gpu_buffer_map(tile->renderer->scratch.palette));
     rc = record(tile, err);
     struct spl_error why = {0};
     int ended = spl_gpu_submit(gpu, &ticket, &why);

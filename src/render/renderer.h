@@ -10,6 +10,7 @@
 #include "gpu/gpu.h"
 #include "render/fill.h"
 #include "render/kernels.h"
+#include "render/paint.h"
 #include "render/residency.h"
 #include "render/select.h"
 #include "render/soft/order.h"
@@ -30,6 +31,7 @@ struct spl_scratch {
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
     struct spl_gpu_buffer *tests;    /* uint[], grown on demand */
     struct spl_gpu_buffer *marks;    /* bytes, grown on demand; what is in use is written in every tile */
+    struct spl_gpu_buffer *palette;  /* SPL_PALETTE_WORDS, written in every tile whose colours show something else */
     struct spl_gpu_buffer *shades;   /* 4 bytes a sample, made with the first tile that is shaded; may be NULL */
     struct spl_soft_memory soft;     /* of soft spheres, from when there are any: soft/pass.h */
     uint64_t soft_bytes;             /* that it takes */
@@ -72,6 +74,7 @@ struct spl_tile {
     uint64_t samples;
     struct spl_frame_params params;              /* common to all dispatches of the tile, but for map_* */
     struct spl_gpu_buffer *map;                  /* that map_* are of; NULL = none so far */
+    const struct spl_paint *paint;               /* what colours show; may be NULL: the splats' own */
     const atomic_bool *cancelled;                // may be NULL; borrowed
     uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
@@ -133,8 +136,8 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 /* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), of which some splats
  * are soft (common/marks.glsl), or several of these; NULL = as those that have none, but for marks. */
 enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_COUNT = 8 };
-/* The constant that says whether a kernel looks at marks. */
-enum { SPL_CONSTANT_MARKED = 3 };
+/* The constants that say whether a kernel looks at marks, and what colours show (SPL_PAINT_*). */
+enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
 };
@@ -197,6 +200,11 @@ void spl_tile_set_map(struct spl_tile *tile, uint32_t station);
 bool spl_tile_has_map_colors(const struct spl_tile *tile, uint32_t group);
 /* Records them, and a barrier: the group's sums (of method nearest payloads) become sums of floats. */
 int spl_tile_dispatch_maps(struct spl_tile *tile, struct spl_error *err);
+/* What colours show where they are of `group`; 0 = the splats' own, SPL_PAINT_NONE. */
+static inline uint32_t spl_tile_get_paint(const struct spl_tile *tile, uint32_t group)
+{
+    return group == SPL_SUMS_COLOR && tile->paint ? tile->paint->kind : SPL_PAINT_NONE;
+}
 /* tile_shade.c: the kinds that colours of the tile are shaded by (SPL_SHADE_*), 0 where it has none; samples that
  * shading looks away. light() records what of it comes from normals, which it draws for it, before the group of colours
  * (`first` as of a method's record()); deepen() what comes from depths, behind it. */

@@ -60,6 +60,7 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_MARKS].buffer = scratch->marks;
     bindings[SPL_RESOURCE_SOFT].buffer = scratch->soft.buffers[SPL_SOFT_STATE];
     bindings[SPL_RESOURCE_FOUND].buffer = scratch->soft.buffers[SPL_SOFT_FOUND];
+    bindings[SPL_RESOURCE_PALETTE].buffer = scratch->palette;
     bindings[SPL_RESOURCE_SHADES].buffer = scratch->shades;
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_MAP].buffer = tile->map;
@@ -116,6 +117,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
         {&scratch->tests, SPL_GPU_UPLOAD, tests_at_start},
         {&scratch->marks, SPL_GPU_DEVICE, marks_at_start},
+        {&scratch->palette, SPL_GPU_UPLOAD, SPL_PALETTE_WORDS * sizeof(uint32_t)},
     };
     uint64_t working = 0, mib = 1 << 20;
     uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
@@ -143,7 +145,8 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
     struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->large,  scratch->small,  scratch->output,
                                     scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
-                                    scratch->entries,  scratch->tests,  scratch->marks,  scratch->shades};
+                                    scratch->entries,  scratch->tests,  scratch->marks,  scratch->palette,
+                                    scratch->shades};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     spl_soft_memory_finish(&scratch->soft, gpu);

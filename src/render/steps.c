@@ -169,6 +169,10 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc)
         rc = spl_marks_init(&steps->job.marks, &view->soft, dataset, err);
     if (!rc)
+        rc = spl_paint_init(&steps->job.paint, &view->color, info, err);
+    if (!rc)
+        spl_paint_set_stream(&steps->job.paint, spl_dataset_get_streams(dataset, &(uint32_t){0}));
+    if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
@@ -198,6 +202,7 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
         struct spl_tile tile = {.renderer = job->renderer,
                                 .resident = job->resident,
                                 .view = &steps->view,
+                                .paint = job->paint.kind ? &job->paint : NULL,
                                 .cancelled = job->cancelled};
         spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
         int rc = spl_frame_render_tile(job, &tile, err);

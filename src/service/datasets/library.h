@@ -55,6 +55,7 @@ bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entr
 
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
+void spl_show_legend(struct request *request, const struct spl_call *call);
 
 /* describe.c: new references; NULL without memory. */
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);
