@@ -86,7 +86,7 @@ int spl_color_parse_range(const char *text, struct spl_color_params *out, struct
     bool shares[2];
     const char *at = text;
     for (int i = 0; i < 2; i++) {
-        at += i ? strspn(at, ".") : 0;
+        at += 2 * i; // behind the dots
         shares[i] = *at == 'q';
         const char *end = spl_decimal_parse(at + shares[i], &range[i]);
         bool more = end && !i && end[-1] == '.' && *end == '.'; // of 1..2, one dot is the number's

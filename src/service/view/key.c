@@ -38,7 +38,7 @@ uint64_t spl_renderer_hash(const struct spl_device_info *device)
 }
 
 struct form {
-    uint64_t words[96];
+    uint64_t words[128];
     size_t count;
 };
 
