@@ -141,12 +141,5 @@ int spl_color_check(const struct spl_color_params *color, struct spl_error *err)
     for (int i = 0; i < 2 && color->has_range; i++)
         if (!isfinite(color->range[i]) || (color->shares[i] && !(color->range[i] >= 0 && color->range[i] <= 1)))
             return spl_fail_field(err, SPL_E_USAGE, "range", "range has an end %g that is none", color->range[i]);
-    const bool measured = color->by != SPL_COLOR_BY_RGB && color->by != SPL_COLOR_BY_NORMAL && color->by != SPL_COLOR_BY_FLAT;
-    if (!measured && color->has_range)
-        return spl_fail_field(err, SPL_E_USAGE, "range", "range is of values, of which color_by has none here: it goes "
-                              "with height, a plane or an attribute");
-    if (!measured && color->ramp != SPL_RAMP_AUTO)
-        return spl_fail_field(err, SPL_E_USAGE, "ramp", "ramp is of values, of which color_by has none here: it goes "
-                              "with height, a plane or an attribute");
     return SPL_OK;
 }
