@@ -8,6 +8,7 @@
 #include "common/octahedral.glsl"
 #include "common/bend.glsl"
 #include "common/clip.glsl"
+#include "common/paint.glsl"
 #include "common/trim.glsl"
 
 struct work {
@@ -23,7 +24,7 @@ bool prepare(splat_run run, splat s, out work w)
         return false;
     w.payload = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
     if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
-        uvec3 c = load_color(run.chunk, s.index);
+        uvec3 c = shown_color(run.chunk, s);
         w.payload = c.x | c.y << 8 | c.z << 16;
     } else if (GROUP == SPL_SUMS_NORMAL) {
         w.payload = pack_normal(s.normal);

@@ -17,6 +17,7 @@
 #include "common/texture.glsl"
 #else
 #include "common/clip.glsl"
+#include "common/paint.glsl"
 #endif
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
@@ -37,7 +38,11 @@ bool prepare(splat_run run, splat s, out work w)
         return false;
     w.value = uvec3(0u);
     if (GROUP == SPL_SUMS_COLOR)
+#ifdef SPL_TEXTURED
         w.value = load_color(run.chunk, s.index);
+#else
+        w.value = shown_color(run.chunk, s);
+#endif
     else if (GROUP == SPL_SUMS_NORMAL)
         w.value = uvec3(s.normal * 127.0 + 127.5);
     w.id = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));

@@ -64,6 +64,10 @@ class Dataset:
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
         return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
 
+    def legend(self, color_by, ramp=None, range=None):
+        """What colours of a view with these parameters mean: an SVG, as bytes."""
+        return self.ask(f"{self.info['uri']}/legend.svg", {"color_by": color_by, "ramp": ramp, "range": range})[0]
+
     def place(self, crs, **point):
         """A point both ways: give position=[longitude, latitude, height], in crs ("EPSG:4326"), or world=[x, y, z]."""
         return json.loads(self.ask(f"{self.info['uri']}/place", {"crs": crs, **point})[0])

@@ -40,6 +40,7 @@ const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
 let dataset = null; // that the controls are set for
 let parameters = null; // their Controls, once there is a table of them
+let colors = {}; // what the fragment says of colours that has no control
 let soft = null; // the part of the panel for what is soft, as long
 
 /** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
@@ -58,7 +59,8 @@ function readSettings(before) {
   }
   $("method-help").textContent = findMethod(settings.method).description;
   stage.coarse = $("moving").value;
-  return {...settings, ...soft.read()};
+  for (const name of ["color_by", "shade"]) if ($(name).value) settings[name] = $(name).value;
+  return {...settings, ...colors, ...soft.read()};
 }
 
 function writeLink() {
@@ -130,6 +132,11 @@ async function open() {
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
+    const shown = ["height", "normal", ...dataset.attributes.map(({name}) => name)];
+    $("color_by").replaceChildren(new Option("its own", ""), ...shown.map((name) => new Option(name)));
+    choose($("color_by"), wanted.color_by ?? "");
+    choose($("shade"), wanted.shade ?? "");
+    colors = Object.fromEntries(["ramp", "range", "edl_strength", "edl_radius"].filter((name) => name in wanted).map((name) => [name, wanted[name]]));
     choices($("method"), dataset.methods, offered(wanted.method, dataset));
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);

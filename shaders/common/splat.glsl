@@ -73,6 +73,9 @@ spl_draw_chunk load_chunk(uint index)
     c.texture = chunk_word(index, 16);
     c.texture_scale = uintBitsToFloat(chunk_word(index, 17));
     c.marks = chunk_word(index, 18);
+    c.paint_word = chunk_word(index, 19);
+    c.paint_bits = chunk_word(index, 20);
+    c.paint_base = chunk_word(index, 21);
     return c;
 }
 
@@ -89,6 +92,14 @@ bit_run load_run(uint word, uint bit, int words)
     run.c = funnel(w2, w3, shift);
     run.d = funnel(w3, w4, shift);
     return run;
+}
+
+/* Code `index` of those that begin at `word`. */
+uint load_code(uint word, uint width, uint index)
+{
+    uint bit = index * width, at = word + (bit >> 5);
+    uint code = funnel(page_word(at), page_word(at + 1u), bit & 31u);
+    return width == 0u ? 0u : code & (0xffffffffu >> (32u - width));
 }
 
 /* Takes the next `width` (0..24) bits. */

@@ -293,7 +293,8 @@ int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint3
     uint32_t resolved = !mapped ? method->resolve : method->sums ? SPL_RESOLVED_MAPPED : SPL_RESOLVED_MAPPED_BENT;
     bool blended = layer == SPL_LAYER_COLOR || layer == SPL_LAYER_COVERAGE;
     uint32_t soft = !spl_soft_is_drawn(tile) ? 0 : blended ? 1 : spl_soft_is_found(tile->view) ? 2 : 0;
-    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft}};
+    const uint32_t shaded = layer == SPL_LAYER_COLOR && spl_tile_get_shades(tile);
+    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft, shaded}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
     params.map_near = (float)tile->view->soft.cover; /* no other word of its slot is free */

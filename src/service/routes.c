@@ -90,6 +90,7 @@ static const struct route {
     {"/v1/datasets/{id}", PUT, SPL_SCOPE_ADMIN, false, spl_put_dataset}, // called before the body
     {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
+    {"/v1/datasets/{id}/legend.svg", GET, SPL_SCOPE_VIEW, true, spl_show_legend},
     {"/v1/datasets/{id}/place", GET, SPL_SCOPE_VIEW, true, spl_show_place},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
     {"/v1/datasets/{id}/thumbnail.jpg", GET, SPL_SCOPE_VIEW, true, spl_make_thumbnail},

@@ -323,6 +323,23 @@ def test_layers_methods_and_budgets():
         assert link(tab)["lod"] == "1"
 
 
+def test_colours_and_shading():
+    with page() as tab:
+        digest = settled(tab)
+        tab.choose("#color_by", "height")
+        digest = settled(tab, digest)
+        tab.choose("#shade", "edl+headlight")
+        digest = settled(tab, digest)
+        assert link(tab)["color_by"] == "height" and link(tab)["shade"] == "edl+headlight", link(tab)
+        url = tab.run("location.href") + "&range=-5..5&ramp=turbo"
+    with page(url) as tab:
+        settled(tab)
+        assert {"color_by": "height", "shade": "edl+headlight", "range": "-5..5", "ramp": "turbo"}.items() <= link(tab).items(), link(tab)
+        tab.choose("#budget", "500ms")
+        tab.until("document.querySelector('#chosen').textContent.startsWith('Chosen: ')")
+        assert link(tab)["color_by"] == "height" and link(tab)["ramp"] == "turbo", link(tab)
+
+
 def test_the_address_restores_the_picture():
     with page() as tab:
         x, y = middle(tab)

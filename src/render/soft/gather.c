@@ -41,6 +41,7 @@ static int gather(const struct spl_soft_gathering *from, enum phase phase, const
     };
     const bool surface = spl_dataset_get_info(from->tile->resident->dataset)->has_surface;
     const uint32_t details = phase == GATHER && from->details ? surface ? 1 : 2 : 0;
+    const uint32_t paint = spl_tile_get_paint(from->tile, SPL_SUMS_COLOR);
     int rc = spl_soft_put_step(order, step, &with[SPL_RESOURCE_STEP], err);
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds && !rc; i++) {
         struct spl_disc_kernels kernels;
@@ -49,7 +50,8 @@ static int gather(const struct spl_soft_gathering *from, enum phase phase, const
                                           .lanes = kinds[i].lanes,
                                           .role = SPL_ROLE_SOFT,
                                           .with = with};
-        const struct spl_kernel_key key = {kinds[i].name, false, {phase, details}};
+        const struct spl_kernel_key key = {
+            kinds[i].name, false, {phase, details, [SPL_CONSTANT_PAINT] = phase == GATHER ? paint : SPL_PAINT_NONE}};
         rc = spl_tile_get_plain_kernels(from->tile, key, &what, &kernels, err);
         rc = rc ? rc : spl_tile_dispatch_splats(from->tile, &kernels, &what, err);
     }

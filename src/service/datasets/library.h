@@ -61,6 +61,7 @@ void spl_saving_abandon(struct spl_saving *saving); /* its request no longer wai
 
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
+void spl_show_legend(struct request *request, const struct spl_call *call);
 
 /* describe.c: new references; NULL without memory. */
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);

@@ -85,6 +85,7 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (rc)
         return rc;
     spl_values_resolve_splats(values, view);
+    spl_values_resolve_colors(values, view);
     view->supersample = get(values, PARAM_supersample, 1);
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)
@@ -92,6 +93,26 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (get(values, PARAM_transparent, 0) != 0)
         view->background[3] = 0;
     return 0;
+}
+
+void spl_values_resolve_colors(const struct values *values, struct spl_view *view)
+{
+    const double *shade = values->v[PARAM_shade].n, *range = values->v[PARAM_range].n;
+    const enum spl_ramp ramp = view->color.ramp; /* as a method's parameter, which is there by now */
+    view->color = values->color;
+    view->color.ramp = ramp;
+    if (given(values, PARAM_range)) {
+        view->color.has_range = true;
+        for (int i = 0; i < 2; i++) {
+            view->color.range[i] = range[i];
+            view->color.shares[i] = (int)range[2] >> i & 1;
+        }
+    }
+    if (given(values, PARAM_shade)) {
+        view->shade.kinds = (uint32_t)shade[0];
+        view->shade.sun[0] = shade[1];
+        view->shade.sun[1] = shade[2];
+    }
 }
 
 /* Samples and memory, not pixels alone, are what a view costs. */

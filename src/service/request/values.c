@@ -100,6 +100,32 @@ static int parse_version(struct spl_value *value, const char *name, const char *
     return 0;
 }
 
+static int parse_shade(struct spl_value *value, const char *text, struct spl_error *err)
+{
+    struct spl_shade_params shade = {0};
+    int rc = spl_shade_parse(text, &shade, err);
+    value->n[0] = shade.kinds;
+    value->n[1] = shade.sun[0];
+    value->n[2] = shade.sun[1];
+    return rc;
+}
+
+static int parse_range(struct spl_value *value, const char *text, struct spl_error *err)
+{
+    struct spl_color_params color = {0};
+    int rc = spl_color_parse_range(text, &color, err);
+    value->n[0] = color.range[0];
+    value->n[1] = color.range[1];
+    value->n[2] = (int)color.shares[0] | (int)color.shares[1] << 1;
+    return rc;
+}
+
+int spl_values_set_color(struct values *values, const char *text, struct spl_error *err)
+{
+    int rc = spl_value_claim(&values->v[PARAM_color_by], "color_by", err);
+    return rc ? rc : spl_color_parse(text, &values->color, err);
+}
+
 /* Of a method's parameter. */
 static int parse_choice(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
@@ -188,6 +214,10 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_choice(value, name, text, err);
     if (kind == SPL_KIND_NAME)
         return parse_name(value, name, text, err);
+    if (kind == SPL_KIND_RANGE)
+        return parse_range(value, text, err);
+    if (kind == SPL_KIND_SHADE)
+        return parse_shade(value, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

@@ -23,6 +23,9 @@ enum {
     SPL_KIND_DURATION, /* ms */
     SPL_KIND_VERSION,  /* upper and lower 32 bits */
     SPL_KIND_NAME,     /* of a view */
+    SPL_KIND_SHADE,    /* kinds, azimuth and elevation of the sun */
+    SPL_KIND_RANGE,    /* ends; bit per end that is a quantile */
+    SPL_KIND_COLOR_BY, /* what colours show, which is kept beside the numbers */
     SPL_KIND_SOFT,     /* terms, which are kept beside the numbers */
 };
 
@@ -44,6 +47,7 @@ extern const struct param_info spl_params[PARAM_COUNT];
 struct values {
     struct spl_value v[PARAM_COUNT]; /* colours: R, G, B, A */
     struct spl_soft_params soft;     /* terms alone, of PARAM_soft */
+    struct spl_color_params color;   /* what they show alone, of PARAM_color_by */
 };
 
 /* 0..15, -1 for anything else. */
@@ -68,6 +72,10 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
 /* A body's parameters, those of `place`; none for an empty one. */
 int spl_values_from_body(struct values *values, const char *body, size_t length, enum spl_value_place place,
                          struct spl_error *err);
+
+/* What colours show: of queries and of JSON. Claims the parameter. */
+int spl_values_set_color(struct values *values, const char *text, struct spl_error *err);
+void spl_values_resolve_colors(const struct values *values, struct spl_view *view);
 
 /* soft.c: more terms, as text, or as JSON: text, or an array of such, which may be empty and then says that nothing is
  * soft. */
