@@ -6,6 +6,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"
+#include "common/paint.glsl"
 #include "common/octahedral.glsl"
 #include "common/soft.glsl"
 #include "common/soft_step.glsl"
@@ -110,7 +111,7 @@ void main()
                 uint own = (span.x + 1u) * (span.y + 1u);
                 if (PHASE == 2u) {
                     uint at = SPL_SOFT_ITEM_WORDS * next;
-                    uvec3 color = load_color(run.chunk, i);
+                    uvec3 color = shown_color(run.chunk, load_splat(run.chunk, i, !PAINTS_NORMALS));
                     items[at] = floatBitsToUint(p.x);
                     items[at + 1u] = floatBitsToUint(p.y);
                     items[at + 2u] = key;

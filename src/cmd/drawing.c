@@ -96,6 +96,27 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
     return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
 }
 
+int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "color_by", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse_range(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "range", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_shade_parse(text, &((struct spl_cmd_drawing *)drawing)->view.shade, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "shade", "%s: %s", option, why.message) : SPL_OK;
+}
+
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     return spl_cmd_parse_color(option, text, ((struct spl_cmd_drawing *)drawing)->view.background, err);
@@ -150,13 +171,34 @@ void spl_cmd_print_methods(FILE *out, size_t column)
     }
 }
 
+/* What any method takes. */
+static void print_changing(FILE *out, enum spl_param_changes changes, size_t column)
+{
+    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+        if (spl_method_param_get((enum spl_method_param)i)->changes == changes)
+            print_param(out, (enum spl_method_param)i, column);
+}
+
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
                           "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', "
                           "'uncertainty>q0.9', 'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
                           "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
-    for (int i = 0; i < SPL_PARAM_COUNT; i++)
-        if (SPL_PARAMS_OF_ALL >> i & 1)
-            print_param(out, (enum spl_method_param)i, column);
+    print_changing(out, SPL_CHANGES_SOFT, column);
+}
+
+void spl_cmd_print_colors(FILE *out, size_t column)
+{
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --color-by WHAT"), column,
+                          "what colours show: rgb, class, intensity or any attribute, height, normal, "
+                          "plane:x,y,z,nx,ny,nz, flat:COLOUR; rgb+intensity: times the splats' own (rgb)");
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --range LOW..HIGH"), column,
+                          "of values, which a ramp reaches from and to: 0..200, or shares of the splats, q0.02..q0.98 "
+                          "(the latter of attributes; of heights all there are)");
+    print_changing(out, SPL_CHANGES_COLORS, column);
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
+                          "for shape: none, edl (darker where what lies around is nearer), headlight, "
+                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, else none)");
+    print_changing(out, SPL_CHANGES_SHADE, column);
 }

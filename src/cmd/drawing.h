@@ -34,7 +34,11 @@ int spl_cmd_take_background(void *drawing, const char *option, char *text, struc
 int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err);
 void spl_cmd_print_soft(FILE *out, size_t column);
+void spl_cmd_print_colors(FILE *out, size_t column);
 void spl_cmd_print_methods(FILE *out, size_t column);
 
 #define SPL_CMD_PARAM_ROW(param, ...) {.name = #param, .form = "X", .take = spl_cmd_take_param},
@@ -46,9 +50,15 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
          .take = spl_cmd_take_background},                                                                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
+        {.help = "Colours and their shading, with any method:", .print = spl_cmd_print_colors},                        \
+        {"color-by", "WHAT", NULL, .take = spl_cmd_take_color},                                                        \
+        {"range", "LOW..HIGH", NULL, .take = spl_cmd_take_range},                                                      \
+        {"shade", "KINDS", NULL, .take = spl_cmd_take_shade},                                                          \
+        {"edl-strength", "X", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */       \
+        {"edl-radius", "N", NULL, .take = spl_cmd_take_param},                                                         \
         {.help = "Soft transparency, with any method:", .print = spl_cmd_print_soft},                                  \
         {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
-        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \
+        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param},                                                      \
         {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
         {"soft-cover", "X", NULL, .take = spl_cmd_take_param},                                                         \
         {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \

@@ -191,6 +191,8 @@ static void print_table(const struct spl_info_report *report)
     size_t i;
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
+    if (info->title)
+        print_line("  title", info->title);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");
@@ -233,6 +235,8 @@ static void print_table(const struct spl_info_report *report)
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
+    for (uint32_t v = 0; v < info->view_count; v++)
+        printf("  view          --view %s\n", info->views[v].name);
     printf("  splat radius  %.4g %s (median)\n", info->splat_radius, spl_unit_word(info));
     printf("  pages         %s, %.1f MB resident", spl_cmd_group(info->pages, a),
            (double)(info->page_bytes - info->map_bytes) / 1e6);

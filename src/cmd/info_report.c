@@ -8,6 +8,7 @@
 
 #include "dataset/chunk_clip.h"
 #include "dataset/panels.h"
+#include "dataset/saved_views.h"
 
 const struct spl_info_code spl_info_codes[SPL_INFO_CODES] = {
     {"position_axis",
@@ -244,7 +245,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
         "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, "
-        "s:o}",
+        "s:o, s:s?, s:s?, s:o}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -262,5 +263,6 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
         json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "pruned",
         json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
-        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report));
+        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report), "title", info->title,
+        "description", info->description, "views", spl_saved_views_to_json(info->views, info->view_count));
 }

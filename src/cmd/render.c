@@ -15,7 +15,9 @@
 #include "cmd/drawing.h"
 #include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "dataset/saved_views.h"
 #include "geom/camera_json.h"
+#include "geom/fit.h"
 #include "geom/size.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
@@ -23,6 +25,7 @@
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
+    const char *view; // may be NULL; the name of one that the dataset was packed with
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
@@ -39,6 +42,8 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
+    {"view", "NAME", "or that view's, which the dataset was packed with ('splatd info' lists them)",
+     SPL_CMD_TEXT(struct arguments, view)},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
     {"crs", "EPSG:N", "what --eye, --target and shapes of --soft are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
@@ -128,11 +133,34 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
     return rc;
 }
 
-static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+/* The default view, or --view: its eye, target and up, and its field of view in *camera. */
+static int start_camera(const struct arguments *a, const struct spl_dataset *dataset, struct spl_saved_view *from,
+                        struct spl_camera *camera, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    const uint32_t *size = a->drawing.size;
+    int rc = spl_dataset_get_default_camera(dataset, size[0], size[1], camera, err);
+    memcpy(from->eye, info->default_eye, sizeof from->eye);
+    memcpy(from->target, info->default_target, sizeof from->target);
+    memcpy(from->up, info->default_up, sizeof from->up);
+    if (rc || !a->view)
+        return rc;
+    const struct spl_saved_view *view = spl_saved_views_find(info->views, info->view_count, a->view);
+    if (!view)
+        return spl_fail_field(err, SPL_E_USAGE, "view", "--view: '%s' has no view '%.64s'; 'splatd info' lists them",
+                              info->id, a->view);
+    *from = *view;
+    if ((rc = spl_camera_set_fov(camera, spl_fit_fov((double[]){view->fov, view->fov}, size[0], size[1]), size[0], size[1],
+                                 err)))
+        return rc;
+    return spl_camera_look_at(camera, view->eye, view->target, view->up, err);
+}
+
+static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+{
     struct spl_camera *camera = &a->drawing.view.camera;
-    int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
+    struct spl_saved_view from = {0};
+    int rc = start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
     if (!isnan(a->fov) && !isnan(a->fx))
@@ -147,9 +175,9 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     camera->cx = isnan(a->cx) ? camera->cx : a->cx;
     camera->cy = isnan(a->cy) ? camera->cy : a->cy;
     if (!isnan(a->eye[0]) || !isnan(a->target[0]) || !isnan(a->up[0]))
-        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? info->default_eye : a->eye,
-                                isnan(a->target[0]) ? info->default_target : a->target,
-                                isnan(a->up[0]) ? info->default_up : a->up, err);
+        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? from.eye : a->eye,
+                                isnan(a->target[0]) ? from.target : a->target,
+                                isnan(a->up[0]) ? from.up : a->up, err);
     if (rc)
         return rc;
     camera->near = isnan(a->near) ? camera->near : a->near;

@@ -132,6 +132,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
     memcpy(defaults.target, info->default_target, sizeof defaults.target);
     memcpy(defaults.up, info->default_up, sizeof defaults.up);
+    memcpy(defaults.fit, info->default_fit, sizeof defaults.fit);
     int rc = spl_dataset_get_default_camera(dataset, 16, 9, &camera, err);
     defaults.near = camera.near;
     defaults.far = camera.far;

@@ -9,13 +9,14 @@
 
 #include "gpu/gpu.h"
 
-enum { SPL_KERNEL_CONSTANTS = 4 };
+enum { SPL_KERNEL_CONSTANTS = 5 };
 
 struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */
     bool wide;                                /* its variant with 64 bit atomics where the device has them */
     uint32_t constants[SPL_KERNEL_CONSTANTS]; /* as the shader numbers them; those that it does not declare are 0 */
     bool trims;                               /* its variant NAME_trim, for chunks that a map trims */
+    bool shared;                              /* its variant NAME_shared, for hardware (shaders/common/walk.glsl) */
 };
 
 struct spl_kernels {

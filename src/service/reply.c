@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "service/exchange.h"
 #include "service/ops/access_log.h"
+#include "service/pages.h"
 #include "service/state.h"
 #include "service/view/views.h"
 
@@ -122,7 +123,15 @@ char *spl_problem_text(const struct request *request, const struct spl_error *er
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail)
 {
-    set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
+    if (!spl_problem_wants_page(request)) {
+        set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
+        return;
+    }
+    set_text(request, status, "text/html; charset=utf-8", spl_problem_print_page(request, status, detail));
+    if (!request->response)
+        return;
+    spl_reply_add_header(request, "Content-Security-Policy", "%s", spl_page_policy);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_VARY, "%s", MHD_HTTP_HEADER_ACCEPT);
 }
 
 void spl_reply_error(struct request *request, const struct spl_error *err)

@@ -42,6 +42,9 @@ def test_python_views():
         service = Splatd(url(d) + "/")
         assert service.datasets() == ["wall"]
         wall = service.dataset("wall")
+        assert wall.title is None and wall.description is None and wall.views == {}
+        thumbnail = wall.thumbnail(width=64)
+        assert thumbnail.bytes.startswith(JPEG) and thumbnail.camera["width"] == 64 and thumbnail.camera["height"] == 36
         view = wall.view(**POSE, **SMALL, transparent=False)
         assert view.bytes.startswith(JPEG) and view.type == "image/jpeg"
         assert view.camera["eye"] == [3, 0, 1] and view.camera["width"] == 65

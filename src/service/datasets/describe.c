@@ -162,6 +162,8 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "state", json_string("ready"));
     set(json, "uri", json_string(entry->uri));
     set(json, "view", json_sprintf("%s/view", entry->uri));
+    set(json, "thumbnail", json_sprintf("%s/thumbnail.jpg", entry->uri));
+    set(json, "title", info->title ? json_string(info->title) : json_null());
     set(json, "unit", json_string(spl_unit_word(info)));
     const char *crs = spl_places_get_crs(entry->places);
     set(json, "crs", *crs ? json_string(crs) : json_null());
@@ -195,7 +197,11 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
             json_array_append_new(formats, json_string(spl_format_name((enum spl_format)i)));
     set(json, "formats", formats);
     set(json, "default_view",
-        json_pack("{s:o, s:o, s:o, s:f}", "eye", vector(info->default_eye), "target", vector(info->default_target),
-                  "up", vector(info->default_up), "fov", info->default_fov));
+        json_pack("{s:o, s:o, s:o, s:f, s:o}", "eye", vector(info->default_eye), "target",
+                  vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "fit",
+                  info->default_fit[0] > 0 ? json_pack("[f, f]", info->default_fit[0], info->default_fit[1])
+                                           : json_null()));
+    set(json, "description", info->description ? json_string(info->description) : json_null());
+    set(json, "views", spl_saved_describe(entry->saved));
     return json;
 }

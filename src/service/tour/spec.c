@@ -102,6 +102,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
         return fail_type("settings", "an object", settings, err);
     if (json_object_get(settings, "camera"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
+    if (json_object_get(settings, "view"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.view", "a tour's cameras are its path; name no view");
     if (json_object_get(settings, "crs"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.crs",
                               "crs goes into the path, beside its keyframes or frames");
