@@ -89,6 +89,14 @@ def test_who_takes_long_gives_way():
         assert ended[0].status == 200, ended[0].body
 
 
+def test_blanks_are_plus_in_queries():
+    with Daemon(FAKE) as d:
+        for text, terms in [("class+%3E0.4", ["class>0.4"]), ("0.1+%3C+class", ["class>0.1"]), ("class:3+-+5", ["class:3..5"]),
+                            ("class%3C1e+5", ["class<100000"]), ("class%3C+5+or+class%3E+9", ["class<5", "class>9"])]:
+            reply = d.ask(f"{VIEW}?width=8&height=8&soft={text}")
+            assert reply.status == 200 and soft(reply)["soft"] == terms, (text, reply.body[:300], reply.headers)
+
+
 def test_a_batch_says_which_view():
     with Daemon(FAKE) as d:
         batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "views": [{}, {"soft": "nothing_like_it>3"}]}))

@@ -78,11 +78,26 @@ static int parse_color(struct values *values, const char *text, size_t length, s
     return rc ? rc : spl_values_set_color(values, decoded, err);
 }
 
+static bool is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+/* '+' is a blank, as forms in pages write it, but for an exponent's sign (1e+05). */
+static void read_blanks(char *text)
+{
+    for (char *p = text; (p = strchr(p, '+')); p++)
+        if (!(p - text >= 2 && (p[-1] == 'e' || p[-1] == 'E') && (is_digit(p[-2]) || p[-2] == '.') && is_digit(p[1])))
+            *p = ' ';
+}
+
 /* May be given several times, and is longer than others. */
 static int parse_soft(struct values *values, const char *text, size_t length, struct spl_error *err)
 {
     char decoded[SPL_SOFT_TEXT_MAX + 1];
     int rc = spl_percent_decode(text, length, decoded, sizeof decoded, "soft", err);
+    if (!rc)
+        read_blanks(decoded);
     return rc ? rc : spl_values_add_soft(values, decoded, err);
 }
 
