@@ -3,6 +3,7 @@
 #include "base/decimal.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,4 +31,14 @@ const char *spl_decimal_parse(const char *text, double *value)
         return NULL;
     *value = number;
     return end;
+}
+
+const char *spl_decimal_print(double value, char text[SPL_DECIMAL_TEXT])
+{
+    for (int count = 6; count <= 17; count++) {
+        snprintf(text, SPL_DECIMAL_TEXT, "%.*g", count, value);
+        if (strtod(text, NULL) == value)
+            break;
+    }
+    return text;
 }

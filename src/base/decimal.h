@@ -8,4 +8,9 @@
  * would take, and what is beyond a double. Any thread. */
 const char *spl_decimal_parse(const char *text, double *value);
 
+/* In as few digits as read as the same number, six at least: what is just beyond a limit is not printed as the limit.
+ * Any thread. */
+enum { SPL_DECIMAL_TEXT = 40 };
+const char *spl_decimal_print(double value, char text[SPL_DECIMAL_TEXT]); /* returns `text` */
+
 #endif

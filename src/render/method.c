@@ -6,6 +6,7 @@
 
 #include <splatd/render.h>
 
+#include "base/decimal.h"
 #include "base/error.h"
 #include "shared.h"
 
@@ -139,10 +140,12 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
         return SPL_OK;
     if (param->kind == SPL_PARAM_CHOICE)
         return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %g does not exist", param->name, value);
+    char text[SPL_DECIMAL_TEXT];
+    spl_decimal_print(value, text);
     if (param->otherwise < param->least)
-        return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %g is neither %g nor within %g and %g", param->name,
-                              value, param->otherwise, param->least, param->most);
-    return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %g is not within %g and %g", param->name, value,
+        return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %s is neither %g nor within %g and %g", param->name,
+                              text, param->otherwise, param->least, param->most);
+    return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %s is not within %g and %g", param->name, text,
                           param->least, param->most);
 }
 

@@ -95,6 +95,8 @@ def test_blanks_are_plus_in_queries():
                             ("class%3C1e+5", ["class<100000"]), ("class%3C+5+or+class%3E+9", ["class<5", "class>9"])]:
             reply = d.ask(f"{VIEW}?width=8&height=8&soft={text}")
             assert reply.status == 200 and soft(reply)["soft"] == terms, (text, reply.body[:300], reply.headers)
+        refused = d.view(width=8, height=8, soft=AXIS, soft_opacity="1.0000000001").json()
+        assert "1.0000000001 is not" in refused["detail"], refused
 
 
 def test_a_batch_says_which_view():

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "base/error.h"
 
 static const char *const model_names[SPL_SOFT_MODEL_COUNT] = {
@@ -93,16 +94,17 @@ bool spl_soft_check_term(const struct spl_soft_term *term, char fault[SPL_SOFT_F
 
 int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
 {
-    char fault[SPL_SOFT_FAULT_MAX];
+    char fault[SPL_SOFT_FAULT_MAX], number[SPL_DECIMAL_TEXT];
     if (soft->count > SPL_SOFT_TERMS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "soft", "%u terms are more than %d", soft->count, SPL_SOFT_TERMS_MAX);
     if ((unsigned)soft->model >= SPL_SOFT_MODEL_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "soft_model", "soft_model %d does not exist", (int)soft->model);
     if (!(soft->opacity >= 0 && soft->opacity <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "soft_opacity", "soft_opacity %g is not within 0 and 1",
-                              soft->opacity);
+        return spl_fail_field(err, SPL_E_USAGE, "soft_opacity", "soft_opacity %s is not within 0 and 1",
+                              spl_decimal_print(soft->opacity, number));
     if (!(soft->cover >= 0 && soft->cover <= 1))
-        return spl_fail_field(err, SPL_E_USAGE, "soft_cover", "soft_cover %g is not within 0 and 1", soft->cover);
+        return spl_fail_field(err, SPL_E_USAGE, "soft_cover", "soft_cover %s is not within 0 and 1",
+                              spl_decimal_print(soft->cover, number));
     if (!(soft->blend >= 0 && isfinite(soft->blend)))
         return spl_fail_field(err, SPL_E_USAGE, "soft_blend", "soft_blend %g is not 0 or more", soft->blend);
     if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)
