@@ -184,6 +184,38 @@ static void panels_alone(void **state)
     spl_dataset_close(dataset);
 }
 
+/* The largest disc of the leaves, or of the nodes above them. */
+static float largest_disc(const struct spl_dataset *dataset, bool inner)
+{
+    uint64_t nodes, chunks;
+    const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
+    const struct spl_chunk *all = spl_dataset_get_chunks(dataset, &chunks);
+    float largest = 0;
+    for (uint64_t n = 0; n < nodes; n++)
+        for (uint64_t c = node[n].first_chunk; c < node[n].first_chunk + node[n].chunk_count; c++)
+            for (uint32_t i = 0; (node[n].child_count > 0) == inner && i < all[c].count; i++) {
+                struct spl_splat splat;
+                if (spl_chunk_kind(&all[c]) != SPL_CHUNK_DISCS)
+                    continue;
+                assert_true(spl_dataset_find_splat(dataset, all[c].first_id + i, &splat));
+                largest = fmaxf(largest, splat.radius);
+            }
+    return largest;
+}
+
+/* A few points that lie by themselves before walls: no level has a disc from one to the other. */
+static void few_discs_beside_panels_stay_small(void **state)
+{
+    (void)state;
+    pack(write_corner("strays.csv", walls, 5), path_of("strays.spld"), SPL_PRIMITIVES_ALL, 2, NULL);
+    struct spl_dataset *dataset = open_verified(path_of("strays.spld"));
+    const float leaves = largest_disc(dataset, false), above = largest_disc(dataset, true);
+    print_message("largest disc %.3f, of the levels above %.3f\n", (double)leaves, (double)above);
+    assert_true(leaves > 0 && leaves < 0.1f);
+    assert_true(above > 0 && above < 2.5f * leaves);
+    spl_dataset_close(dataset);
+}
+
 /* Nothing flat: but for what META says, primitives change nothing. */
 static void foliage_alone(void **state)
 {
@@ -324,6 +356,7 @@ int main(void)
         cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(panels_alone),
         cmocka_unit_test(foliage_alone),
+        cmocka_unit_test(few_discs_beside_panels_stay_small),
         cmocka_unit_test(counts_of_panels_are_compared),
         cmocka_unit_test(what_does_not_go_together_is_refused),
         cmocka_unit_test(a_bound_is_held_against_the_scan),
