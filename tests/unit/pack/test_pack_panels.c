@@ -216,6 +216,34 @@ static void few_discs_beside_panels_stay_small(void **state)
     spl_dataset_close(dataset);
 }
 
+/* A sagging wire through foliage over a wall: where lines stand for splats these share no chunk with others, so that a
+ * view that softens the foliage finds in the headers that no wire is soft. */
+static void splats_on_wires_have_chunks_of_their_own(void **state)
+{
+    (void)state;
+    const char *scan = write_corner("wire.csv", walls, foliage), *out = path_of("wire.spld");
+    uint64_t chunks, linear = 0, others = 0, lines = 0;
+    FILE *f = fopen(scan, "ab");
+    assert_non_null(f);
+    for (int i = 0; i < 600; i++)
+        fprintf(f, "%.5f,%.5f,%.5f,20,20,20,14\n", 0.01 * i - 2, 0.71, 0.72 + 0.02 * (0.01 * i - 2) * (0.01 * i - 2));
+    assert_int_equal(fclose(f), 0);
+    pack(scan, out, SPL_PRIMITIVES_ALL, 2, NULL);
+    struct spl_dataset *dataset = open_verified(out);
+    const struct spl_chunk *all = spl_dataset_get_chunks(dataset, &chunks);
+    for (uint64_t c = 0; c < chunks; c++) {
+        const uint32_t mode = all[c].geometry_bits >> SPL_GEOMETRY_LINEAR;
+        lines += spl_chunk_kind(&all[c]) == SPL_CHUNK_LINES;
+        if (spl_chunk_kind(&all[c]) != SPL_CHUNK_DISCS)
+            continue;
+        assert_int_not_equal(mode, SPL_LINEAR_SOME);
+        linear += mode == SPL_LINEAR_ALL ? all[c].count : 0;
+        others += mode == SPL_LINEAR_ALL ? 0 : all[c].count;
+    }
+    assert_true(lines > 0 && linear > 300 && others > foliage / 2);
+    spl_dataset_close(dataset);
+}
+
 /* Nothing flat: but for what META says, primitives change nothing. */
 static void foliage_alone(void **state)
 {
@@ -357,6 +385,7 @@ int main(void)
         cmocka_unit_test(panels_alone),
         cmocka_unit_test(foliage_alone),
         cmocka_unit_test(few_discs_beside_panels_stay_small),
+        cmocka_unit_test(splats_on_wires_have_chunks_of_their_own),
         cmocka_unit_test(counts_of_panels_are_compared),
         cmocka_unit_test(what_does_not_go_together_is_refused),
         cmocka_unit_test(a_bound_is_held_against_the_scan),
