@@ -241,8 +241,8 @@ static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node 
         grow_box(header, splats, position, &out->chunks[c]);
         out->chunks[c].geometry_word = (uint32_t)out->word_count;
         out->word_count += words;
-        out->word_count += spl_emitted_streams_encode(w->streams, w->points, node, w->items + first, used, out->codes[c],
-                                                      w->words + out->word_count);
+        out->word_count += spl_emitted_streams_encode(w->streams, w->points, node, w->items + first, used,
+                                                      out->codes[c], w->words + out->word_count);
         out->error.position_over_radius += error.position_over_radius;
         out->error.normal_radians += error.normal_radians;
     }

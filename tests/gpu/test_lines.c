@@ -86,13 +86,14 @@ static void lines_around_the_eye_match(void **state)
     done(dataset);
 }
 
-/* Two discs far below, of which none (0), both (1) or the first (2) are linear, and a line from (-1, 0, 0) to (1, 0, 0.2) in `pieces`. */
+/* Two discs far below, of which none (0), both (1) or the first (2) are linear, and a line from (-1, 0, 0) to
+ * (1, 0, 0.2) in `pieces`. */
 static struct spl_dataset *one_line(int pieces, float width, int linear)
 {
     struct make_splat all[vertices + 2] = {0};
     for (int i = 0; i < 2; i++)
         all[i] = (struct make_splat){
-            .position = {0.1 * i, 0, -0.5}, .normal = {0, -1, 0}, .radius = 0.05f, .linear = linear && (linear == 1 || i == 0)};
+            .position = {0.1 * i, 0, -0.5}, .normal = {0, -1, 0}, .radius = 0.05f, .linear = linear == 1 || linear > 1 + i};
     for (int i = 0; i <= pieces; i++)
         all[2 + i] = (struct make_splat){.position = {2.0 * i / pieces - 1, 0, 0.2 * i / pieces},
                                          .normal = {0, -1, 0},
