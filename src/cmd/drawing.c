@@ -5,7 +5,10 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "render/soft/share.h"
+#include "render/soft_params.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -86,6 +89,8 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
     }
     if (!rc)
         spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
+    if (!rc && SPL_PARAMS_OF_ALL >> param & 1)
+        ((struct spl_cmd_drawing *)drawing)->soft_option = option;
     return rc;
 }
 
@@ -94,6 +99,36 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
     struct spl_error why = {0};
     int rc = spl_soft_parse(text, &((struct spl_cmd_drawing *)drawing)->view.soft, &why);
     return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
+int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
+{
+    if (!drawing->soft_option || drawing->view.soft.count)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_USAGE, "soft",
+                          "%s is of what is soft, and nothing is: say what with --soft, as in --soft 'class:3-5'; "
+                          "'splatd info' says what the dataset has",
+                          drawing->soft_option);
+}
+
+void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *dataset,
+                       const struct spl_frame_stats *stats)
+{
+    uint32_t told = 0;
+    for (uint32_t i = 0; i < view->soft.count; i++) {
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_SOFT_TEXT_MAX];
+        const struct spl_soft_params one = {.count = 1, .terms = {view->soft.terms[i]}};
+        spl_soft_explain(&view->soft.terms[i], spl_dataset_get_info(dataset), reason);
+        if (!*reason)
+            continue;
+        spl_soft_print(&one, text, sizeof text);
+        fprintf(stderr, "splatd: nothing is soft by '%s': ", text);
+        spl_cmd_put_text(stderr, reason, 0);
+        fputc('\n', stderr);
+        told++;
+    }
+    if (stats && told < view->soft.count && spl_view_shows_soft(view) && !stats->soft_drawn)
+        fprintf(stderr, "splatd: nothing of what is in view is soft, or it lies behind what is not\n");
 }
 
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "render/marks.h"
+#include "render/soft/hints.h"
 
 static bool is_shape(const struct spl_soft_term *term)
 {
@@ -21,16 +22,19 @@ static int find_stream(const struct spl_dataset_info *info, const char *name)
     return -1;
 }
 
-static int refuse_name(const struct spl_dataset_info *info, const char *name, struct spl_error *err)
+static int refuse_name(const struct spl_dataset_info *info, const struct spl_soft_term *term, struct spl_error *err)
 {
+    char hint[SPL_SOFT_HINT_MAX];
+    const bool hinted = spl_soft_hint_name(term, info, hint);
     char known[SPL_STREAMS_MAX * (SPL_STREAM_TEXT_MAX + 2)] = "";
     size_t used = 0;
     for (uint32_t s = 0; s < info->stream_count; s++)
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, "soft", "dataset '%s' has no attribute '%s': it has %s", info->id, name,
-                          used ? known : "none, so that only axis, plane and box are left");
+    return spl_fail_field(err, SPL_E_INPUT, "soft", "dataset '%s' has no attribute '%s': it has %s%s%s", info->id,
+                          term->name, used ? known : "none, so that only axis, plane and box are left",
+                          hinted ? "; " : "", hinted ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_soft_term *term, struct spl_error *err)
@@ -80,7 +84,7 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
         return SPL_OK;
     out->stream = find_stream(info, term->name);
     if (out->stream < 0)
-        return refuse_name(info, term->name, err);
+        return refuse_name(info, term, err);
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
     out->complete = values && values->count == info->leaf_splats;
     const bool share = term->measure == SPL_SOFT_ATTRIBUTE && !strcmp(term->name, "uncertainty");
