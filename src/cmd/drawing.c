@@ -65,6 +65,7 @@ static void replace(char *text, char from, char to)
 
 int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err)
 {
+    struct spl_cmd_drawing *d = drawing;
     char name[64];
     snprintf(name, sizeof name, "%s", option + strspn(option, "-"));
     replace(name, '-', '_');
@@ -88,9 +89,9 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
         rc = rc ? rc : spl_method_param_check(info, value, err);
     }
     if (!rc)
-        spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
+        spl_view_set_param(&d->view, param, value);
     if (!rc && SPL_PARAMS_OF_ALL >> param & 1)
-        ((struct spl_cmd_drawing *)drawing)->soft_option = option;
+        snprintf(d->soft_option, sizeof d->soft_option, "%s", option);
     return rc;
 }
 
@@ -103,7 +104,7 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
 
 int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
 {
-    if (!drawing->soft_option || drawing->view.soft.count)
+    if (!*drawing->soft_option || drawing->view.soft.count)
         return SPL_OK;
     return spl_fail_field(err, SPL_E_USAGE, "soft",
                           "%s is of what is soft, and nothing is: say what with --soft, as in --soft 'class:3-5'; "
@@ -188,8 +189,8 @@ void spl_cmd_print_methods(FILE *out, size_t column)
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
-                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', "
-                          "'uncertainty>q0.9', 'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+                          "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
+                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
                           "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (SPL_PARAMS_OF_ALL >> i & 1)

@@ -16,7 +16,7 @@ struct spl_cmd_drawing {
     int format, layer;                   /* enum; format: -1 = not given */
     bool no_verify;
     const char *output;                  /* argument of -o; NULL = not given */
-    const char *soft_option;             /* the last of those that say how what is soft is drawn; NULL = none */
+    char soft_option[24];                /* the last of those that say how what is soft is drawn; "" = none */
     struct spl_view view;                /* all but the camera */
     struct spl_encode_options encode;    /* all but the format */
     struct spl_renderer_options renderer;

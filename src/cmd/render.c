@@ -78,10 +78,11 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
-        "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
-        "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
+        "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
+        "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
+        "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
-        "  splatd render courtyard.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
+        "  splatd render courtyard.spld --soft 'plane:0,0,3,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
         "Cut out, four samples a pixel side, to another program:\n"
         "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
     .options = options,

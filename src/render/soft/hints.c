@@ -70,7 +70,8 @@ static const char *find_near(const char *name, const struct spl_dataset_info *in
     unsigned best = 1 + (unsigned)least((unsigned)length, 9) / 3;
     for (uint32_t s = 0; s < info->stream_count; s++) {
         const char *known = info->streams[s].name;
-        const bool begins = length >= 3 && !strncmp(known, name, length);
+        const size_t shorter = least((unsigned)length, (unsigned)strlen(known));
+        const bool begins = shorter >= 3 && !strncmp(known, name, shorter);
         const unsigned far = begins ? 0 : distance(name, known);
         if (spl_stream_type_from_name(info->streams[s].type) == SPL_STREAM_UNKNOWN || far >= best)
             continue;

@@ -200,7 +200,7 @@ static void test_names_are_guessed(void **state)
     } rows[] = {
         {"uncertanty>0.4", "did you mean 'uncertainty'?"},
         {"Uncertainty>0.4", "did you mean 'uncertainty'?"},
-        {"classification:5", NULL},
+        {"classification:5", "did you mean 'class'?"},
         {"clas:5", "did you mean 'class'?"},
         {"int>5", "did you mean 'intensity'?"},
         {"smell>1", NULL},
