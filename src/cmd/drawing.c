@@ -190,8 +190,8 @@ void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
                           "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
-                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
-                          "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
+                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', "
+                          "'plane:x,y,z,nx,ny,nz>0', 'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
     for (int i = 0; i < SPL_PARAM_COUNT; i++)
         if (SPL_PARAMS_OF_ALL >> i & 1)
             print_param(out, (enum spl_method_param)i, column);

@@ -34,9 +34,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
-                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v; of "
-                                                                      "a view's, format, quality, chroma, depth_scale, background "
-                                                                      "and transparent change nothing of it"
+                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
