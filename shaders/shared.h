@@ -175,6 +175,8 @@
 /* Soft spheres of model concentric have a shell for every so many samples of their radius, at most so many. */
 #define SPL_SOFT_SHELL_SAMPLES 4
 #define SPL_SOFT_SHELLS_MAX 16
+/* A splat on a wire stands for a stretch of it that is so many of its radii long (1 / SPL_RADIUS_SPACING). */
+#define SPL_SOFT_STRETCH 1.3333333f
 /* Models with a kernel of their own, beside express. */
 #define SPL_SOFT_BASE 0
 #define SPL_SOFT_CONCENTRIC 1
@@ -197,7 +199,8 @@ struct spl_draw_chunk {
     SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the tile */
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
-                                             width, metres */
+                                             width, metres; of soft splats that are linear: the square of the radius
+                                             that one of radius 1 has */
     SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
     SPL_U32 paint_word, paint_bits, paint_base; /* of the attribute that colours show: where its codes begin, their width
                                              and SPL_PAINT_LAST_NONE, and what they are added to */

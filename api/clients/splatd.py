@@ -75,6 +75,9 @@ class Dataset:
     def ask(self, path, params):
         """(bytes, headers): a `camera` only goes as JSON. What is None is left out."""
         given = {name: value for name, value in params.items() if value is not None}
+        soft = given.get("soft", "")
+        if not isinstance(soft, str) and not (isinstance(soft, (list, tuple)) and all(isinstance(term, str) for term in soft)):
+            raise TypeError(f"soft is a term like 'class:3-5' or a list of them, not {soft!r}")
         if "camera" in given:
             return self.service.ask(path, json.dumps(given).encode())
         return self.service.ask(f"{path}?{query(given)}")

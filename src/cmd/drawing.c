@@ -5,7 +5,10 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "render/soft/share.h"
+#include "render/soft_params.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -62,6 +65,7 @@ static void replace(char *text, char from, char to)
 
 int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err)
 {
+    struct spl_cmd_drawing *d = drawing;
     char name[64];
     snprintf(name, sizeof name, "%s", option + strspn(option, "-"));
     replace(name, '-', '_');
@@ -85,7 +89,9 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
         rc = rc ? rc : spl_method_param_check(info, value, err);
     }
     if (!rc)
-        spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
+        spl_view_set_param(&d->view, param, value);
+    if (!rc && SPL_PARAMS_OF_ALL >> param & 1)
+        snprintf(d->soft_option, sizeof d->soft_option, "%s", option);
     return rc;
 }
 
@@ -115,6 +121,36 @@ int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl
     struct spl_error why = {0};
     int rc = spl_shade_parse(text, &((struct spl_cmd_drawing *)drawing)->view.shade, &why);
     return rc ? spl_fail_field(err, SPL_E_USAGE, "shade", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
+{
+    if (!*drawing->soft_option || drawing->view.soft.count)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_USAGE, "soft",
+                          "%s is of what is soft, and nothing is: say what with --soft, as in --soft 'class:3-5'; "
+                          "'splatd info' says what the dataset has",
+                          drawing->soft_option);
+}
+
+void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *dataset,
+                       const struct spl_frame_stats *stats)
+{
+    uint32_t told = 0;
+    for (uint32_t i = 0; i < view->soft.count; i++) {
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_SOFT_TEXT_MAX];
+        const struct spl_soft_params one = {.count = 1, .terms = {view->soft.terms[i]}};
+        spl_soft_explain(&view->soft.terms[i], spl_dataset_get_info(dataset), reason);
+        if (!*reason)
+            continue;
+        spl_soft_print(&one, text, sizeof text);
+        fprintf(stderr, "splatd: nothing is soft by '%s': ", text);
+        spl_cmd_put_text(stderr, reason, 0);
+        fputc('\n', stderr);
+        told++;
+    }
+    if (stats && told < view->soft.count && spl_view_shows_soft(view) && !stats->soft_drawn)
+        fprintf(stderr, "splatd: nothing of what is in view is soft, or it lies behind what is not\n");
 }
 
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
@@ -182,8 +218,8 @@ static void print_changing(FILE *out, enum spl_param_changes changes, size_t col
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
-                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', "
-                          "'uncertainty>q0.9', 'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+                          "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
+                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
                           "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
     print_changing(out, SPL_CHANGES_SOFT, column);
 }

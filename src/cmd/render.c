@@ -19,6 +19,7 @@
 #include "geom/camera_json.h"
 #include "geom/fit.h"
 #include "geom/size.h"
+#include "render/soft_params.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
 
@@ -82,10 +83,11 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
-        "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
-        "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
+        "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
+        "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
+        "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
-        "  splatd render courtyard.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
+        "  splatd render courtyard.spld --soft 'plane:0,0,3,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
         "Cut out, four samples a pixel side, to another program:\n"
         "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
     .options = options,
@@ -188,15 +190,16 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_dataset_info *info,
+static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const double *low = info->bounds_min, *high = info->bounds_max;
     const struct {
         uint64_t count;
         const char *what;
     } others[] = {{stats->panels_drawn, "panels"}, {stats->meshes_drawn, "meshes"}, {stats->lines_drawn, "lines"}};
-    uint64_t drawn = stats->splats_drawn;
+    uint64_t drawn = stats->splats_drawn + stats->soft_drawn;
     fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
@@ -204,6 +207,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         if (others[i].count)
             fprintf(stderr, ", %llu %s", (unsigned long long)others[i].count, others[i].what);
     }
+    if (spl_view_shows_soft(&a->drawing.view))
+        fprintf(stderr, ", %llu soft spheres", (unsigned long long)stats->soft_drawn);
     fprintf(stderr, " in %.1f ms", stats->total_ms);
     if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
@@ -212,6 +217,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     if (!drawn)
         fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
                 low[0], low[1], low[2], high[0], high[1], high[2]);
+    else
+        spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
@@ -242,7 +249,7 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
     if (!rc)
-        report(spl_renderer_get_device(renderer), spl_dataset_get_info(dataset), &frame.stats, a, &encoded);
+        report(spl_renderer_get_device(renderer), dataset, &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
     spl_frame_finish(&frame);
     if (renderer && dataset)
@@ -269,7 +276,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

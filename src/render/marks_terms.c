@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "render/marks.h"
+#include "render/soft/hints.h"
 
 static bool is_shape(const struct spl_soft_term *term)
 {
@@ -22,7 +23,7 @@ int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name)
 }
 
 int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *left,
-                          struct spl_error *err)
+                          const char *hint, struct spl_error *err)
 {
     char known[SPL_STREAMS_MAX * (SPL_STREAM_TEXT_MAX + 2)] = "";
     size_t used = 0;
@@ -30,8 +31,9 @@ int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name,
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s%s%s", info->id, name,
-                          used ? known : "none, so that only ", used ? "" : left, used ? "" : " are left");
+    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s%s%s%s%s", info->id,
+                          name, used ? known : "none, so that only ", used ? "" : left, used ? "" : " are left",
+                          hint ? "; " : "", hint ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_soft_term *term, struct spl_error *err)
@@ -80,8 +82,11 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
     if (is_shape(term))
         return SPL_OK;
     out->stream = spl_marks_find_stream(info, term->name);
-    if (out->stream < 0)
-        return spl_marks_refuse_name(info, term->name, "soft", "axis, plane and box", err);
+    if (out->stream < 0) {
+        char hint[SPL_SOFT_HINT_MAX];
+        const bool hinted = spl_soft_hint_name(term, info, hint);
+        return spl_marks_refuse_name(info, term->name, "soft", "axis, plane and box", hinted ? hint : NULL, err);
+    }
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
     out->complete = values && values->count == info->leaf_splats;
     const bool share = term->measure == SPL_SOFT_ATTRIBUTE && !strcmp(term->name, "uncertainty");

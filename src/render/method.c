@@ -140,7 +140,7 @@ int spl_method_param_check(const struct spl_method_param_info *param, double val
         return SPL_OK;
     if (param->kind == SPL_PARAM_CHOICE)
         return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %g does not exist", param->name, value);
-    char text[SPL_DECIMAL_TEXT];
+    char text[SPL_DECIMAL_MAX];
     spl_decimal_print(value, text);
     if (param->otherwise < param->least)
         return spl_fail_field(err, SPL_E_USAGE, param->name, "%s %s is neither %g nor within %g and %g", param->name,

@@ -120,6 +120,13 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
     return spl_view_read(view, &known, err);
 }
 
+bool spl_view_shows_soft(const struct spl_view *view)
+{
+    const uint32_t blended = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE;
+    return view->soft.count && view->soft.opacity > 0 &&
+           (view->layers & blended || view->soft.of != SPL_SOFT_OF_SOLID);
+}
+
 void spl_frame_finish(struct spl_frame *frame)
 {
     for (int i = 0; i < SPL_LAYER_COUNT; i++)

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "base/log.h"
 #include "service/exchange.h"
 #include "service/ops/access_log.h"
@@ -50,7 +51,7 @@ void spl_reply_text(struct request *request, const char *type, char *body)
 
 void spl_reply_json(struct request *request, json_t *json)
 {
-    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
     json_decref(json);
     set_text(request, MHD_HTTP_OK, "application/json", text);
 }

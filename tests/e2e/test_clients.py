@@ -91,6 +91,12 @@ def test_python_refusals():
                 raise RuntimeError("nothing was refused")
             except SplatdError as error:
                 assert (error.status, error.field) == (status, field) and str(error).startswith(f"{status}: "), error
+        for soft in {"class": 5}, ["class:5", 5], 5:
+            try:
+                service.dataset("wall").view(soft=soft)
+                raise RuntimeError("nothing was refused")
+            except TypeError as error:
+                assert "'class:3-5'" in str(error) and repr(soft) in str(error), error
 
 
 def test_a_busy_service_is_asked_again():

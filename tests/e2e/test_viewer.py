@@ -836,6 +836,7 @@ def test_what_is_soft():
     dataset = daemon.ask("/v1/datasets/wall").json()
     dataset["attributes"] = [{"name": "uncertainty", "unit": "", "values": SPREAD}, {"name": "class", "unit": "", "values": CLASSES},
                              {"name": "odd", "unit": "", "values": None}]
+    dataset["soft"] = ["class:5", "plane:0,0,1,0,0,1>0"]
     script = f"""(usual => {{ const told = {json.dumps({"/v1/datasets/wall": dataset})}; window.asked = [];
         window.fetch = (path, how) => {{
             asked.push(path);
@@ -880,11 +881,18 @@ def test_what_is_soft():
         tab.choose("#budget", "")
         tab.until(REST)
         tab.choose("#soft-what", "class")
-        next_link(tab, lambda now: "soft" not in now)  # none is chosen yet
+        next_link(tab, lambda now: now.get("soft") == "class:5")  # what the dataset suggests
         assert tab.run("[...document.querySelectorAll('#soft-kinds label')].map(e => e.textContent.trim())") == ["2 ground 75 %", "5 high vegetation 25 %"]
         tab.run("document.querySelector('#soft-kinds input[value=\"5\"]').focus()")
         tab.key(" ")
+        next_link(tab, lambda now: "soft" not in now)
+        tab.key(" ")
         next_link(tab, lambda now: now.get("soft") == "class:5")
+        select = "document.querySelector('#soft-what')"
+        tab.run(f"window.fits = (select => {{ const text = document.createElement('span'); text.textContent = 'above a height';"
+                f" select.parentNode.append(text); text.style.font = getComputedStyle(select).font; text.style.position = 'fixed';"
+                f" const room = select.clientWidth - text.offsetWidth; text.remove(); return room; }})({select})")
+        assert tab.run("fits") > 36, "paddings and arrow"
         for written, checked in ("class:3-5", [False, True]), ("class:2..5", [True, True]), ("class:2,5", [True, True]):
             tab.choose("#soft-terms", written)
             next_link(tab, lambda now: now.get("soft") == written)  # as it was written, and the boxes as it says

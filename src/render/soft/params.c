@@ -94,7 +94,7 @@ bool spl_soft_check_term(const struct spl_soft_term *term, char fault[SPL_SOFT_F
 
 int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
 {
-    char fault[SPL_SOFT_FAULT_MAX], number[SPL_DECIMAL_TEXT];
+    char fault[SPL_SOFT_FAULT_MAX], number[SPL_DECIMAL_MAX];
     if (soft->count > SPL_SOFT_TERMS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "soft", "%u terms are more than %d", soft->count, SPL_SOFT_TERMS_MAX);
     if ((unsigned)soft->model >= SPL_SOFT_MODEL_COUNT)

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "dataset/dataset.h"
+#include "render/soft/suggest.h"
 #include "service/datasets/library.h"
 
 static json_t *vector(const double v[3])
@@ -114,28 +115,14 @@ static json_t *describe_attributes(const struct spl_dataset_info *info)
     return all;
 }
 
-/* What views may name in soft: what is measured, its form and what it is of. */
+/* What views may begin with in soft. */
 static json_t *describe_soft(const struct spl_dataset_info *info)
 {
+    char terms[SPL_SUGGESTIONS_MAX][SPL_SUGGESTION_MAX];
+    const uint32_t terms_count = spl_soft_suggest(info, terms);
     json_t *forms = json_array();
-    for (uint32_t s = 0; s < info->stream_count; s++) {
-        const struct spl_stream_values *values = spl_dataset_info_get_values(info, s);
-        const char *name = info->streams[s].name;
-        bool share = !strcmp(name, "uncertainty"); // is asked for as a share of its 99th percentile
-        if (values && values->kind_count)
-            json_array_append_new(forms, json_sprintf("%s:%.17g", name, values->kinds[values->kind_count - 1].value));
-        else if (values || !share)
-            json_array_append_new(forms, json_sprintf("%s>%.4g", name, !values ? 0 : share ? 0.5 : values->quantiles[32]));
-        if (values)
-            json_array_append_new(forms, json_sprintf("%s>q0.9", name));
-    }
-    const double *low = info->bounds_min, *high = info->bounds_max;
-    double middle[3] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2};
-    json_array_append_new(forms, json_sprintf("axis:%.9g,%.9g,%.9g,0,0,1<%.4g", middle[0], middle[1], middle[2],
-                                              (high[0] - low[0]) / 4));
-    json_array_append_new(forms, json_sprintf("plane:%.9g,%.9g,%.9g,0,0,1>0", middle[0], middle[1], middle[2]));
-    json_array_append_new(forms, json_sprintf("box:%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", low[0], low[1], middle[2], high[0],
-                                              high[1], high[2]));
+    for (uint32_t i = 0; i < terms_count; i++)
+        json_array_append_new(forms, json_string(terms[i]));
     return forms;
 }
 

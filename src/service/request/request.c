@@ -31,7 +31,7 @@ struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *r
     return encode;
 }
 
-static int resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+int spl_values_resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err)
 {
     double quality = get(values, PARAM_quality, 90), scale = get(values, PARAM_depth_scale, 1000);
     double chroma = get(values, PARAM_chroma, 0);
@@ -202,7 +202,8 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
     if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
         (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_soft(values, defaults, &out->view, err)) || (rc = resolve_encoding(values, out, err)) ||
+        (rc = spl_values_resolve_soft(values, defaults, &out->view, err)) ||
+        (rc = spl_values_resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);

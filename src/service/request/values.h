@@ -94,6 +94,9 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
 
 /* The parts of it that picks share: method, lod, margin, what method fill takes; the version. */
 void spl_values_resolve_splats(const struct values *values, struct spl_view *view);
+
+/* How a picture of out->layer is encoded. */
+int spl_values_resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err);
 void spl_values_resolve_version(const struct values *values, struct spl_view_request *out);
 
 #endif
