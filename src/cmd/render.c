@@ -24,6 +24,8 @@ struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
+    int projection;                      /* enum spl_projection, -1 = not given */
+    double view_height, units_per_pixel; /* NAN = not given */
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
 
@@ -37,6 +39,8 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
     return rc ? SPL_E_USAGE : SPL_OK;
 }
 
+static const char *const projections[] = {"perspective", "orthographic", NULL};
+
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
@@ -48,9 +52,15 @@ static const struct spl_cmd_option options[] = {
     {"fy", "F", "the same, downwards", .otherwise = "fx", SPL_CMD_REAL(struct arguments, fy, 1e-6, 1e9)},
     {"cx", "X", "principal point", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cx, -1e9, 1e9)},
     {"cy", "Y", "the same, downwards", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cy, -1e9, 1e9)},
+    {"projection", "P", "perspective, or orthographic: a plan, an elevation, a section, whose scale is the same everywhere",
+     .otherwise = "perspective", SPL_CMD_CHOICE(struct arguments, projection, projections)},
+    {"view-height", "H", "of an orthographic image, in the dataset's unit", .otherwise = "as high as the pinhole's where it looks",
+     SPL_CMD_REAL(struct arguments, view_height, 1e-9, 1e12)},
+    {"units-per-pixel", "U", "of an orthographic image, instead of its height",
+     SPL_CMD_REAL(struct arguments, units_per_pixel, 1e-9, 1e9)},
     {"size", "WxH", "pixels; W or xH alone: at 16:9", .otherwise = "1280x720",
      SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
-    {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 1e-9, 1e12)},
+    {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 0, 1e12)},
     {"far", "N", "and up to which", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
     {.help = "Drawing:"},
     {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage, "
@@ -77,6 +87,8 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+        "A plan of the ground floor, looking down from 1.2 above it, a centimetre a pixel, north up:\n"
+        "  splatd render courtyard.spld --projection orthographic --units-per-pixel 0.01 --eye 0,0,1.2 --target 0,0,0 -o plan.png\n"
         "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
         "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
@@ -128,6 +140,44 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
     return rc;
 }
 
+static void give(struct spl_value *values, enum spl_camera_param param, const double *numbers, unsigned count)
+{
+    if (isnan(numbers[0]))
+        return;
+    values[param].given = true;
+    values[param].count = count;
+    memcpy(values[param].n, numbers, count * sizeof *numbers);
+}
+
+/* Where a projection is said, all means what it means over HTTP. */
+static int resolve_projection(const struct arguments *a, const struct spl_dataset_info *info, struct spl_camera *camera,
+                              struct spl_error *err)
+{
+    const double projection = a->projection < 0 ? (double)NAN : a->projection, size[2] = {a->drawing.size[0], a->drawing.size[1]};
+    const struct spl_camera_limits limits = {.side_px = 65535, .pixels = UINT64_MAX};
+    struct spl_camera_defaults defaults = {.fov = info->default_fov, .near = camera->near, .far = camera->far};
+    struct spl_value values[SPL_CAMERA_PARAMS] = {0};
+    memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
+    memcpy(defaults.target, info->default_target, sizeof defaults.target);
+    memcpy(defaults.up, info->default_up, sizeof defaults.up);
+    give(values, SPL_CAMERA_eye, a->eye, 3);
+    give(values, SPL_CAMERA_target, a->target, 3);
+    give(values, SPL_CAMERA_up, a->up, 3);
+    give(values, SPL_CAMERA_projection, &projection, 1);
+    give(values, SPL_CAMERA_view_height, &a->view_height, 1);
+    give(values, SPL_CAMERA_units_per_pixel, &a->units_per_pixel, 1);
+    give(values, SPL_CAMERA_fov, &a->fov, 1);
+    give(values, SPL_CAMERA_fx, &a->fx, 1);
+    give(values, SPL_CAMERA_fy, &a->fy, 1);
+    give(values, SPL_CAMERA_cx, &a->cx, 1);
+    give(values, SPL_CAMERA_cy, &a->cy, 1);
+    give(values, SPL_CAMERA_width, &size[0], 1);
+    give(values, SPL_CAMERA_height, &size[1], 1);
+    give(values, SPL_CAMERA_near, &a->near, 1);
+    give(values, SPL_CAMERA_far, &a->far, 1);
+    return spl_camera_from_values(values, &defaults, &limits, camera, err);
+}
+
 static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
@@ -135,6 +185,10 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
+    if (a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
+        rc = resolve_projection(a, info, camera, err);
+        return rc ? rc : spl_view_check(&a->drawing.view, err);
+    }
     if (!isnan(a->fov) && !isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");
     if (!isnan(a->fy) && isnan(a->fx))
@@ -228,7 +282,7 @@ int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
         .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
-        .near = NAN, .far = NAN,
+        .near = NAN, .far = NAN, .projection = -1, .view_height = NAN, .units_per_pixel = NAN,
     };
     struct spl_error err = {0};
     spl_cmd_drawing_init(&a.drawing, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT);

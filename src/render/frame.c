@@ -316,6 +316,7 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     int rc = spl_gpu_begin(gpu, err);
     if (rc)
         return rc;
+    tile->renderer->kernels.parallel = tile->camera.projection == SPL_ORTHOGRAPHIC;
     rc = record(tile, err);
     struct spl_error why = {0};
     int ended = spl_gpu_submit(gpu, &ticket, &why);

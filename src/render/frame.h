@@ -28,6 +28,7 @@ struct spl_frame_job {
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
     struct spl_frame_whole whole;
+    double advance; /* of spl_camera_advance(): what depths of the view are more by than those that are drawn */
 };
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */

@@ -73,15 +73,17 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
 void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
+    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
     char far[32] = "null"; // JSON has no infinity
     if (isfinite(camera->far))
         snprintf(far, sizeof far, "%.9g", camera->far);
     spl_headers_add(
         headers, "Splatd-Camera",
         "{\"eye\":[%.17g,%.17g,%.17g],\"rotation\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g],"
-        "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
+        "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s%s}",
         eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
-        camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+        camera->cx, camera->cy, camera->width, camera->height, camera->near, far,
+        parallel ? ",\"projection\":\"orthographic\"" : "");
 }
 
 /* What is soft, as a body says it; its texts have nothing that JSON would escape. */

@@ -27,6 +27,7 @@ struct golden {
     const char *soft;         /* terms of what is drawn as soft spheres; NULL = nothing */
     enum spl_soft_model model;
     double opacity, blend;
+    double view_height;       /* of an orthographic view; 0 = fov */
 };
 
 static const struct golden goldens[] = {
@@ -83,6 +84,9 @@ static const struct golden goldens[] = {
     /* cells of panels and meshes as spheres, some of a panel solid, method nearest */
     {"soft-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
      {1, 0.004}, .relief = true, .soft = "plane:0,0,0,1,0,0.2>0", .opacity = 0.2},
+    /* parallel rays, straight down: walls are their upper edges, and a column's foot lies under its head */
+    {"plan-splat", {1, 0.5, 30}, {1, 0.5, 0}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0, {1, 0.002},
+     .view_height = 14},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 
