@@ -25,11 +25,11 @@ let asked = false;
 async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
-    const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = await toWorld(
+    const {dataset: _, eye, target, up, fov, projection, view_height, layer = "color", budget, ...setting} = await toWorld(
       dataset,
       parse(location.hash),
     );
-    const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
+    const given = Object.entries({eye, target, up, fov, projection, view_height}).filter(([, value]) => value !== undefined);
     document.title = id;
     stage.element.ariaLabel = `View of ${id}`;
     stage.settings = budget ? {layer, budget, ...softOf(setting)} : {layer, ...setting};

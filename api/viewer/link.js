@@ -3,8 +3,8 @@
 import {findParameter} from "./methods.js";
 
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "layer", "method", "budget", "crs", "soft"],
-  NUMBERS = ["fov", "lod", "supersample"];
+  TEXTS = ["dataset", "layer", "method", "budget", "crs", "soft", "projection"],
+  NUMBERS = ["fov", "view_height", "lod", "supersample"];
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 
 /** Is it a number, as a parameter of a view? */

@@ -63,6 +63,11 @@ SPL_API int spl_camera_set_matrix(struct spl_camera *camera, const double camera
 SPL_API int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const double t[3],
                                   struct spl_error *err);
 
+/* Where the pixels of an orthographic view straight down lie, all but their epsg. SPL_E_INPUT, field "format", of a view
+ * that is none. */
+struct spl_ground;
+SPL_API int spl_camera_get_ground(const struct spl_camera *camera, struct spl_ground *ground, struct spl_error *err);
+
 /* Checks everything: finite, orthonormal, positive focal lengths and sizes, 0 < near < far, |eye| <= 1e12.
  * The field at fault is named. */
 SPL_API int spl_camera_check(const struct spl_camera *camera, struct spl_error *err);

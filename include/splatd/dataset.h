@@ -94,6 +94,7 @@ struct spl_dataset_info {
                        eye lie behind those that face it */
     const struct spl_stream_values *stream_values; /* of each stream, borrowed until close; NULL = the file says nothing
                                                       of any */
+    uint32_t epsg;  /* number of the horizontal coordinate system in EPSG's list; 0 = not known */
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */

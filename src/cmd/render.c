@@ -16,6 +16,7 @@
 #include "cmd/output.h"
 #include "dataset/dataset.h"
 #include "geom/camera_json.h"
+#include "geom/ground.h"
 #include "geom/size.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
@@ -26,6 +27,7 @@ struct arguments {
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     int projection;                      /* enum spl_projection, -1 = not given */
     double view_height, units_per_pixel; /* NAN = not given */
+    bool world_file;
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
 
@@ -70,7 +72,9 @@ static const struct spl_cmd_option options[] = {
     {.help = "File:"},
     {"output", "FILE", "written in one piece; '-' is stdout and wants --format", .letter = 'o',
      SPL_CMD_TEXT(struct spl_cmd_drawing, output)},
-    {"format", "F", "jpeg, png, npy, raw or webp, when the file's ending does not say it", .take = spl_cmd_take_format},
+    {"format", "F", "jpeg, png, npy, raw, webp, or tiff of a map, when the file's ending does not say it", .take = spl_cmd_take_format},
+    {"world-file", .help = "of a map: writes beside OUT.png OUT.pgw, beside OUT.jpg OUT.jgw, where its pixels lie; tiff says so itself",
+     SPL_CMD_FLAG(struct arguments, world_file)},
     SPL_CMD_ENCODING_ROWS,
     SPL_CMD_MACHINE_ROWS,
 };
@@ -89,6 +93,9 @@ static const struct spl_cmd_table table = {
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
         "A plan of the ground floor, looking down from 1.2 above it, a centimetre a pixel, north up:\n"
         "  splatd render courtyard.spld --projection orthographic --units-per-pixel 0.01 --eye 0,0,1.2 --target 0,0,0 -o plan.png\n"
+        "The same as a GeoTIFF, colours and heights on the same pixels:\n"
+        "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 -o ortho.tif\n"
+        "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 --layer depth -o heights.tif\n"
         "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
         "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
@@ -214,6 +221,33 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
+/* Where a map's pixels lie, for GeoTIFF and world files. */
+static int find_ground(struct arguments *a, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    const enum spl_format format = a->drawing.encode.format;
+    if (a->world_file && (!spl_format_world_file(format) || !strcmp(a->drawing.output, "-")))
+        return spl_fail(err, SPL_E_USAGE, "--world-file is for JPEG, PNG and WebP files");
+    if (!a->world_file && format != SPL_FORMAT_TIFF)
+        return SPL_OK;
+    int rc = spl_camera_get_ground(&a->drawing.view.camera, &a->drawing.encode.ground, err);
+    a->drawing.encode.ground.epsg = info->epsg;
+    return rc;
+}
+
+static int write_world_file(const struct arguments *a, struct spl_error *err)
+{
+    char path[4096], text[SPL_WORLD_FILE_BYTES];
+    const char *output = a->drawing.output, *ending = spl_cmd_ending(output);
+    if (!a->world_file)
+        return SPL_OK;
+    size_t length = *ending ? (size_t)(ending - 1 - output) : strlen(output);
+    if ((size_t)snprintf(path, sizeof path, "%.*s%s", (int)length, output, spl_format_world_file(a->drawing.encode.format)) >=
+        sizeof path)
+        return spl_fail(err, SPL_E_USAGE, "the name of the world file is longer than %zu bytes", sizeof path - 1);
+    spl_ground_print_world_file(&a->drawing.encode.ground, text);
+    return spl_cmd_write_output(path, text, strlen(text), err);
+}
+
 static void report(const struct spl_device_info *device, const struct spl_dataset_info *info,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
@@ -256,6 +290,8 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = resolve_camera(a, dataset, err);
     if (!rc)
+        rc = find_ground(a, spl_dataset_get_info(dataset), err);
+    if (!rc)
         spl_cmd_drawing_set_unit(&a->drawing, dataset);
     if (!rc)
         rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
@@ -267,6 +303,8 @@ static int render(struct arguments *a, struct spl_error *err)
         rc = spl_image_encode(&frame.images[a->drawing.layer], &a->drawing.encode, &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
+    if (!rc)
+        rc = write_world_file(a, err);
     if (!rc)
         report(spl_renderer_get_device(renderer), spl_dataset_get_info(dataset), &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);

@@ -27,7 +27,7 @@ enum spl_value_kind {
     SPL_KIND_END,  /* the service's own kinds go on from here */
 };
 
-enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16, SPL_PLACE = 32 };
+enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16, SPL_PLACE = 32, SPL_TILE = 64 };
 
 enum spl_camera_param {
 #define PARAM(name, alias, kind, places, help) SPL_CAMERA_##name,

@@ -49,6 +49,10 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
     spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
+    if (format == SPL_FORMAT_TIFF) { // heights
+        spl_headers_add(headers, "Splatd-Height-Unit", "%s", request->encode.unit);
+        return;
+    }
     spl_headers_add(headers, "Splatd-Depth-Unit", "%s", request->encode.unit);
     switch (format) {
     case SPL_FORMAT_PNG:

@@ -434,12 +434,13 @@ def test_openapi_knows_every_parameter_and_route():
     params = [[cell.strip() for cell in row.replace("\\\n", " ").split(",")] for row in
               re.findall(r"^    (?:REAL|COUNT|CHOICE)\(([^\"]+?),[\s\\\\]*\"", methods, re.M)]
     assert len(params) >= 6
-    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] != "SPL_CHANGES_TEXTURES" else "")) for row in params]
+    rows += [(row[0], "", "SPL_QUERY | SPL_BODY | SPL_TILE" + (" | SPL_PICK" if row[-1] != "SPL_CHANGES_TEXTURES" else "")) for row in params]
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
     camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in
               (ROOT / "src/geom/camera_params.def").read_text()}
     assert listed["pick"] == {name for name, _, places in rows if "PICK" in places} | camera
+    assert listed["getTile"] == {name for name, _, places in rows if "TILE" in places}
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
     assert listed["showPlace"] == {name for name, _, places in rows if "PLACE" in places}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
