@@ -16,7 +16,7 @@ from harness import REAL, VIEW, WALL, Daemon, run
 
 PICK = VIEW.replace("/view", "/pick")
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
-WEBP = os.environ["SPLATD_WEBP"] == "1"
+WEBP, TIFF = (os.environ[f"SPLATD_{name}"] == "1" for name in ("WEBP", "TIFF"))
 COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
               "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4), "primitive": ("<u4", 1, 4)}
 LOOK = dict(eye="3,0.2,1", target="0,0,1", up="0,0,1")
@@ -65,7 +65,7 @@ def test_datasets_are_described():
         low, high = full["bounds"]["min"], full["bounds"]["max"]
         assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
         assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill", "nearest"]
-        assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
+        assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP + ["tiff"] * TIFF
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
 
