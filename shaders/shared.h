@@ -426,6 +426,7 @@ struct spl_soft_step {
     SPL_U32 ends;          /* of layer: this is its last window */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
     SPL_U32 details;       /* word of the items' details */
+    SPL_U32 entries;       /* of all lists */
 };
 
 #ifndef SPL_GLSL

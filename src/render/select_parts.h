@@ -21,6 +21,13 @@ struct spl_walk {
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
     bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
+    struct spl_walk_found *found; /* nodes that are drawn once all are known (select_share.c); NULL = at once */
+};
+
+/* Nodes that are drawn, in the order of the walk. */
+struct spl_walk_found {
+    struct spl_found_node *nodes;
+    size_t count, capacity, chunks;
 };
 
 /* Spacings from 2^(i / 4) samples on. */
@@ -57,6 +64,12 @@ static inline double spl_walk_typical(const struct spl_node *node)
  * and all that is looked for of a node that is drawn. */
 struct spl_view_box spl_walk_node_box(const struct spl_walk *w, const struct spl_node *node);
 struct spl_view_box spl_walk_drawn_box(const struct spl_walk *w, const struct spl_found_node *found);
+
+/* Listing of many nodes by several cores (select_share.c), where nothing of it asks for residency: the list is the same
+ * as in turn. */
+bool spl_walk_may_share(const struct spl_walk *w);
+int spl_walk_find(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err);
+int spl_walk_draw_found(struct spl_walk *w, struct spl_error *err);
 
 /* What is soft (select_soft.c). Shapes become tests, before anything is listed. */
 int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);

@@ -61,7 +61,7 @@ static int dispatch(struct spl_soft_order *order, const struct look *look, uint3
                      .fall_2 = fall[2] * scale,
                      .fall_3 = fall[3] * scale,
                      .fall_4 = fall[4] * scale},
-            .from = order->sorted == SPL_SOFT_PAIRS ? SPL_SOFT_OTHERS : SPL_SOFT_PAIRS,
+            .from = spl_soft_other(order->sorted),
             .to = order->sorted,
             .totals = SPL_SOFT_TOTALS,
             .workgroups = (uint32_t)(((uint64_t)(end - first) * samples + SPL_WORKGROUP - 1) / SPL_WORKGROUP)},
