@@ -9,6 +9,7 @@
 #include <splatd/api.h>
 #include <splatd/camera.h>
 #include <splatd/cancel.h>
+#include <splatd/color.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 #include <splatd/image.h>
@@ -36,6 +37,8 @@ struct spl_view {
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
     enum spl_shapes shapes;     /* the same */
     struct spl_soft_params soft; /* what is soft, of every method */
+    struct spl_shade_params shade; /* of colours: how what is solid is shaded, the same */
+    struct spl_color_params color; /* what they show, the same */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

@@ -18,7 +18,7 @@ void load_frame()
 /* The rays of the image: through the eye, or parallel to the viewing axis, where frame.fx and fy are samples a unit. Known
  * before a kernel is built, so that neither pays for the other. All that divides by depth on its way to the image goes
  * through ray_scale(). */
-layout(constant_id = 4) const uint PARALLEL = 0;
+layout(constant_id = 6) const uint PARALLEL = 0;
 
 /* What offsets from the axis at view depth z are divided by. */
 float ray_scale(float z)

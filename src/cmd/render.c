@@ -15,15 +15,19 @@
 #include "cmd/drawing.h"
 #include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "dataset/saved_views.h"
 #include "geom/camera_json.h"
+#include "geom/fit.h"
 #include "geom/ground.h"
 #include "geom/size.h"
+#include "render/soft_params.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
+    const char *view; // may be NULL; the name of one that the dataset was packed with
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     int projection;                      /* enum spl_projection, -1 = not given */
     double view_height, units_per_pixel; /* NAN = not given */
@@ -45,6 +49,8 @@ static const char *const projections[] = {"perspective", "orthographic", NULL};
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
+    {"view", "NAME", "or that view's, which the dataset was packed with ('splatd info' lists them)",
+     SPL_CMD_TEXT(struct arguments, view)},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
     {"crs", "EPSG:N", "what --eye, --target and shapes of --soft are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
@@ -96,10 +102,11 @@ static const struct spl_cmd_table table = {
         "The same as a GeoTIFF, colours and heights on the same pixels:\n"
         "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 -o ortho.tif\n"
         "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 --layer depth -o heights.tif\n"
-        "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
-        "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
+        "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
+        "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
+        "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
-        "  splatd render courtyard.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
+        "  splatd render courtyard.spld --soft 'plane:0,0,3,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
         "Cut out, four samples a pixel side, to another program:\n"
         "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
     .options = options,
@@ -157,16 +164,17 @@ static void give(struct spl_value *values, enum spl_camera_param param, const do
 }
 
 /* Where a projection is said, all means what it means over HTTP. */
-static int resolve_projection(const struct arguments *a, const struct spl_dataset_info *info, struct spl_camera *camera,
-                              struct spl_error *err)
+static int resolve_projection(const struct arguments *a, const struct spl_saved_view *from, const double fit[2],
+                              struct spl_camera *camera, struct spl_error *err)
 {
     const double projection = a->projection < 0 ? (double)NAN : a->projection, size[2] = {a->drawing.size[0], a->drawing.size[1]};
     const struct spl_camera_limits limits = {.side_px = 65535, .pixels = UINT64_MAX};
-    struct spl_camera_defaults defaults = {.fov = info->default_fov, .near = camera->near, .far = camera->far};
+    struct spl_camera_defaults defaults = {
+        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far};
     struct spl_value values[SPL_CAMERA_PARAMS] = {0};
-    memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
-    memcpy(defaults.target, info->default_target, sizeof defaults.target);
-    memcpy(defaults.up, info->default_up, sizeof defaults.up);
+    memcpy(defaults.eye, from->eye, sizeof defaults.eye);
+    memcpy(defaults.target, from->target, sizeof defaults.target);
+    memcpy(defaults.up, from->up, sizeof defaults.up);
     give(values, SPL_CAMERA_eye, a->eye, 3);
     give(values, SPL_CAMERA_target, a->target, 3);
     give(values, SPL_CAMERA_up, a->up, 3);
@@ -185,15 +193,40 @@ static int resolve_projection(const struct arguments *a, const struct spl_datase
     return spl_camera_from_values(values, &defaults, &limits, camera, err);
 }
 
-static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+/* The default view, or --view: its eye, target and up, and its field of view in *camera. */
+static int start_camera(const struct arguments *a, const struct spl_dataset *dataset, struct spl_saved_view *from,
+                        struct spl_camera *camera, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    const uint32_t *size = a->drawing.size;
+    int rc = spl_dataset_get_default_camera(dataset, size[0], size[1], camera, err);
+    memcpy(from->eye, info->default_eye, sizeof from->eye);
+    memcpy(from->target, info->default_target, sizeof from->target);
+    memcpy(from->up, info->default_up, sizeof from->up);
+    from->fov = info->default_fov;
+    if (rc || !a->view)
+        return rc;
+    const struct spl_saved_view *view = spl_saved_views_find(info->views, info->view_count, a->view);
+    if (!view)
+        return spl_fail_field(err, SPL_E_USAGE, "view", "--view: '%s' has no view '%.64s'; 'splatd info' lists them",
+                              info->id, a->view);
+    *from = *view;
+    if ((rc = spl_camera_set_fov(camera, spl_fit_fov((double[]){view->fov, view->fov}, size[0], size[1]), size[0], size[1],
+                                 err)))
+        return rc;
+    return spl_camera_look_at(camera, view->eye, view->target, view->up, err);
+}
+
+static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+{
     struct spl_camera *camera = &a->drawing.view.camera;
-    int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
+    struct spl_saved_view from = {0};
+    int rc = start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
     if (a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
-        rc = resolve_projection(a, info, camera, err);
+        const double *fit = spl_dataset_get_info(dataset)->default_fit;
+        rc = resolve_projection(a, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
         return rc ? rc : spl_view_check(&a->drawing.view, err);
     }
     if (!isnan(a->fov) && !isnan(a->fx))
@@ -208,9 +241,9 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     camera->cx = isnan(a->cx) ? camera->cx : a->cx;
     camera->cy = isnan(a->cy) ? camera->cy : a->cy;
     if (!isnan(a->eye[0]) || !isnan(a->target[0]) || !isnan(a->up[0]))
-        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? info->default_eye : a->eye,
-                                isnan(a->target[0]) ? info->default_target : a->target,
-                                isnan(a->up[0]) ? info->default_up : a->up, err);
+        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? from.eye : a->eye,
+                                isnan(a->target[0]) ? from.target : a->target,
+                                isnan(a->up[0]) ? from.up : a->up, err);
     if (rc)
         return rc;
     camera->near = isnan(a->near) ? camera->near : a->near;
@@ -248,15 +281,16 @@ static int write_world_file(const struct arguments *a, struct spl_error *err)
     return spl_cmd_write_output(path, text, strlen(text), err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_dataset_info *info,
+static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const double *low = info->bounds_min, *high = info->bounds_max;
     const struct {
         uint64_t count;
         const char *what;
     } others[] = {{stats->panels_drawn, "panels"}, {stats->meshes_drawn, "meshes"}, {stats->lines_drawn, "lines"}};
-    uint64_t drawn = stats->splats_drawn;
+    uint64_t drawn = stats->splats_drawn + stats->soft_drawn;
     fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
@@ -264,6 +298,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         if (others[i].count)
             fprintf(stderr, ", %llu %s", (unsigned long long)others[i].count, others[i].what);
     }
+    if (spl_view_shows_soft(&a->drawing.view))
+        fprintf(stderr, ", %llu soft spheres", (unsigned long long)stats->soft_drawn);
     fprintf(stderr, " in %.1f ms", stats->total_ms);
     if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
@@ -272,6 +308,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     if (!drawn)
         fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
                 low[0], low[1], low[2], high[0], high[1], high[2]);
+    else
+        spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
@@ -306,7 +344,7 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = write_world_file(a, err);
     if (!rc)
-        report(spl_renderer_get_device(renderer), spl_dataset_get_info(dataset), &frame.stats, a, &encoded);
+        report(spl_renderer_get_device(renderer), dataset, &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
     spl_frame_finish(&frame);
     if (renderer && dataset)
@@ -333,7 +371,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

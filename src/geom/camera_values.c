@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/fit.h"
 #include "geom/size.h"
 
 static const char *const names[SPL_CAMERA_PARAMS] = {
@@ -100,13 +101,19 @@ static bool is_orthographic(const struct spl_value *v)
                : given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
 }
 
+/* The field of view where nobody says one. */
+static double usual_fov(const struct spl_camera_defaults *defaults, const struct spl_camera *camera)
+{
+    return defaults->fit[0] > 0 ? spl_fit_fov(defaults->fit, camera->width, camera->height) : defaults->fov;
+}
+
 /* How high its image is: said, or as high as the pinhole's image is where it looks. */
 static int resolve_orthographic(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                                 struct spl_camera *camera, double distance, struct spl_error *err)
 {
     static const enum spl_camera_param sizes[] = {SPL_CAMERA_view_height, SPL_CAMERA_units_per_pixel, SPL_CAMERA_fx},
                                        others[] = {SPL_CAMERA_fov, SPL_CAMERA_model, SPL_CAMERA_params};
-    double height = 2 * tan(defaults->fov * M_PI / 360) * distance;
+    double height = 2 * tan(usual_fov(defaults, camera) * M_PI / 360) * distance;
     for (int i = 0; i < 3; i++)
         if (given(v, others[i]))
             return conflict(v, others[i], given(v, SPL_CAMERA_projection) ? SPL_CAMERA_projection : sizes[!given(v, sizes[0])],
@@ -144,7 +151,8 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
                               struct spl_camera *camera, struct spl_error *err)
 {
     static const enum spl_camera_param pinhole[] = {SPL_CAMERA_fx, SPL_CAMERA_fy, SPL_CAMERA_cx, SPL_CAMERA_cy};
-    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, defaults->fov), camera->width, camera->height, err);
+    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, usual_fov(defaults, camera)), camera->width, camera->height,
+                                err);
     if (rc)
         return rc;
     for (int i = 0; i < 2; i++) {

@@ -9,14 +9,15 @@
 
 #include "gpu/gpu.h"
 
-/* The last of them says of all kernels of a frame alike how rays go: shaders/common/frame.glsl. */
-enum { SPL_KERNEL_PARALLEL = 4, SPL_KERNEL_CONSTANTS };
+/* SPL_KERNEL_PARALLEL says of all kernels of a frame alike how rays go: shaders/common/frame.glsl. */
+enum { SPL_KERNEL_PARALLEL = 6, SPL_KERNEL_CONSTANTS };
 
 struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */
     bool wide;                                /* its variant with 64 bit atomics where the device has them */
     uint32_t constants[SPL_KERNEL_CONSTANTS]; /* as the shader numbers them; those that it does not declare are 0 */
     bool trims;                               /* its variant NAME_trim, for chunks that a map trims */
+    bool shared;                              /* its variant NAME_shared, for hardware (shaders/common/walk.glsl) */
 };
 
 struct spl_kernels {

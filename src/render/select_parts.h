@@ -20,6 +20,7 @@ struct spl_walk {
     struct spl_marks_chunk judged; /* of the chunk being listed */
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
     bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft */
+    double line_width; /* of its lines, the largest; 0 = not known, or nothing is soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
     struct spl_walk_found *found; /* nodes that are drawn once all are known (select_share.c); NULL = at once */
 };
@@ -77,6 +78,8 @@ int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);
 void spl_walk_judge(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
 /* May any linear splat of the node be soft? */
 bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3]);
+/* How wide the node's lines are, at most, where anything may be soft. */
+double spl_walk_line_width(const struct spl_walk *w, const struct spl_node *node);
 /* Where `judged` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is listed
  * otherwise. */
 int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,

@@ -27,6 +27,7 @@ struct golden {
     const char *soft;         /* terms of what is drawn as soft spheres; NULL = nothing */
     enum spl_soft_model model;
     double opacity, blend;
+    const char *shade, *color_by; /* NULL: none, rgb */
     double view_height;       /* of an orthographic view; 0 = fov */
 };
 
@@ -84,6 +85,13 @@ static const struct golden goldens[] = {
     /* cells of panels and meshes as spheres, some of a panel solid, method nearest */
     {"soft-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
      {1, 0.004}, .relief = true, .soft = "plane:0,0,0,1,0,0.2>0", .opacity = 0.2},
+    /* eye-dome lighting, whose factor rounds by a level, and light from normals, at four samples a pixel under a
+     * transparent sky: edges, specks, and what lies outside the image */
+    {"shade-edl", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 2, {0, 0, 0, 0}, 0,
+     {2, 0.004}, .shade = "edl+headlight"},
+    /* heights over a terrain's ramp by the nearest disc: an entry of the palette more or less is a level or two */
+    {"color-height", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {2, 0.004}, .color_by = "height"},
     /* parallel rays, straight down: walls are their upper edges, and a column's foot lies under its head */
     {"plan-splat", {1, 0.5, 30}, {1, 0.5, 0}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0, {1, 0.002},
      .view_height = 14},

@@ -91,7 +91,8 @@ void same_images(const struct spl_dataset *dataset, const struct spl_view *view,
     assert_int_equal(reference_render(dataset, view, &cpu, &err), SPL_OK);
     struct tally t = compare(&gpu, &cpu);
     size_t few = t.pixels / (rounds_exactly() ? 10000 : 400) + 1;
-    if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > few ||
+    size_t tied = rounds_exactly() ? few : t.pixels / 20 + 1; // ids where surfaces lie in one plane
+    if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > tied ||
         t.normal_differs > few || t.primitive_differs > few)
         fail_msg(
             "%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu, "

@@ -36,8 +36,6 @@ int gl_begin(struct spl_gpu *base, struct spl_error *err)
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_use(gpu);
     gpu->gl.DeleteSync(gpu->list.sync);
-    for (int i = 0; i < GL_PATTERNS; i++)
-        gpu->gl.DeleteBuffers(1, &gpu->patterns[i].name);
     gpu->list.sync = NULL;
     gpu->list.written = 0;
     return check(gpu, err);

@@ -4,8 +4,6 @@
  * by tile as items are by depth. Both are stable, so lists are the same. Belongs to the renderer's thread. */
 #include "render/soft/order.h"
 
-#include <string.h>
-
 enum {
     list_block = 64,
     list_blocks_least = 32 // that all cores have some
@@ -75,8 +73,9 @@ static int list_by_counting(struct spl_soft_order *order, uint32_t items, uint32
     rc = rc ? rc : spl_soft_run(order, err);
     if (rc)
         return rc;
-    uint64_t entries = lay_out(spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]),
-                               spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]), tiles);
+    uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
+    uint64_t entries = lay_out(spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]), starts, tiles);
+    order->starts = starts;
     if (entries > memory->sizes.entries)
         return SPL_SOFT_CROWDED;
     order->entries = (uint32_t)entries;
@@ -124,8 +123,7 @@ static int list_by_sorting(struct spl_soft_order *order, uint32_t items, uint64_
     rc = rc ? rc : spl_soft_run(order, err);
     if (rc)
         return rc;
-    memcpy(spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]), spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]),
-           tiles * sizeof(uint32_t));
+    order->starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]); /* cached, which those of UPLOAD are not */
     order->entries = (uint32_t)entries;
     return SPL_OK;
 }

@@ -30,6 +30,7 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     bytes[SPL_SOFT_COUNTS] = word * counters_of(sizes, software);
     const uint64_t slots = sizes->slots, buckets = 2 * (uint64_t)SPL_SOFT_BUCKETS;
     bytes[SPL_SOFT_SLOTS] = word * (SPL_SOFT_SLOT_WORDS * slots > buckets ? SPL_SOFT_SLOT_WORDS * slots : buckets);
+    bytes[SPL_SOFT_TOLD] = software ? 0 : bytes[SPL_SOFT_SLOTS];
     bytes[SPL_SOFT_FIRSTS] = word * (slots ? slots : 1);
     bytes[SPL_SOFT_DIGITS] = word * digits_max;
     bytes[SPL_SOFT_TOTALS] = bytes[SPL_SOFT_STARTS] = word * sizes->tiles;

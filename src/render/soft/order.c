@@ -160,7 +160,7 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
     const uint32_t tiles = order->columns * order->rows;
     if (blend->model != SPL_SOFT_MODEL_EXPRESS)
         return spl_soft_walk(order, blend, err);
-    const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
+    const uint32_t *starts = order->starts;
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]);
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups * (SPL_WORKGROUP / lanes);
     const float scale = 65536;

@@ -39,7 +39,8 @@ enum spl_soft_buffer {
     SPL_SOFT_TILED,   /* pairs of tile and item, which sorting moves to and fro; NULL but where `many` */
     SPL_SOFT_UNTILED,
     SPL_SOFT_COUNTS,
-    SPL_SOFT_SLOTS,   /* what they have, for the host */
+    SPL_SOFT_SLOTS,   /* what they have, for the host: where `many`, by way of SPL_SOFT_TOLD */
+    SPL_SOFT_TOLD,    /* counted there, since a GPU's atomics and scattered words are slow in the host's memory; else NULL */
     SPL_SOFT_FIRSTS,  /* their first items, from the host */
     SPL_SOFT_DIGITS,  /* totals of a sort */
     SPL_SOFT_TOTALS,  /* of tiles, for the host */
@@ -88,6 +89,7 @@ struct spl_soft_order {
     uint32_t steps;                /* of SPL_SOFT_STEPS_OF, used since it last ran */
     enum spl_soft_buffer sorted;   /* PAIRS or OTHERS: where the last sort ended */
     uint32_t entries;              /* of the lists */
+    const uint32_t *starts;        /* of the tiles, where the host reads them: mapped memory of the device */
 };
 
 /* Puts the parameters of a dispatch where it may bind them. */

@@ -116,7 +116,7 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
             larger(sizes.items * entries_of_item, SPL_SOFT_SLOT_CELLS * SPL_SOFT_SPAN_MAX * SPL_SOFT_SPAN_MAX);
     } else {
         choose_items(&sizes, slots * SPL_SOFT_SLOT_SPLATS, share, limits->binding_bytes, software);
-        if (view->soft.model != SPL_SOFT_MODEL_EXPRESS)
+        if (view->soft.model != SPL_SOFT_MODEL_EXPRESS || !software) // a window costs a GPU more than memory does
             choose_entries(&sizes, share, limits->binding_bytes, software);
     }
     const bool exact = renderer->soft_items_most > 0;

@@ -48,7 +48,7 @@ static uint32_t lay_out(const struct spl_soft_order *order, const struct spl_sof
     const struct spl_soft_memory *memory = order->memory;
     const uint32_t tiles = order->columns * order->rows;
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups / (samples / SPL_WORKGROUP + 1);
-    const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
+    const uint32_t *starts = order->starts;
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]), listed = 0;
     struct group *group = NULL;
     batch->count = batch->words = 0;

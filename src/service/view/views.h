@@ -51,7 +51,8 @@ struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);
 /* route.c: answers with a view that was parsed, or refuses what `err` says. */
 void spl_view_answer(struct request *request, const struct spl_call *call, struct spl_view_request *view,
                      struct spl_error *err);
-/* /v1/datasets/{id}/view and /pick. */
+/* /v1/datasets/{id}/view, /pick and /thumbnail.jpg. */
+void spl_make_thumbnail(struct request *request, const struct spl_call *call);
 void spl_make_view(struct request *request, const struct spl_call *call);
 void spl_pick(struct request *request, const struct spl_call *call);
 
