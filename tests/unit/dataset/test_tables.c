@@ -63,7 +63,9 @@ static void by_page_they_are_the_same(void **state)
     struct spl_dataset_info same = *spl_dataset_get_info(by_page);
     assert_true(info->stream_values && same.stream_values && info->stream_count);
     assert_memory_equal(info->stream_values, same.stream_values, info->stream_count * sizeof *same.stream_values);
+    assert_int_equal(info->view_count, same.view_count);
     same.stream_values = info->stream_values;
+    same.views = info->views;
     assert_memory_equal(info, &same, sizeof *info);
     for (uint32_t page = 0; page < info->pages; page++) {
         struct spl_tables *read, *none;
