@@ -26,13 +26,13 @@ uint payload(spl_draw_chunk chunk, splat vertex)
 void draw(piece cut, uvec2 payloads)
 {
     vec3 from = cut.from, to = cut.to;
-    precise vec2 a = vec2(frame.fx * (from.x / from.z) + frame.cx, frame.fy * (from.y / from.z) + frame.cy);
-    precise vec2 b = vec2(frame.fx * (to.x / to.z) + frame.cx, frame.fy * (to.y / to.z) + frame.cy);
+    vec2 a = image_place(from), b = image_place(to);
     bool upright = abs(b.y - a.y) > abs(b.x - a.x);
     vec2 first = upright ? a.yx : a, last = upright ? b.yx : b;
     ivec2 corner = upright ? tile_corner().yx : tile_corner(), end = upright ? tile_end().yx : tile_end();
     precise float inverse = 1.0 / (last.x - first.x);
-    precise float w0 = 1.0 / from.z, w1 = 1.0 / to.z;
+    /* What is linear along the image: inverse depth, or of parallel rays depth. */
+    precise float w0 = PARALLEL != 0u ? from.z : 1.0 / from.z, w1 = PARALLEL != 0u ? to.z : 1.0 / to.z;
     /* Clamped as a whole number too: ends of a forged chunk may be no numbers. */
     float low = float(corner.x), high = float(end.x);
     int k = clamp(int(ceil(clamp(min(first.x, last.x) - 0.5, low, high))), corner.x, end.x);
@@ -41,13 +41,13 @@ void draw(piece cut, uvec2 payloads)
         precise float t = (float(k) + 0.5 - first.x) * inverse;
         precise float across = first.y + t * (last.y - first.y);
         precise float w = w0 + t * (w1 - w0);
-        precise float z = 1.0 / w;
+        precise float z = PARALLEL != 0u ? w : 1.0 / w;
         if (k <= to_k && k < end.x && across >= float(corner.y) && across < float(end.y)) {
             int row = clamp(int(floor(across)), corner.y, end.y - 1);
             uint at = image_sample_index(upright ? ivec2(row, k) : ivec2(k, row));
             uint bits = (floatBitsToUint(z) & ~SPL_FILL_DEPTH_BITS) | SPL_FILL_LINEAR;
             if (wins(at, bits))
-                put(at, bits, t * w1 * z < cut.middle ? payloads.x : payloads.y);
+                put(at, bits, (PARALLEL != 0u ? t : t * w1 * z) < cut.middle ? payloads.x : payloads.y);
         }
         if (++k > to_k)
             break;

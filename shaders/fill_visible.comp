@@ -1,7 +1,8 @@
 /* Visibility, the operator of Pintus et al. 2011 ("Real-time Rendering of Massive Unstructured Raw Point Clouds using
  * Screen-space Operators"): eight sectors around a sample, in each the widest cone towards the eye that no nearer
  * sample enters; a sample is visible where the cones' solid angles add up to the threshold. A sample that holds
- * nothing lies infinitely far away. What is not visible is a hole, to be filled.
+ * nothing lies infinitely far away. What is not visible is a hole, to be filled. Along parallel rays distances on the image
+ * are the same at all depths.
  *
  * Constant 0 = 1, adaptive: a sample stands in the way of others as far as frame.fill_reach times its spacing on the
  * image, which is proportional to its inverse depth, and frame.fill_kernel at most. Of the rings around a sample, each
@@ -31,8 +32,9 @@ bool blocked; /* something was looked at that is nearer, how far off whatever */
 int cone_of(uint word, uint mask, float squared, bool inside)
 {
     float w = inverse_depth(word, mask), spacing = spacing_of(word & SPACING_MASK);
-    float reach = w * spacing * (frame.fill_radius * frame.fill_reach);
-    precise float nearer = w * (z - spacing * (frame.fill_margin * frame.fill_radius)) - 1.0;
+    float reach = (PARALLEL != 0u ? 1.0 : w) * spacing * (frame.fill_radius * frame.fill_reach);
+    float least = z - spacing * (frame.fill_margin * frame.fill_radius);
+    precise float nearer = PARALLEL != 0u ? least - 1.0 / w : w * least - 1.0;
     precise float cone = nearer * nearer / squared;
     bool blocks = inside && nearer > 0.0;
     blocked = blocked || blocks;
@@ -68,7 +70,8 @@ float coarse_reach(ivec2 at)
     for (int i = 0;;) {
         ivec2 c = ivec2((i & 1) != 0 ? other.x : cell.x, (i & 2) != 0 ? other.y : cell.y);
         uint word = plane_word(frame.fill_to + uint(c.y) * size.x + uint(c.x));
-        angle = max(angle, inverse_depth(word, mask) * spacing_of(word & SPACING_MASK));
+        float w = inverse_depth(word, mask);
+        angle = max(angle, (PARALLEL != 0u ? (w > 0.0 ? 1.0 : 0.0) : w) * spacing_of(word & SPACING_MASK));
         if (++i >= 4)
             break;
     }

@@ -69,7 +69,8 @@ void main()
     precise vec3 across = vec3(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x);
     precise float area = sqrt(across.x * across.x + across.y * across.y + across.z * across.z);
     precise vec3 normal = across * (1.0 / max(area, 1e-30));
-    precise float square_on = abs(normal.x * p.x + normal.y * p.y + normal.z * p.z) / z;
+    precise float along_ray = abs(normal.x * p.x + normal.y * p.y + normal.z * p.z) / z;
+    float square_on = PARALLEL != 0u ? abs(normal.z) : along_ray;
     precise float slant = clamp(1.0 / max(square_on, 1e-6), 1.0, SPL_MARGIN_SLANT);
 
     float range;

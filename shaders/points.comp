@@ -28,7 +28,7 @@ void draw(spl_draw_chunk chunk, splat s)
     vec3 p = s.position;
     if (!(p.z >= frame.near && p.z <= frame.far))
         return;
-    precise vec2 center = vec2(frame.fx * (p.x / p.z) + frame.cx, frame.fy * (p.y / p.z) + frame.cy);
+    vec2 center = image_place(p);
     vec2 low = vec2(tile_corner()), end = vec2(tile_end());
     if (!(center.x >= low.x && center.y >= low.y && center.x < end.x && center.y < end.y))
         return;

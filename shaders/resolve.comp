@@ -2,7 +2,7 @@
  * neighbour stands for a speck between sums. A pixel is the box average of its supersample^2 samples:
  *   color     RGBA8, straight alpha over the background
  *   depth     float, mean over the samples within 1 % of the nearest one, so that an edge gives no depth in between
- *   range     the same along the ray
+ *   range     the same along the ray; parallel rays begin where depth does
  *   normal    octahedral word of the mean, world axes; SPL_NOTHING = none
  *   id        that of the nearest sample, the least among equals
  *   primitive the same; 0 = none
@@ -194,7 +194,7 @@ void main()
         value = rgb.x | rgb.y << 8 | rgb.z << 16 | uint(float(weight) / float(total) + 0.5) << 24;
     } else if (LAYER == SPL_RESOLVE_DEPTH || LAYER == SPL_RESOLVE_RANGE) {
         float sum = 0.0, count = 0.0;
-        float limit = uintBitsToFloat(nearest) * 1.01;
+        float near = uintBitsToFloat(nearest), limit = PARALLEL != 0u ? near + depth_slack(near, 0.01) : near * 1.01;
         for (uint i = 0u;;) {
             pixel_sample s = load_sample(corner, i);
             if (s.bits != SPL_NOTHING && uintBitsToFloat(s.bits) <= limit) {
@@ -210,7 +210,7 @@ void main()
                 precise vec2 center = vec2(corner + tile_corner()) + 0.5 * float(side);
                 precise vec2 ray = vec2((center.x - frame.cx) / frame.fx, (center.y - frame.cy) / frame.fy);
                 precise float range = z * sqrt(1.0 + ray.x * ray.x + ray.y * ray.y);
-                z = range;
+                z = PARALLEL != 0u ? z : range;
             }
             value = floatBitsToUint(z);
         }

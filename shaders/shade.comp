@@ -4,7 +4,8 @@
  *
  * Eye-dome lighting looks at four pairs of samples, map_sides away on either side. Inverse depth is linear along a
  * plane, so the mean of a pair's is the sample's own on any plane, however slanted; where it is more, the sample lies
- * deeper than what is around it. Products, sums and quotients alone, continuous in depth: drivers differ by a rounding.
+ * deeper than what is around it. Along parallel rays depth itself is linear, and differences of depth are a share of how
+ * far off a pinhole would see pixels as large. Products, sums and quotients alone, continuous in depth: drivers differ by a rounding.
  * A sample outside the image, or one that holds nothing, says nothing, and its pair neither. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -36,7 +37,8 @@ float light_of(ivec2 at, uint index)
 {
     vec3 n = normal_of(index);
     precise vec2 place = vec2(at + tile_corner()) + 0.5;
-    precise vec3 ray = vec3((place.x - frame.cx) / frame.fx, (place.y - frame.cy) / frame.fy, 1.0);
+    precise vec2 off_axis = vec2((place.x - frame.cx) / frame.fx, (place.y - frame.cy) / frame.fy);
+    vec3 ray = vec3(PARALLEL != 0u ? vec2(0.0) : off_axis, 1.0);
     precise float along = n.x * ray.x + n.y * ray.y + n.z;
     precise float facing = abs(along) / sqrt(ray.x * ray.x + ray.y * ray.y + 1.0);
     precise float sun = n.x * frame.map_pose[0] + n.y * frame.map_pose[1] + n.z * frame.map_pose[2];
@@ -48,23 +50,26 @@ float light_of(ivec2 at, uint index)
     return kept;
 }
 
-/* Inverse depth of a sample of the tile that lies in the image; 0 where there is nothing. */
-float inverse_at(ivec2 at)
+/* Inverse depth of a sample of the tile that lies in the image, or depth where rays are parallel; 0 where there is
+ * nothing. */
+float linear_at(ivec2 at)
 {
     bool inside = at.x >= int(frame.fill_level) && at.y >= int(frame.fill_from) && at.x < int(frame.fill_to) &&
                   at.y < int(frame.fill_stride);
     uint bits = depth_word(sample_index(inside ? at : ivec2(frame.fill_level, frame.fill_from)));
-    return inside && bits != SPL_NOTHING ? 1.0 / uintBitsToFloat(bits) : 0.0;
+    float z = uintBitsToFloat(bits);
+    return inside && bits != SPL_NOTHING ? (PARALLEL != 0u ? z : 1.0 / z) : 0.0;
 }
 
 float edl_of(ivec2 at, float z)
 {
     int far = int(frame.map_sides), corner = int(0.7071068 * float(far) + 0.5);
-    float deeper = 0.0;
+    float deeper = 0.0, far_off = depth_slack(z, 1.0);
     for (int i = 0; i < 4; i++) { /* of fixed length: it is unrolled */
         ivec2 step = i == 0 ? ivec2(far, 0) : i == 1 ? ivec2(corner, corner) : i == 2 ? ivec2(0, far) : ivec2(corner, -corner);
-        float one = inverse_at(at - step), other = inverse_at(at + step);
-        precise float past = 0.5 * (one + other) * z - 1.0;
+        float one = linear_at(at - step), other = linear_at(at + step);
+        precise float nearer = 0.5 * (one + other) * z - 1.0, before = (z - 0.5 * (one + other)) / far_off;
+        float past = PARALLEL != 0u ? before : nearer;
         deeper += one > 0.0 && other > 0.0 ? max(past, 0.0) : 0.0;
     }
     precise float scaled = SPL_SHADE_DEPTH * deeper;

@@ -65,6 +65,10 @@
 /* Samples of one surface that are smoothed differ in depth by this share at most. */
 #define SPL_SMOOTH_SHARE 0.01f
 
+/* Along parallel rays nothing says how depths of one surface differ but the samples: by as much as for a lens of this
+ * focal length, pixels, whose samples are as large there. */
+#define SPL_PARALLEL_FOCAL 640.0f
+
 /* A splat covers the samples within this many sample sizes of its centre, however small it is: half a sample's
  * diagonal, so that any centre covers one, and a thousandth more, for a centre in the corner between four and what
  * floats round. */
@@ -364,7 +368,7 @@ struct spl_chunk_bounds {
 /* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
 struct spl_frame_params {
     SPL_F32 rotation[12];                 /* world -> camera, three rows of (x, y, z, 0) */
-    SPL_F32 fx, fy, cx, cy;               /* samples; the same in every tile of an image */
+    SPL_F32 fx, fy, cx, cy;               /* samples; the same in every tile of an image; of parallel rays samples a unit */
     SPL_F32 near, far;
     SPL_F32 low_pass;                     /* radius in samples within which a splat always covers */
     SPL_F32 margin;                       /* blend margin as a multiple of the splat's radius */

@@ -35,7 +35,7 @@ void main()
         precise float y = (float(at.y + int(frame.tile_y)) + (0.5 - frame.cy)) * frame.inverse_fy;
         precise float over = 1.0 / (1.0 + rx * rx + y * y);
         ry[k] = y;
-        inverse[k] = over;
+        inverse[k] = PARALLEL != 0u ? 1.0 : over;
         sum[k] = uvec3(0u);
         clear[k] = int(SPL_SOFT_CLEAR);
         if (FIRST == 0u) {
@@ -61,13 +61,13 @@ void main()
         float radius = THIN != 0u ? soft_radius(own, z) : own, whole = soft_share(own, radius);
         float rounding = THIN != 0u ? soft_rounding(own, radius, x, y) : 0.5;
         precise float closer = 1.0 / (radius * radius);
-        precise float ox = x - rx * z;
-        precise float ox_squared = ox * ox, ox_along = ox * rx;
+        precise float ox = x - rx * ray_scale(z);
+        precise float ox_squared = ox * ox, ox_along = PARALLEL != 0u ? 0.0 : ox * rx;
         float soft = soft_of_mark(paint >> 24);
         int left = 0;
         for (int k = 0; k < SPL_SOFT_SAMPLES; k++) {
-            precise float oy = y - ry[k] * z;
-            precise float along = ox_along + oy * ry[k];
+            precise float oy = y - ry[k] * ray_scale(z);
+            precise float along = PARALLEL != 0u ? 0.0 : ox_along + oy * ry[k];
             precise float share = (ox_squared + oy * oy - along * along * inverse[k]) * closer;
             precise float inner = 1.0 - share;
             precise float m = intBitsToFloat(max(floatBitsToInt(inner), 0));

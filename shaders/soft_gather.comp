@@ -27,6 +27,10 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_TESTS) test_texels;
 /* The samples along an axis, inclusive, that a sphere at p, depth q, may reach. */
 vec2 sphere_extent(float p, float q, float radius, float f, float c)
 {
+    if (PARALLEL != 0u) {
+        precise vec2 sides = vec2((p - radius) * f + c, (p + radius) * f + c);
+        return vec2(ceil(sides.x - 0.501), floor(sides.y - 0.499));
+    }
     precise float a = q * q - radius * radius;
     precise float root = radius * sqrt(max(p * p + q * q - radius * radius, 0.0));
     precise float inverse = f / (a > 0.0 ? a : 1.0);
@@ -133,7 +137,8 @@ void main()
                                               span.y << SPL_SOFT_RECT_ROWS;
                     if (DETAILS != 0u) {
                         uint detail = job.details + SPL_SOFT_DETAIL_WORDS * next;
-                        items[detail] = pack_normal(DETAILS == 1u ? load_splat(run.chunk, i, false).normal : -p);
+                        vec3 to_eye = PARALLEL != 0u ? vec3(0.0, 0.0, -1.0) : -p;
+                        items[detail] = pack_normal(DETAILS == 1u ? load_splat(run.chunk, i, false).normal : to_eye);
                         items[detail + 1u] = SPL_DRAWN;
                     }
                     pairs[2u * next] = key;

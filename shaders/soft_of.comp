@@ -92,6 +92,7 @@ void main()
     precise vec2 slope = vec2(at + ivec2(frame.tile_x, frame.tile_y)) + (0.5 - vec2(frame.cx, frame.cy));
     slope *= vec2(frame.inverse_fx, frame.inverse_fy);
     precise float inverse = 1.0 / (1.0 + slope.x * slope.x + slope.y * slope.y);
+    inverse = PARALLEL != 0u ? 1.0 : inverse;
     ray.slope = slope;
     ray.inverse = inverse;
     bool seen = false;
@@ -109,8 +110,8 @@ void main()
         item.share = THIN != 0u ? soft_share(given, item.radius) : 1.0;
         item.rounding = THIN != 0u ? soft_rounding(given, item.radius, center.x, center.y) : 0.5;
         precise float closer = 1.0 / (item.radius * item.radius);
-        precise vec2 off = center - slope * item.z;
-        precise float along = off.x * slope.x + off.y * slope.y;
+        precise vec2 off = center - slope * ray_scale(item.z);
+        precise float along = PARALLEL != 0u ? 0.0 : off.x * slope.x + off.y * slope.y;
         precise float q = (off.x * off.x + off.y * off.y - along * along * inverse) * closer;
         precise float behind = along * inverse;
         item.behind = behind;

@@ -9,7 +9,8 @@
 // token    where the service wants one; whoever sees the page sees it, so let it allow no more than view
 // signed   in its place, what `splatd sign /embed/ID` puts behind '?': exp=…&sig=…, for this dataset until it expires
 // crs      what eye and target are in, as EPSG:4326; without it the dataset's own coordinates
-// eye, target, up, fov, layer, lod, supersample, budget, method and whatever GET /v1/methods says that it takes
+// eye, target, up, fov (or projection="orthographic" view_height), layer, lod, supersample, budget, method and whatever
+//          GET /v1/methods says that it takes
 //          as parameters of a view; changing one moves the view
 //
 // Event "camera": detail {eye, target, up, fov}, once the view has come to rest; the property `camera` has the last

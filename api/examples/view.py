@@ -23,7 +23,7 @@ class Error(c.Structure):  # struct spl_error
 
 class Camera(c.Structure):  # struct spl_camera
     _fields_ = [("eye", real * 3), ("rotation", real * 9), ("fx", real), ("fy", real), ("cx", real), ("cy", real),
-                ("width", u32), ("height", u32), ("near", real), ("far", real)]
+                ("width", u32), ("height", u32), ("near", real), ("far", real), ("projection", c.c_int)]
 
 
 class View(c.Structure):  # struct spl_view, up to what is set here

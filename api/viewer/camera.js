@@ -1,4 +1,5 @@
-// A look-at camera, as the service takes it: {eye, target, up, fov}, fov vertical in degrees. All functions are pure
+// A look-at camera, as the service takes it: {eye, target, up, fov}, fov vertical in degrees; one that is `flat` is
+// orthographic, and shows as much as it would of the plane through its target. All functions are pure
 // and return new cameras. The camera frame is x right, y down, z forward, as in api/cameras.md; pixels count from the
 // corner.
 
@@ -32,8 +33,8 @@ export function project(camera, [width, height], point) {
   const {right, down, forward} = axes(camera);
   const p = sub(point, camera.eye);
   const z = dot(p, forward);
-  const f = focal(camera, height);
-  return z > 0 ? [(f * dot(p, right)) / z + width / 2, (f * dot(p, down)) / z + height / 2, z] : null;
+  const f = focal(camera, height) / (camera.flat ? distance(camera) : z);
+  return z > 0 || camera.flat ? [f * dot(p, right) + width / 2, f * dot(p, down) + height / 2, z] : null;
 }
 
 /** Direction through a pixel, one long along the viewing axis. */
@@ -109,8 +110,8 @@ export function warp(from, to, [width, height]) {
       add(times(a.forward, d), add(times(a.right, (-cx * d) / f), times(a.down, (-cy * d) / f))),
     ),
   ];
-  const h = columns.map((v) => {
-    const z = dot(v, b.forward);
+  const h = columns.map((v, i) => {
+    const z = !to.flat ? dot(v, b.forward) : i === 2 ? distance(to) : 0;
     return [g * dot(v, b.right) + cx * z, g * dot(v, b.down) + cy * z, z];
   });
   const corners = [
@@ -133,7 +134,33 @@ export function rounded(camera) {
     target: round(camera.target),
     up: camera.up.map((x) => Number(x.toFixed(6)) + 0),
     fov: Number(camera.fov.toFixed(3)),
+    ...(camera.flat ? {flat: true} : {}),
   };
+}
+
+/** What of it the service takes: of a flat one the eye is `back` farther away, so that nothing is before it. */
+export function params({flat, fov, ...camera}, back) {
+  if (!flat) return {...camera, fov};
+  const height = 2 * distance(camera) * Math.tan((fov * Math.PI) / 360);
+  const eye = sub(camera.eye, times(axes(camera).forward, back));
+  return {...rounded({...camera, eye, fov: 1}), fov: undefined, projection: "orthographic", view_height: Number(height.toPrecision(6))};
+}
+
+/** The other way round: of parameters, with what they leave out from `home`. */
+export function fromParams({projection, view_height: height, ...given}, home) {
+  const camera = {...home, ...given};
+  if (projection !== "orthographic" && height === undefined) return camera;
+  const far = height ? height / 2 / Math.tan((camera.fov * Math.PI) / 360) : distance(camera);
+  return {...camera, flat: true, eye: sub(camera.target, times(axes(camera).forward, far))};
+}
+
+/** The same target from one of its sides ("top", "front", "side"), flat; `home` says what is up. */
+export function fromSide(camera, side, home) {
+  const x = [1, 0, 0],
+    up = Math.abs(home.up[1]) > Math.abs(home.up[2]) ? [0, 1, 0] : [0, 0, 1];
+  const ahead = cross(up, x); // north, of z up
+  const [direction, upward] = {top: [times(up, -1), ahead], front: [ahead, up], side: [times(x, -1), up]}[side];
+  return {...camera, flat: true, up: upward, eye: sub(camera.target, times(direction, distance(camera)))};
 }
 
 export const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);

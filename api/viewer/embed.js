@@ -26,11 +26,11 @@ async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
     const wanted = parse(location.hash);
-    const {dataset: _, view: __, eye, target, up, fov, layer = "color", budget, ...setting} = {
+    const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, ...setting} = {
       ...named(dataset, wanted, stage.size),
       ...(await toWorld(dataset, wanted)),
     };
-    const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
+    const given = Object.entries({eye, target, up, fov, projection, view_height}).filter(([, value]) => value !== undefined);
     document.title = dataset.title ?? id;
     stage.element.ariaLabel = `View of ${id}`;
     stage.settings = budget ? {layer, budget, ...softOf(setting)} : {layer, ...setting};

@@ -3,8 +3,8 @@
 import {findParameter} from "./methods.js";
 
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade"],
-  NUMBERS = ["fov", "lod", "supersample"];
+  TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade", "projection"],
+  NUMBERS = ["fov", "view_height", "lod", "supersample"];
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 
 /** Is it a number, as a parameter of a view? */

@@ -1,5 +1,6 @@
 // The page: fills the controls from what the service says and ties them to the stage.
 
+import {add, distance, fromSide, same, sub, unit} from "./camera.js";
 import {Chart} from "./chart.js";
 import {Gallery} from "./gallery.js";
 import {attach} from "./input.js";
@@ -64,7 +65,7 @@ function readSettings(before) {
 }
 
 function writeLink() {
-  const {eye, target, up, fov} = stage.params();
+  const {eye, target, up, fov, projection, view_height} = stage.params();
   const {budget, ...setting} = stage.settings;
   history.replaceState(
     null,
@@ -75,6 +76,8 @@ function writeLink() {
       target,
       up,
       fov,
+      projection,
+      view_height,
       layer: setting.layer,
       ...(budget ? {budget, ...softOf(setting)} : setting),
     })}`,
@@ -159,7 +162,7 @@ async function open() {
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
     const camera = Object.fromEntries(
-      ["eye", "target", "up", "fov"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]),
+      ["eye", "target", "up", "fov", "projection", "view_height"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]),
     );
     opened = turn;
     stage.open(dataset, camera);
@@ -301,6 +304,28 @@ $("views").addEventListener("change", () => {
   if (stage.dataset) stage.setCamera(view ? named(stage.dataset, {view}, stage.size) : stage.home);
 });
 $("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
+const SIDES = ["top", "front", "side"];
+let round = null; // the camera before it looked from a side
+/** Which side it looks from, or null. */
+function side() {
+  const towards = ({eye, target}) => unit(sub(target, eye)).map((x) => Number(x.toFixed(6)) + 0);
+  const from = (name) => same(towards(stage.camera), towards(fromSide(stage.camera, name, stage.home)));
+  return (stage.camera.flat && SIDES.find(from)) || null;
+}
+for (const name of SIDES)
+  $(name).addEventListener("click", () => {
+    if (!stage.dataset) return;
+    const now = stage.camera;
+    if (!now.flat) round = now;
+    const {eye, target, up, fov} = round ?? stage.home; // whence it is left again
+    const scale = distance(now) / distance({eye, target});
+    if (side() !== name) stage.setCamera(fromSide(now, name, stage.home));
+    else stage.setCamera({eye: add(now.target, sub(eye, target).map((x) => x * scale)), target: now.target, up, fov});
+  });
+stage.addEventListener("camera", () => {
+  const seen = side();
+  for (const name of SIDES) $(name).ariaPressed = String(name === seen);
+});
 $("link").addEventListener("click", () => copied(location.href, "Link"));
 $("curl").addEventListener("click", () => stage.dataset && copied(curl(stage.url(), stage.settings.layer), "Command"));
 $("clear").addEventListener("click", () => points.clear());

@@ -50,9 +50,10 @@ export class Points extends EventTarget {
       dataset,
       size: [width, height],
     } = this.stage;
-    const {eye, target, up, fov} = this.stage.params();
+    const {eye, target, up, fov, projection, view_height} = this.stage.params();
     const drawn = pickable(this.stage.shown?.chosen ?? this.stage.settings);
-    const found = await askJson(`${dataset.uri}/pick?${query({x, y, eye, target, up, fov, width, height, ...drawn})}`);
+    const camera = {eye, target, up, fov, projection, view_height, width, height};
+    const found = await askJson(`${dataset.uri}/pick?${query({x, y, ...camera, ...drawn})}`);
     return found.position ? found : null;
   }
 

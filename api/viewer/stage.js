@@ -5,7 +5,7 @@
 // cancelled, which lets the service drop it. Events: "camera" (it changed), "frame" (detail: what the reply said),
 // "state" (detail: a Problem, or null when all is well).
 
-import {fitted, rounded, same, warp} from "./camera.js";
+import {fitted, fromParams, params, rounded, same, warp} from "./camera.js";
 import {Problem, ask, query} from "./service.js";
 import {softOf} from "./soft_setting.js";
 
@@ -71,13 +71,13 @@ export class Stage extends EventTarget {
     this.refresh();
   }
 
-  /** Shows another dataset, from `camera` or its default view. */
+  /** Shows another dataset, from `camera`, a view's parameters, or its default view. */
   open(dataset, camera) {
     if (this.dataset?.id !== dataset.id) this.close();
     this.dataset = dataset;
     this.first = this.home;
     this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
-    this.camera = {...this.first, ...camera};
+    this.camera = fromParams(camera ?? {}, this.first);
     this.dispatchEvent(new Event("camera"));
     this.refresh();
   }
@@ -150,7 +150,7 @@ export class Stage extends EventTarget {
     if (full && budget) quality = {budget, ...softOf(setting)};
     else if (!full && coarse.budget) quality = {...kept, ...coarse};
     return {
-      ...rounded(this.camera),
+      ...params(rounded(this.camera), 1000 * this.least),
       width: Math.max(1, Math.floor(width * ratio)),
       height: Math.max(1, Math.floor(height * ratio)),
       layer,

@@ -44,7 +44,7 @@ export class Tour extends EventTarget {
   add() {
     const opacity = opacityOf(this.stage.settings);
     this.keyframes.push({
-      ...rounded(this.stage.camera),
+      ...rounded({...this.stage.camera, flat: false}), // a tour is a pinhole's
       seconds: 3,
       ...(opacity === null ? {} : {soft_opacity: opacity}),
     });

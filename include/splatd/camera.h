@@ -1,9 +1,11 @@
-/* A pinhole camera, and the conventions it can be given in.
+/* A pinhole camera or an orthographic one, and the conventions it can be given in.
  *
  * World coordinates are doubles in the dataset's unit. The camera frame is x right, y down, z forward (COLMAP,
  * OpenCV, ROS); a world point p lands on the pixel
  *     c = R (p - eye),   u = fx c.x / c.z + cx,   v = fy c.y / c.z + cy
- * where the first pixel's centre is (0.5, 0.5). Pure functions; any thread. */
+ * where the first pixel's centre is (0.5, 0.5). An orthographic camera's rays are parallel to its axis:
+ *     u = fx c.x + cx,   v = fy c.y + cy
+ * with fx and fy in pixels a unit. Pure functions; any thread. */
 #ifndef SPLATD_CAMERA_H
 #define SPLATD_CAMERA_H
 
@@ -15,20 +17,30 @@
 
 SPL_BEGIN_DECLARATIONS
 
+enum spl_projection { SPL_PERSPECTIVE, SPL_ORTHOGRAPHIC, SPL_PROJECTION_COUNT };
+SPL_API const char *spl_projection_name(enum spl_projection projection);
+SPL_API int spl_projection_from_name(const char *name); /* -1 for an unknown name */
+
 struct spl_camera {
     double eye[3];           /* world position */
     double rotation[9];      /* R, world -> camera, row-major, orthonormal, determinant +1 */
-    double fx, fy, cx, cy;   /* pixels */
+    double fx, fy, cx, cy;   /* pixels; of orthographic ones fx, fy pixels a unit */
     uint32_t width, height;  /* pixels */
-    double near, far;        /* view depths that are drawn, 0 < near < far; far may be INFINITY */
+    double near, far;        /* view depths that are drawn, 0 < near < far (near 0 in orthographic views); far may be INFINITY */
+    enum spl_projection projection; /* 0 = of a pinhole */
 };
 
 /* Full pinhole from a vertical field of view: fx = fy, principal point in the middle.
- * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height only:
+ * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height and projection only:
  * near and far are those of spl_view_init(), 0.01 and INFINITY, or of spl_dataset_get_default_camera(), which fit the
  * dataset. */
 SPL_API int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                                struct spl_error *err);
+
+/* Orthographic, of an image that is `view_height` units high, principal point in the middle; fields at fault are named
+ * "view_height", "width", "height". Fills fx fy cx cy width height and projection only. */
+SPL_API int spl_camera_set_orthographic(struct spl_camera *camera, double view_height, uint32_t width, uint32_t height,
+                                        struct spl_error *err);
 
 /* Looks from `eye` to `target` with `up` upwards in the image. Errors name "eye", "target", "up": non-finite numbers,
  * eye == target, up zero or parallel to the view. Fills eye and rotation only. */
@@ -50,6 +62,11 @@ SPL_API int spl_camera_set_matrix(struct spl_camera *camera, const double camera
  * fields "q", "t". Fills eye and rotation only. */
 SPL_API int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const double t[3],
                                   struct spl_error *err);
+
+/* Where the pixels of an orthographic view straight down lie, all but their epsg. SPL_E_INPUT, field "format", of a view
+ * that is none. */
+struct spl_ground;
+SPL_API int spl_camera_get_ground(const struct spl_camera *camera, struct spl_ground *ground, struct spl_error *err);
 
 /* Checks everything: finite, orthonormal, positive focal lengths and sizes, 0 < near < far, |eye| <= 1e12.
  * The field at fault is named. */

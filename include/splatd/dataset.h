@@ -107,6 +107,7 @@ struct spl_dataset_info {
     const char *title, *description;    // may be NULL; what its packer called it; borrowed until close
     uint32_t view_count;                /* at most SPL_SAVED_VIEWS_MAX */
     const struct spl_saved_view *views; /* by name; borrowed until close */
+    uint32_t epsg;  /* number of the horizontal coordinate system in EPSG's list; 0 = not known */
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */

@@ -51,7 +51,18 @@ enum spl_format {
     SPL_FORMAT_NPY, /* the layer's own type: |u1 (h,w,4), <f4 (h,w), <f4 (h,w,3), <u4 (h,w) */
     SPL_FORMAT_RAW, /* the same bytes without a header, little-endian */
     SPL_FORMAT_WEBP, /* lossy; as JPEG, with the alpha of color; only where it was built in */
+    SPL_FORMAT_TIFF, /* GeoTIFF of a map: color RGB and alpha, depth and range as float32 heights, NaN = nothing; the
+                        others as they are; only where it was built in */
     SPL_FORMAT_COUNT
+};
+
+/* Where the pixels of a map lie: column c and row r, the first pixel's corner at 0, 0, are at
+ * origin + c across + r down (x, y). */
+struct spl_ground {
+    bool placed; /* false: the image is no map */
+    double origin[2], across[2], down[2];
+    double height; /* of depth 0 */
+    uint32_t epsg; /* its coordinate system's number, 0 = not known */
 };
 
 struct spl_encode_options {
@@ -61,6 +72,7 @@ struct spl_encode_options {
     int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
     char unit[32];        /* of distances, for the note that a 16 bit PNG carries: "m", "ft"; "" = "unit" */
+    struct spl_ground ground; /* of GeoTIFF, which is refused without */
 };
 
 static inline void spl_encode_options_init(struct spl_encode_options *options)

@@ -3,7 +3,7 @@
  *
  * The planes through the eye beside an axis at distance r from it cut the image at depth z in lines that are
  * r / (z g) off the axis' picture, where g is the gradient of the plane through eye and axis (unit normal n), a sample
- * apart: g = |(n.x / fx, n.y / fy)|. */
+ * apart: g = |(n.x / fx, n.y / fy)|. Of parallel rays the plane is along the viewing axis, and the lines r / g off. */
 #ifndef SPL_CAPSULE_GLSL
 #define SPL_CAPSULE_GLSL
 
@@ -14,8 +14,8 @@ struct capsule {
     vec2 a, along;     /* samples: where it begins, the way to its end */
     float inverse;     /* one over the square of that way's length; 0 of none */
     float slope;       /* samples across for a sample along, within 1 */
-    float w, fall;     /* inverse depth where it begins, and how much more it is where it ends */
-    float half_width;  /* samples times depth */
+    float w, fall;     /* inverse depth where it begins, and how much more it is where it ends; of parallel rays depth */
+    float half_width;  /* samples times depth, or of parallel rays samples */
     float thick;       /* half its width, metres */
     float middle;      /* as of the piece, along the picture */
     int first, end;    /* samples along; empty when end <= first */
@@ -30,16 +30,11 @@ struct capsule_walk {
     int left;
 };
 
-vec2 capsule_project(vec3 p)
-{
-    precise vec2 place = vec2(frame.fx * (p.x / p.z) + frame.cx, frame.fy * (p.y / p.z) + frame.cy);
-    return place;
-}
-
 /* One over the gradient, within what lines in an image have; as straight ahead where the axis is a point. */
 float capsule_scale(vec3 p, vec3 q)
 {
     precise vec3 n = vec3(p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x);
+    n = PARALLEL != 0u ? vec3(q.y - p.y, p.x - q.x, 0.0) : n;
     precise float squared = n.x * n.x + n.y * n.y + n.z * n.z;
     precise vec2 g = vec2(n.x * frame.inverse_fx, n.y * frame.inverse_fy);
     precise float gradient = g.x * g.x + g.y * g.y;
@@ -51,14 +46,14 @@ float capsule_scale(vec3 p, vec3 q)
 capsule make_capsule(piece cut, spl_draw_chunk chunk, vec2 window_low, vec2 window_high)
 {
     capsule c;
-    vec2 a = capsule_project(cut.from), b = capsule_project(cut.to);
+    vec2 a = image_place(cut.from), b = image_place(cut.to);
     c.upright = abs(b.y - a.y) > abs(b.x - a.x);
     c.a = c.upright ? a.yx : a;
     precise vec2 along = c.upright ? b.yx - a.yx : b - a;
     precise float squared = along.x * along.x + along.y * along.y;
-    precise float w0 = 1.0 / cut.from.z, w1 = 1.0 / cut.to.z;
+    precise float w0 = PARALLEL != 0u ? cut.from.z : 1.0 / cut.from.z, w1 = PARALLEL != 0u ? cut.to.z : 1.0 / cut.to.z;
     precise float half_width = chunk.texture_scale * capsule_scale(cut.from, cut.to);
-    precise float widest = max(half_width * max(w0, w1), SPL_LINE_THIN);
+    precise float widest = max(half_width * (PARALLEL != 0u ? 1.0 : max(w0, w1)), SPL_LINE_THIN);
     precise float slope = along.y / along.x;
     precise float inverse = 1.0 / squared;
     c.along = along;
@@ -68,7 +63,7 @@ capsule make_capsule(piece cut, spl_draw_chunk chunk, vec2 window_low, vec2 wind
     c.fall = w1 - w0;
     c.half_width = half_width;
     c.thick = chunk.texture_scale;
-    precise float middle = cut.middle * cut.to.z;
+    precise float middle = cut.middle * ray_scale(cut.to.z);
     c.middle = middle;
     precise float reach = widest * sqrt(1.0 + c.slope * c.slope);
     c.reach = reach;
@@ -125,10 +120,10 @@ float capsule_sample(capsule c, capsule_walk walk, out float z, out bool second)
     precise float t = clamp((off.x * c.along.x + off.y * c.along.y) * c.inverse, 0.0, 1.0);
     precise vec2 beside = off - t * c.along;
     precise float w = c.w + t * c.fall;
-    precise float depth = 1.0 / w;
-    precise float half_width = max(c.half_width * w, SPL_LINE_THIN);
+    precise float depth = PARALLEL != 0u ? w : 1.0 / w;
+    precise float half_width = max(c.half_width * (PARALLEL != 0u ? 1.0 : w), SPL_LINE_THIN);
     precise float distance = (beside.x * beside.x + beside.y * beside.y) / (half_width * half_width);
-    precise float way = t * depth;
+    precise float way = t * ray_scale(depth);
     z = depth;
     second = !(way < c.middle);
     return distance;
@@ -137,7 +132,7 @@ float capsule_sample(capsule c, capsule_walk walk, out float z, out bool second)
 /* How far depth z is pushed back for blending: as a disc's of the half width that faces the eye. */
 float capsule_margin(capsule c, float z)
 {
-    precise float margin = frame.margin * max(c.thick, frame.low_pass * z * frame.inverse_fx);
+    precise float margin = frame.margin * max(c.thick, frame.low_pass * ray_scale(z) * frame.inverse_fx);
     return margin;
 }
 

@@ -1,6 +1,7 @@
 /* The footprint of an oriented disc on the sample grid, and its depth there.
  *
- * The sample's ray meets the disc's plane at z = n.p / n.d (d.z = 1), exact under perspective. A splat that is smaller
+ * The sample's ray meets the disc's plane at z = n.p / n.d (d.z = 1), exact under perspective; a parallel ray where the
+ * plane, whose depth is linear along the image then, is there. A splat that is smaller
  * than a sample still covers the sample that its centre falls on: within `low_pass` samples of the centre it counts as
  * covered. Its depth there is the plane's, clamped to what the disc spans, r sqrt(1 - n.z^2) around its centre, or to
  * SPL_LOW_PASS_REACH if that is more. Written without comparisons: software drivers pay more for a select than for a
@@ -18,7 +19,7 @@ struct disc {
     float behind;      /* metres that its back is pushed back besides, so that what faces the eye wins */
     /* With uv = sample - centre: the plane is hit at depth k, k = 1 / (1 + slope . uv) (never behind the eye: there the
      * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth /
-     * radius. */
+     * radius. Along parallel rays it is hit slope . uv nearer, off by (uv / f, - slope . uv) / radius. */
     vec2 slope;
     float reach;
     vec2 ray, pitch;   /* the centre's ray, one over the focal lengths; both times scale */
@@ -30,6 +31,8 @@ struct disc {
  * width. */
 vec2 disc_extent(float p, float q, float n_p, float n_q, float n_other, float radius)
 {
+    if (PARALLEL != 0u)
+        return vec2(p, radius * sqrt(max(1.0 - n_p * n_p, 0.0)));
     precise float a = q * q - radius * radius * (1.0 - n_q * n_q);
     precise float b = p * q + radius * radius * n_p * n_q;
     precise float cross = p * n_q - q * n_p;
@@ -46,7 +49,7 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
 {
     disc d;
     vec3 p = s.position, n = s.normal;
-    precise float inverse = 1.0 / p.z;
+    precise float inverse = 1.0 / ray_scale(p.z);
     precise vec2 ray = p.xy * inverse;
     precise vec2 center = vec2(frame.fx * ray.x + frame.cx, frame.fy * ray.y + frame.cy);
     vec2 ex = disc_extent(p.x, p.z, n.x, n.z, n.y, s.radius), ey = disc_extent(p.y, p.z, n.y, n.z, n.x, s.radius);
@@ -60,17 +63,18 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
         d.last.y = d.first.y - 1;
     d.center = center;
     d.depth = p.z;
-    precise float facing = n.x * ray.x + n.y * ray.y + n.z;
+    precise float towards = n.x * ray.x + n.y * ray.y + n.z;
+    precise float facing = PARALLEL != 0u ? n.z : towards;
     precise float tilt = 1.0 / (abs(facing) < 1e-6 ? 1e-6 : facing);
     precise vec2 slope = vec2(n.x * frame.inverse_fx * tilt, n.y * frame.inverse_fy * tilt);
-    precise float scale = p.z / s.radius;
+    precise float scale = ray_scale(p.z) / s.radius;
     precise float spans = sqrt(max(1.0 - n.z * n.z, 0.0)) / scale;
     precise vec2 scaled_ray = ray * scale, pitch = vec2(frame.inverse_fx * scale, frame.inverse_fy * scale);
     precise float slant = min(max(abs(tilt), 1.0), SPL_MARGIN_SLANT);
-    precise float margin = frame.margin * max(s.radius, frame.low_pass * p.z * frame.inverse_fx) * slant;
+    precise float margin = frame.margin * max(s.radius, frame.low_pass * ray_scale(p.z) * frame.inverse_fx) * slant;
     d.slope = slope;
     d.reach = max(spans, SPL_LOW_PASS_REACH * frame.inverse_fx);
-    d.ray = scaled_ray;
+    d.ray = PARALLEL != 0u ? vec2(0.0) : scaled_ray;
     d.pitch = pitch;
     d.scale = scale;
     d.margin = margin;
@@ -93,13 +97,16 @@ float disc_sample(disc d, ivec2 at, out float z, out vec3 offset)
 {
     precise vec2 uv = vec2(at) + (0.5 - d.center);
     precise float near_center = (uv.x * uv.x + uv.y * uv.y) * frame.inverse_low_pass_squared;
-    precise float k = 1.0 / max(1.0 + (d.slope.x * uv.x + d.slope.y * uv.y), 1e-6);
-    precise float w = k - 1.0;
+    precise float rise = d.slope.x * uv.x + d.slope.y * uv.y;
+    precise float ratio = 1.0 / max(1.0 + rise, 1e-6);
+    float k = PARALLEL != 0u ? 1.0 : ratio;
+    precise float w = PARALLEL != 0u ? -rise : k - 1.0;
     precise vec2 q = d.ray * w + d.pitch * uv * k;
     precise float fall = d.scale * w;
     precise float distance = q.x * q.x + q.y * q.y + fall * fall;
     precise float along = d.depth * (1.0 + clamp(w, -d.reach, d.reach));
-    z = along;
+    precise float beside = d.depth + clamp(w, -d.reach, d.reach);
+    z = PARALLEL != 0u ? beside : along;
     offset = vec3(q, fall);
     return min(distance, near_center);
 }

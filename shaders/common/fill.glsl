@@ -58,7 +58,7 @@ float spacing_of(uint code)
 float surface_tolerance(uint near, float samples)
 {
     float w = inverse_depth(near, SPACING_MASK);
-    float slope = samples * SPL_FILL_SLOPE * frame.inverse_fx;
+    float slope = samples * SPL_FILL_SLOPE * frame.inverse_fx * (PARALLEL != 0u ? w : 1.0);
     return slope + frame.fill_margin * frame.fill_radius * w * spacing_of(near & SPACING_MASK);
 }
 

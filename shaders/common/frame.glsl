@@ -15,6 +15,31 @@ void load_frame()
     frame = frame_in_memory;
 }
 
+/* The rays of the image: through the eye, or parallel to the viewing axis, where frame.fx and fy are samples a unit. Known
+ * before a kernel is built, so that neither pays for the other. All that divides by depth on its way to the image goes
+ * through ray_scale(). */
+layout(constant_id = 6) const uint PARALLEL = 0;
+
+/* What offsets from the axis at view depth z are divided by. */
+float ray_scale(float z)
+{
+    return PARALLEL != 0u ? 1.0 : z;
+}
+
+/* By how much depths of one surface around z may differ: a share of it. */
+float depth_slack(float z, float share)
+{
+    float scale = PARALLEL != 0u ? SPL_PARALLEL_FOCAL * float(frame.supersample) * frame.inverse_fx : z;
+    return share * scale;
+}
+
+/* Where a point of view space falls on the image. */
+vec2 image_place(vec3 p)
+{
+    precise vec2 place = vec2(frame.fx * (p.x / ray_scale(p.z)) + frame.cx, frame.fy * (p.y / ray_scale(p.z)) + frame.cy);
+    return place;
+}
+
 /* Words of a buffer as texels, under a number SPL_TEXELS_…; these and the SPL_STORAGE_… come from the kernel's row in
  * shaders/meson.build. */
 #define SPL_TEXEL_BUFFER(number) layout(binding = number, r32ui) uniform readonly uimageBuffer

@@ -28,13 +28,13 @@ bool covers(panel_draw d, vec2 place)
 /* May any of the panel lie on the samples that are drawn to? It lies in a ball of `radius` around `middle`. */
 bool may_be_seen(splat_run run, vec3 middle, float radius)
 {
-    float near = middle.z - radius, far = middle.z + radius;
+    float near = ray_scale(middle.z - radius), far = ray_scale(middle.z + radius);
     vec2 low = middle.xy - radius, high = middle.xy + radius, focal = vec2(frame.fx, frame.fy);
     vec2 center = vec2(frame.cx, frame.cy);
     vec2 most = center + 1.0 + focal * high / mix(vec2(far), vec2(near), greaterThan(high, vec2(0.0)));
     vec2 least = center - 1.0 + focal * low / mix(vec2(near), vec2(far), greaterThan(low, vec2(0.0)));
     bvec4 inside = bvec4(greaterThanEqual(most, run.low), lessThan(least, run.high + 1.0));
-    return near <= frame.near || all(inside);
+    return middle.z - radius <= frame.near || all(inside);
 }
 
 /* Blocks of 4 x 4 cells that a square of the lattice of `side` squares a side touches. */
@@ -97,7 +97,7 @@ void draw_panel()
     if (!d.own.known || !may_be_seen(run, middle, radius))
         return;
     uint side = 1u << d.own.lattice, count = 2u * side * side;
-    float large = SPL_MESH_LARGE * float(side) * max(middle.z - radius, frame.near);
+    float large = SPL_MESH_LARGE * float(side) * ray_scale(max(middle.z - radius, frame.near));
     bool shared_ones = max(frame.fx, frame.fy) * float(SPL_PANEL_SIDE) * d.plane.cell > large;
     uint lanes = max(shared_ones ? uint(SPL_LANES) : 1u, uint(SPL_MESH_LANES) / count);
     uint there = d.own.there, columns = (there | there >> 4 | there >> 8 | there >> 12) & 15u;

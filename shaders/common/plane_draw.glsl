@@ -1,6 +1,6 @@
 /* What is drawn of a panel on the sample grid: a piece of a plane, which is the panel itself (panel_draw.glsl) or a
  * triangle of one with relief (mesh_draw.glsl). A sample's ray meets the plane at z = n.o / n.d (d.z = 1), exact under
- * perspective, in a cell whose bit says whether it is there. A hair of SPL_PANEL_HAIR cells beyond the piece's edge is
+ * perspective, or, parallel to the axis through (x, y), at z = (n.o - n.x x - n.y y) / n.z, in a cell whose bit says whether it is there. A hair of SPL_PANEL_HAIR cells beyond the piece's edge is
  * its own too, so that no sample falls between pieces that are rounded each on their own.
  *
  * Of what is thinner than a sample, as a plane seen along its edge or far away, each cell that is there also covers the
@@ -48,12 +48,6 @@ void panel_fragment(panel_draw d, ivec2 at, float z, float distance, float pushe
 /* Does the piece, or the hair beyond its edge, lie at `place` in cells of the panel? */
 bool covers(panel_draw d, vec2 place);
 
-vec2 image_place(vec3 p)
-{
-    precise vec2 place = vec2(frame.fx * (p.x / p.z) + frame.cx, frame.fy * (p.y / p.z) + frame.cy);
-    return place;
-}
-
 panel_draw begin_panel(splat_run run, uint index)
 {
     panel_draw d;
@@ -86,7 +80,7 @@ uvec3 shown_on_panel(panel_draw d, vec3 own, ivec2 at, float z)
     if (!PAINTS)
         return uvec3(own + 0.5);
     precise vec2 ray = (vec2(at) + 0.5 - vec2(frame.cx, frame.cy)) * vec2(frame.inverse_fx, frame.inverse_fy);
-    precise vec3 p = vec3(ray, 1.0) * z;
+    precise vec3 p = vec3(ray * ray_scale(z), z);
     return paint_over(uvec3(own + 0.5), paint_color(d.paint, p, d.facing));
 }
 #endif
@@ -99,7 +93,7 @@ void set_plane(inout panel_draw d, vec3 n, vec3 o)
     d.facing = n;
     d.normal = normal;
     d.offset = offset;
-    d.behind = offset > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? d.radius : 0.0;
+    d.behind = (PARALLEL != 0u ? n.z : offset) > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? d.radius : 0.0;
 }
 
 /* Where it lies: `corners`, view space, in order around it; of a triangle the first one again. What it is a piece of is
@@ -146,17 +140,33 @@ void set_corners(inout panel_draw d, splat_run run, vec3 corners[4], float piece
 float panel_push(panel_draw d, float z, float tilt)
 {
     precise float slant = min(max(abs(tilt), 1.0), SPL_MARGIN_SLANT);
-    precise float margin = frame.margin * max(d.radius, frame.low_pass * z * frame.inverse_fx) * slant;
+    precise float margin = frame.margin * max(d.radius, frame.low_pass * ray_scale(z) * frame.inverse_fx) * slant;
     precise float pushed = z + margin + d.behind;
     return pushed;
+}
+
+/* One over n.d of the ray through uv = sample - principal point, and the depth where it meets the plane. */
+float plane_tilt(panel_draw d, vec2 uv)
+{
+    precise float tilt = 1.0 / (d.normal.x * uv.x + d.normal.y * uv.y + d.normal.z);
+    return PARALLEL != 0u ? 1.0 / d.normal.z : tilt;
+}
+
+float plane_depth(panel_draw d, vec2 uv, float tilt)
+{
+    precise float z = d.offset * tilt;
+    precise float beside = (d.offset - d.normal.x * uv.x - d.normal.y * uv.y) * tilt;
+    return PARALLEL != 0u ? beside : z;
 }
 
 void draw_sample(panel_draw d, ivec2 at)
 {
     precise vec2 uv = vec2(at) + 0.5 - vec2(frame.cx, frame.cy);
-    precise float tilt = 1.0 / (d.normal.x * uv.x + d.normal.y * uv.y + d.normal.z);
-    precise float z = d.offset * tilt;
+    precise float tilt = plane_tilt(d, uv);
+    precise float z = plane_depth(d, uv, tilt);
     precise vec2 place = vec2(d.u.x * uv.x + d.u.y * uv.y + d.u.z, d.v.x * uv.x + d.v.y * uv.y + d.v.z) * z - d.eye;
+    precise vec2 beside = vec2(d.u.x * uv.x + d.u.y * uv.y + d.u.z * z, d.v.x * uv.x + d.v.y * uv.y + d.v.z * z) - d.eye;
+    place = PARALLEL != 0u ? beside : place;
     float within = clamp(z, d.least, d.most);
     uvec2 cell = uvec2(clamp(place, vec2(0.0), vec2(float(SPL_PANEL_SIDE) - 0.5)));
     bool inside = z > 0.0 && covers(d, place) && within >= frame.near && within <= frame.far;
@@ -189,10 +199,13 @@ void draw_cell(splat_run run, panel_draw d, uvec2 cell, vec3 p)
 {
     vec2 place = image_place(p);
     precise vec2 uv = floor(place) + 0.5 - vec2(frame.cx, frame.cy);
-    precise float there = d.offset / (d.normal.x * uv.x + d.normal.y * uv.y + d.normal.z);
-    precise float farthest = max(d.most, p.z * (1.0 + SPL_CELL_REACH * frame.inverse_fx));
+    precise float through = d.offset / (d.normal.x * uv.x + d.normal.y * uv.y + d.normal.z);
+    float there = PARALLEL != 0u ? plane_depth(d, uv, plane_tilt(d, uv)) : through;
+    precise float behind = p.z * (1.0 + SPL_CELL_REACH * frame.inverse_fx), beside = p.z + SPL_CELL_REACH * frame.inverse_fx;
+    float farthest = max(d.most, PARALLEL != 0u ? beside : behind);
     float z = clamp(there > 0.0 ? there : p.z, d.least, farthest);
     precise float tilt = z / max(abs(d.offset), 1e-30);
+    tilt = PARALLEL != 0u ? plane_tilt(d, uv) : tilt;
     bool inside = z >= frame.near && z <= frame.far && place.x >= run.low.x && place.y >= run.low.y &&
                   place.x < run.high.x + 1.0 && place.y < run.high.y + 1.0;
     if (inside && panel_has(d.own, cell))

@@ -57,7 +57,7 @@ vec3 view_point(ivec2 at, float z)
 {
     precise vec2 ray = vec2((float(at.x) + 0.5 - frame.cx) * frame.inverse_fx,
                             (float(at.y) + 0.5 - frame.cy) * frame.inverse_fy);
-    precise vec2 p = ray * z;
+    precise vec2 p = ray * ray_scale(z);
     return vec3(p, z);
 }
 

@@ -53,7 +53,7 @@ vec3 smooth_color(ivec2 at, uint own)
         uint beside = sample_beside(at, i);
         float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
         float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
-        weight = abs(z - first) <= SPL_SMOOTH_SHARE * first ? weight : 0.0;
+        weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
         sum += weight * vec3(unpack_color(payload(beside)));
         weights += weight;
         if (++i >= 9)

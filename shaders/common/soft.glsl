@@ -11,7 +11,7 @@
  * stays. */
 float soft_radius(float own, float z)
 {
-    precise float least = frame.low_pass * z * frame.inverse_fx;
+    precise float least = frame.low_pass * ray_scale(z) * frame.inverse_fx;
     return max(own, least);
 }
 
@@ -32,7 +32,7 @@ float soft_rounding(float own, float drawn, float x, float y)
 
 struct soft_ray {
     vec2 slope;     /* the ray goes through (slope, 1) */
-    float inverse;  /* 1 / |(slope, 1)|^2 */
+    float inverse;  /* 1 / |(slope, 1)|^2; of parallel rays 1 */
 };
 
 soft_ray load_soft_ray(ivec2 at)
@@ -42,7 +42,7 @@ soft_ray load_soft_ray(ivec2 at)
     slope *= vec2(frame.inverse_fx, frame.inverse_fy);
     precise float inverse = 1.0 / (1.0 + slope.x * slope.x + slope.y * slope.y);
     ray.slope = slope;
-    ray.inverse = inverse;
+    ray.inverse = PARALLEL != 0u ? 1.0 : inverse;
     return ray;
 }
 
@@ -50,8 +50,9 @@ soft_ray load_soft_ray(ivec2 at)
  * lies. The centre's offset from the ray at its own depth is small where it matters, so nothing cancels. */
 float soft_distance(soft_ray ray, vec3 center, out float behind)
 {
-    precise vec2 off = center.xy - ray.slope * center.z;
+    precise vec2 off = center.xy - ray.slope * ray_scale(center.z);
     precise float along = off.x * ray.slope.x + off.y * ray.slope.y;
+    along = PARALLEL != 0u ? 0.0 : along;
     precise float shift = along * ray.inverse;
     precise float distance = max(off.x * off.x + off.y * off.y - along * shift, 0.0);
     behind = shift;
@@ -68,7 +69,7 @@ float soft_modulate(float opacity, float q, float soft)
 /* spl_soft_shells() of a sphere's radius in samples. */
 float soft_shells(float radius, float z)
 {
-    float samples = frame.fx * radius / max(z, 1e-9);
+    float samples = frame.fx * radius / max(ray_scale(z), 1e-9);
     return floor(clamp(samples * (1.0 / float(SPL_SOFT_SHELL_SAMPLES)), 1.0, float(SPL_SOFT_SHELLS_MAX)));
 }
 

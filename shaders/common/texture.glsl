@@ -84,7 +84,7 @@ void load_atom(inout code_place place, out uint atom, out float weight)
 splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
 {
     splat_texture x;
-    float diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / s.position.z;
+    float diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / ray_scale(s.position.z);
     uint size = frame.texture_size, side = clamp(2u << findMSB(uint(clamp(diameter, 1.0, 64.0))), SPL_TEXTURE_SIDE_MIN, size);
     uint level = 1u + (4u * (size * size - side * side)) / 3u;
     uint atom_size = 1u + (4u * size * size - SPL_TEXTURE_SIDE_MIN * SPL_TEXTURE_SIDE_MIN) / 3u;

@@ -18,6 +18,7 @@
 #include "dataset/saved_views.h"
 #include "geom/camera_json.h"
 #include "geom/fit.h"
+#include "geom/ground.h"
 #include "geom/size.h"
 #include "render/soft_params.h"
 #include "service/place/places.h"
@@ -28,6 +29,9 @@ struct arguments {
     const char *dataset;
     const char *view; // may be NULL; the name of one that the dataset was packed with
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
+    int projection;                      /* enum spl_projection, -1 = not given */
+    double view_height, units_per_pixel; /* NAN = not given */
+    bool world_file;
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
 
@@ -40,6 +44,8 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
     ((struct arguments *)arguments)->crs = (uint32_t)value.n[0];
     return rc ? SPL_E_USAGE : SPL_OK;
 }
+
+static const char *const projections[] = {"perspective", "orthographic", NULL};
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
@@ -54,9 +60,15 @@ static const struct spl_cmd_option options[] = {
     {"fy", "F", "the same, downwards", .otherwise = "fx", SPL_CMD_REAL(struct arguments, fy, 1e-6, 1e9)},
     {"cx", "X", "principal point", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cx, -1e9, 1e9)},
     {"cy", "Y", "the same, downwards", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cy, -1e9, 1e9)},
+    {"projection", "P", "perspective, or orthographic: a plan, an elevation, a section, whose scale is the same everywhere",
+     .otherwise = "perspective", SPL_CMD_CHOICE(struct arguments, projection, projections)},
+    {"view-height", "H", "of an orthographic image, in the dataset's unit", .otherwise = "as high as the pinhole's where it looks",
+     SPL_CMD_REAL(struct arguments, view_height, 1e-9, 1e12)},
+    {"units-per-pixel", "U", "of an orthographic image, instead of its height",
+     SPL_CMD_REAL(struct arguments, units_per_pixel, 1e-9, 1e9)},
     {"size", "WxH", "pixels; W or xH alone: at 16:9", .otherwise = "1280x720",
      SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
-    {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 1e-9, 1e12)},
+    {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 0, 1e12)},
     {"far", "N", "and up to which", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
     {.help = "Drawing:"},
     {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage, "
@@ -66,7 +78,9 @@ static const struct spl_cmd_option options[] = {
     {.help = "File:"},
     {"output", "FILE", "written in one piece; '-' is stdout and wants --format", .letter = 'o',
      SPL_CMD_TEXT(struct spl_cmd_drawing, output)},
-    {"format", "F", "jpeg, png, npy, raw or webp, when the file's ending does not say it", .take = spl_cmd_take_format},
+    {"format", "F", "jpeg, png, npy, raw, webp, or tiff of a map, when the file's ending does not say it", .take = spl_cmd_take_format},
+    {"world-file", .help = "of a map: writes beside OUT.png OUT.pgw, beside OUT.jpg OUT.jgw, where its pixels lie; tiff says so itself",
+     SPL_CMD_FLAG(struct arguments, world_file)},
     SPL_CMD_ENCODING_ROWS,
     SPL_CMD_MACHINE_ROWS,
 };
@@ -83,6 +97,11 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+        "A plan of the ground floor, looking down from 1.2 above it, a centimetre a pixel, north up:\n"
+        "  splatd render courtyard.spld --projection orthographic --units-per-pixel 0.01 --eye 0,0,1.2 --target 0,0,0 -o plan.png\n"
+        "The same as a GeoTIFF, colours and heights on the same pixels:\n"
+        "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 -o ortho.tif\n"
+        "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 --layer depth -o heights.tif\n"
         "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
         "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
         "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
@@ -135,6 +154,45 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
     return rc;
 }
 
+static void give(struct spl_value *values, enum spl_camera_param param, const double *numbers, unsigned count)
+{
+    if (isnan(numbers[0]))
+        return;
+    values[param].given = true;
+    values[param].count = count;
+    memcpy(values[param].n, numbers, count * sizeof *numbers);
+}
+
+/* Where a projection is said, all means what it means over HTTP. */
+static int resolve_projection(const struct arguments *a, const struct spl_saved_view *from, const double fit[2],
+                              struct spl_camera *camera, struct spl_error *err)
+{
+    const double projection = a->projection < 0 ? (double)NAN : a->projection, size[2] = {a->drawing.size[0], a->drawing.size[1]};
+    const struct spl_camera_limits limits = {.side_px = 65535, .pixels = UINT64_MAX};
+    struct spl_camera_defaults defaults = {
+        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far};
+    struct spl_value values[SPL_CAMERA_PARAMS] = {0};
+    memcpy(defaults.eye, from->eye, sizeof defaults.eye);
+    memcpy(defaults.target, from->target, sizeof defaults.target);
+    memcpy(defaults.up, from->up, sizeof defaults.up);
+    give(values, SPL_CAMERA_eye, a->eye, 3);
+    give(values, SPL_CAMERA_target, a->target, 3);
+    give(values, SPL_CAMERA_up, a->up, 3);
+    give(values, SPL_CAMERA_projection, &projection, 1);
+    give(values, SPL_CAMERA_view_height, &a->view_height, 1);
+    give(values, SPL_CAMERA_units_per_pixel, &a->units_per_pixel, 1);
+    give(values, SPL_CAMERA_fov, &a->fov, 1);
+    give(values, SPL_CAMERA_fx, &a->fx, 1);
+    give(values, SPL_CAMERA_fy, &a->fy, 1);
+    give(values, SPL_CAMERA_cx, &a->cx, 1);
+    give(values, SPL_CAMERA_cy, &a->cy, 1);
+    give(values, SPL_CAMERA_width, &size[0], 1);
+    give(values, SPL_CAMERA_height, &size[1], 1);
+    give(values, SPL_CAMERA_near, &a->near, 1);
+    give(values, SPL_CAMERA_far, &a->far, 1);
+    return spl_camera_from_values(values, &defaults, &limits, camera, err);
+}
+
 /* The default view, or --view: its eye, target and up, and its field of view in *camera. */
 static int start_camera(const struct arguments *a, const struct spl_dataset *dataset, struct spl_saved_view *from,
                         struct spl_camera *camera, struct spl_error *err)
@@ -145,6 +203,7 @@ static int start_camera(const struct arguments *a, const struct spl_dataset *dat
     memcpy(from->eye, info->default_eye, sizeof from->eye);
     memcpy(from->target, info->default_target, sizeof from->target);
     memcpy(from->up, info->default_up, sizeof from->up);
+    from->fov = info->default_fov;
     if (rc || !a->view)
         return rc;
     const struct spl_saved_view *view = spl_saved_views_find(info->views, info->view_count, a->view);
@@ -165,6 +224,11 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     int rc = start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
+    if (a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
+        const double *fit = spl_dataset_get_info(dataset)->default_fit;
+        rc = resolve_projection(a, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
+        return rc ? rc : spl_view_check(&a->drawing.view, err);
+    }
     if (!isnan(a->fov) && !isnan(a->fx))
         return spl_fail(err, SPL_E_USAGE, "--fov and --fx exclude each other");
     if (!isnan(a->fy) && isnan(a->fx))
@@ -188,6 +252,33 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     else if (camera->far <= camera->near) /* only near was moved, behind the default far */
         camera->far = INFINITY;
     return spl_view_check(&a->drawing.view, err);
+}
+
+/* Where a map's pixels lie, for GeoTIFF and world files. */
+static int find_ground(struct arguments *a, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    const enum spl_format format = a->drawing.encode.format;
+    if (a->world_file && (!spl_format_world_file(format) || !strcmp(a->drawing.output, "-")))
+        return spl_fail(err, SPL_E_USAGE, "--world-file is for JPEG, PNG and WebP files");
+    if (!a->world_file && format != SPL_FORMAT_TIFF)
+        return SPL_OK;
+    int rc = spl_camera_get_ground(&a->drawing.view.camera, &a->drawing.encode.ground, err);
+    a->drawing.encode.ground.epsg = info->epsg;
+    return rc;
+}
+
+static int write_world_file(const struct arguments *a, struct spl_error *err)
+{
+    char path[4096], text[SPL_WORLD_FILE_BYTES];
+    const char *output = a->drawing.output, *ending = spl_cmd_ending(output);
+    if (!a->world_file)
+        return SPL_OK;
+    size_t length = *ending ? (size_t)(ending - 1 - output) : strlen(output);
+    if ((size_t)snprintf(path, sizeof path, "%.*s%s", (int)length, output, spl_format_world_file(a->drawing.encode.format)) >=
+        sizeof path)
+        return spl_fail(err, SPL_E_USAGE, "the name of the world file is longer than %zu bytes", sizeof path - 1);
+    spl_ground_print_world_file(&a->drawing.encode.ground, text);
+    return spl_cmd_write_output(path, text, strlen(text), err);
 }
 
 static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
@@ -237,6 +328,8 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = resolve_camera(a, dataset, err);
     if (!rc)
+        rc = find_ground(a, spl_dataset_get_info(dataset), err);
+    if (!rc)
         spl_cmd_drawing_set_unit(&a->drawing, dataset);
     if (!rc)
         rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
@@ -248,6 +341,8 @@ static int render(struct arguments *a, struct spl_error *err)
         rc = spl_image_encode(&frame.images[a->drawing.layer], &a->drawing.encode, &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
+    if (!rc)
+        rc = write_world_file(a, err);
     if (!rc)
         report(spl_renderer_get_device(renderer), dataset, &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
@@ -263,7 +358,7 @@ int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
         .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
-        .near = NAN, .far = NAN,
+        .near = NAN, .far = NAN, .projection = -1, .view_height = NAN, .units_per_pixel = NAN,
     };
     struct spl_error err = {0};
     spl_cmd_drawing_init(&a.drawing, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT);

@@ -9,6 +9,7 @@
 
 #include "dataset/open.h"
 #include "dataset/saved_views.h"
+#include "geom/ground.h"
 #include "geom/unit.h"
 
 /* Of what is no number and no text the shape alone. */
@@ -219,6 +220,7 @@ static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
     if (crs && !json_is_null(crs) && (!json_is_string(crs) || json_string_length(crs) > crs_bytes_max))
         return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number) of at most 64 KiB, or null");
     spl_unit_print(metres, dataset->info.unit);
+    dataset->info.epsg = spl_epsg_from_text(json_string_value(crs));
     return SPL_OK;
 }
 

@@ -1,4 +1,4 @@
-/* Pinhole cameras from look-at, matrix and COLMAP form, and the projection they mean.
+/* Pinhole and orthographic cameras from look-at, matrix and COLMAP form, and the projection they mean.
  *
  * Everything is double and relative to the eye: at UTM coordinates the subtraction p - eye is exact, so a distant
  * origin costs no accuracy. Poses are stored as a rotation that is orthonormal to rounding, whatever precision it came
@@ -12,6 +12,8 @@
 
 /* Beyond this, neighbouring doubles are further apart than the points of any scan. */
 static const double coordinate_max = 1e12;
+/* An orthographic image is so high at least: below, doubles of coordinates in kilometres end. */
+static const double view_height_min = 1e-9;
 /* Sine of the angle between view and up below which the image's upright is arbitrary (0.06 millidegrees). */
 static const double parallel_sine = 1e-6;
 /* What matrices written with few digits, or as floats, are off by. */
@@ -64,6 +66,33 @@ static int check_place(const double v[3], const char *field, struct spl_error *e
     return rc;
 }
 
+static const char *const projections[SPL_PROJECTION_COUNT] = {"perspective", "orthographic"};
+
+const char *spl_projection_name(enum spl_projection projection)
+{
+    return (unsigned)projection < SPL_PROJECTION_COUNT ? projections[projection] : "";
+}
+
+int spl_projection_from_name(const char *name)
+{
+    for (int i = 0; i < SPL_PROJECTION_COUNT; i++)
+        if (!strcmp(name, projections[i]))
+            return i;
+    return -1;
+}
+
+/* The principal point in the middle. */
+static void set_centered(struct spl_camera *camera, enum spl_projection projection, double scale, uint32_t width,
+                         uint32_t height)
+{
+    camera->projection = projection;
+    camera->fx = camera->fy = scale;
+    camera->cx = width / 2.0;
+    camera->cy = height / 2.0;
+    camera->width = width;
+    camera->height = height;
+}
+
 int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                        struct spl_error *err)
 {
@@ -78,11 +107,21 @@ int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t w
     if (!isfinite(focal))
         return spl_fail_field(err, SPL_E_INPUT, "fov", "a vertical field of view of %g degrees is too small",
                               fov_degrees);
-    camera->fx = camera->fy = focal;
-    camera->cx = width / 2.0;
-    camera->cy = height / 2.0;
-    camera->width = width;
-    camera->height = height;
+    set_centered(camera, SPL_PERSPECTIVE, focal, width, height);
+    return SPL_OK;
+}
+
+int spl_camera_set_orthographic(struct spl_camera *camera, double view_height, uint32_t width, uint32_t height,
+                                struct spl_error *err)
+{
+    if (!(view_height >= view_height_min && view_height <= coordinate_max))
+        return spl_fail_field(err, SPL_E_INPUT, "view_height", "a view's height must be within %g and %g, not %g",
+                              view_height_min, coordinate_max, view_height);
+    if (!width)
+        return spl_fail_field(err, SPL_E_INPUT, "width", "an image needs at least one pixel of width");
+    if (!height)
+        return spl_fail_field(err, SPL_E_INPUT, "height", "an image needs at least one pixel of height");
+    set_centered(camera, SPL_ORTHOGRAPHIC, height / view_height, width, height);
     return SPL_OK;
 }
 
@@ -194,10 +233,12 @@ int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const do
     return SPL_OK;
 }
 
-static int check_focal(double focal, const char *field, struct spl_error *err)
+static int check_focal(enum spl_projection projection, double focal, const char *field, struct spl_error *err)
 {
     if (isfinite(focal) && focal > 0)
         return SPL_OK;
+    if (projection == SPL_ORTHOGRAPHIC)
+        return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not a positive number", focal);
     return spl_fail_field(err, SPL_E_INPUT, field, "a focal length of %g pixels is not a positive number", focal);
 }
 
@@ -209,19 +250,22 @@ int spl_camera_check(const struct spl_camera *camera, struct spl_error *err)
     if (!rc && !(rotation_error(camera->rotation) <= stored_tolerance))
         rc = spl_fail_field(err, SPL_E_INPUT, "rotation", "the rotation is not orthonormal with determinant +1");
     if (!rc)
-        rc = check_focal(camera->fx, "fx", err);
+        rc = check_focal(camera->projection, camera->fx, "fx", err);
     if (!rc)
-        rc = check_focal(camera->fy, "fy", err);
+        rc = check_focal(camera->projection, camera->fy, "fy", err);
     if (!rc)
         rc = check_finite(&camera->cx, 1, "cx", err);
     if (!rc)
         rc = check_finite(&camera->cy, 1, "cy", err);
+    if (!rc && (unsigned)camera->projection >= SPL_PROJECTION_COUNT)
+        rc = spl_fail_field(err, SPL_E_USAGE, "projection", "projection %d does not exist", (int)camera->projection);
     if (rc)
         return rc;
     if (!camera->width || !camera->height)
         return spl_fail_field(err, SPL_E_INPUT, camera->width ? "height" : "width",
                               "an image of %u x %u pixels is empty", camera->width, camera->height);
-    if (!(isfinite(camera->near) && camera->near > 0))
+    bool from_eye = camera->projection == SPL_ORTHOGRAPHIC && camera->near == 0; /* nothing is divided by depth */
+    if (!(isfinite(camera->near) && camera->near > 0) && !from_eye)
         return spl_fail_field(err, SPL_E_INPUT, "near", "a near depth of %g is not a positive number", camera->near);
     if (!(camera->far > camera->near))
         return spl_fail_field(err, SPL_E_INPUT, "far", "a far depth of %g does not lie behind near, %g", camera->far,
@@ -236,8 +280,9 @@ bool spl_camera_project(const struct spl_camera *camera, const double p[3], doub
     double z = dot(r + 6, ray);
     if (!(z > 0))
         return false;
-    pixel[0] = camera->fx * dot(r, ray) / z + camera->cx;
-    pixel[1] = camera->fy * dot(r + 3, ray) / z + camera->cy;
+    double scale = camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
+    pixel[0] = camera->fx * dot(r, ray) / scale + camera->cx;
+    pixel[1] = camera->fy * dot(r + 3, ray) / scale + camera->cy;
     *depth = z;
     return true;
 }

@@ -3,7 +3,7 @@
  *
  * A form is turned into values of camera_params.def, each of which keeps the name of the member that said it; what
  * they mean together, and whether they can be, is camera_values.c's business, as for values that are given one by
- * one. What a pinhole does not have (skew, distortion, a stereo baseline, parallel rays) is refused here, by name.
+ * one. What no camera of ours has (skew, distortion, a stereo baseline) is refused here, by name.
  * Pure functions, any thread. */
 #include <math.h>
 #include <stdio.h>
@@ -159,29 +159,67 @@ static int read_perspective(const json_t *json, struct spl_value *values, struct
     return set_number(values, SPL_CAMERA_far, far_name, far, err);
 }
 
+/* Half extents; an image of another shape than theirs is refused as one of another aspect ratio is. */
+static int read_orthographic(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    static const char *const known[] = {"xmag", "ymag", "znear", "zfar", NULL};
+    static const char path[] = "gltf.orthographic", ymag_name[] = "gltf.orthographic.ymag",
+                      near_name[] = "gltf.orthographic.znear", far_name[] = "gltf.orthographic.zfar";
+    double mag[2] = {0}, near = 0, far = 0;
+    int rc;
+    if ((rc = check_object(json, path, known, err)) ||
+        (rc = spl_json_get_number(json, SPL_GLTF_XMAG, &mag[0], err)) ||
+        (rc = spl_json_get_number(json, ymag_name, &mag[1], err)) ||
+        (rc = spl_json_get_number(json, near_name, &near, err)) ||
+        (rc = spl_json_get_number(json, far_name, &far, err)))
+        return rc;
+    for (int i = 0; i < 2; i++)
+        if (!(mag[i] > 0 && isfinite(mag[i])))
+            return spl_fail_field(err, SPL_E_INPUT, i ? ymag_name : SPL_GLTF_XMAG,
+                                  "%s %g is not above 0: mirrored images are not drawn", i ? ymag_name : SPL_GLTF_XMAG,
+                                  mag[i]);
+    const double view[2] = {2 * mag[1], mag[0] / mag[1]};
+    if (!(view[1] >= 1e-4 && view[1] <= 1e4))
+        return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_XMAG, "xmag over ymag is %g, outside 0.0001 to 10000", view[1]);
+    if ((rc = set_number(values, SPL_CAMERA_projection, path, SPL_ORTHOGRAPHIC, err)) ||
+        (rc = set(values, SPL_CAMERA_view_height, ymag_name, view, 2, err)) ||
+        (rc = set_number(values, SPL_CAMERA_near, near_name, near, err)))
+        return rc;
+    return set_number(values, SPL_CAMERA_far, far_name, far, err);
+}
+
+/* Which lens the object says it has: of the two that the format knows, one alone. */
+static int read_lens(const json_t *json, struct spl_value *values, struct spl_error *err)
+{
+    const json_t *type = json_object_get(json, "type"), *pinhole = json_object_get(json, "perspective"),
+                 *parallel = json_object_get(json, "orthographic");
+    const char *kind = type ? json_string_value(type) : parallel ? "orthographic" : "perspective";
+    int projection = kind ? spl_projection_from_name(kind) : -1;
+    if (projection < 0)
+        return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf.type must be perspective or orthographic, not %.32s",
+                              kind ? kind : spl_json_type_name(type));
+    if (projection == SPL_ORTHOGRAPHIC ? pinhole != NULL : parallel != NULL)
+        return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf is %s and holds %s", kind,
+                              pinhole ? "perspective" : "orthographic");
+    if (type && projection == SPL_ORTHOGRAPHIC && !parallel)
+        return spl_fail_field(err, SPL_E_INPUT, "gltf.orthographic", "gltf.type is orthographic, and gltf.orthographic missing");
+    return parallel ? read_orthographic(parallel, values, err) : pinhole ? read_perspective(pinhole, values, err) : 0;
+}
+
 static int read_gltf(const json_t *json, struct spl_value *values, struct spl_error *err)
 {
     static const char *const known[] = {"type", "perspective", "matrix", "orthographic", NULL};
     static const char matrix_name[] = "gltf.matrix";
-    const json_t *type = json_object_get(json, "type"), *lens = json_object_get(json, "perspective"),
-                 *node = json_object_get(json, "matrix");
-    const char *kind = type ? json_string_value(type) : "perspective";
+    const json_t *node = json_object_get(json, "matrix");
+    bool lens = json_object_get(json, "perspective") || json_object_get(json, "orthographic");
     double m[16];
     int rc = check_object(json, "gltf", known, err);
     if (rc)
         return rc;
-    if (json_object_get(json, "orthographic") || (kind && !strcmp(kind, "orthographic")))
-        return spl_fail_field(
-            err, SPL_E_INPUT, "gltf.orthographic",
-            "gltf.orthographic: only pinholes are drawn; give perspective, with a small yfov from far "
-            "away for nearly parallel rays");
-    if (!kind || strcmp(kind, "perspective"))
-        return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf.type must be perspective, not %.32s",
-                              kind ? kind : spl_json_type_name(type));
-    if (!lens && !node)
-        return spl_fail_field(err, SPL_E_INPUT, "gltf", "gltf holds neither perspective nor matrix");
-    if (lens && (rc = read_perspective(lens, values, err)))
+    if ((rc = read_lens(json, values, err)))
         return rc;
+    if (!lens && !node)
+        return spl_fail_field(err, SPL_E_INPUT, "gltf", "gltf holds neither perspective, orthographic nor matrix");
     if (!node)
         return 0;
     if (json_is_array(json_array_get(node, 0)))

@@ -92,11 +92,15 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
 {
     if (kind == SPL_KIND_CRS)
         return crs_from_text(value, name, text, err);
-    bool axes = kind == SPL_KIND_AXES;
-    int choice = axes ? axes_from_name(text) : spl_colmap_model_from_name(text);
+    bool axes = kind == SPL_KIND_AXES, projection = kind == SPL_KIND_PROJECTION;
+    int choice = axes         ? axes_from_name(text)
+                 : projection ? spl_projection_from_name(text)
+                              : spl_colmap_model_from_name(text);
     if (choice < 0)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, text,
-                              axes ? "opengl, opencv" : spl_colmap_model_names);
+                              axes         ? "opengl, opencv"
+                              : projection ? "perspective, orthographic"
+                                           : spl_colmap_model_names);
     value->n[0] = choice;
     return 0;
 }

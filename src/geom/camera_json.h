@@ -21,6 +21,7 @@ enum spl_value_kind {
     SPL_KIND_NUMBERS,
     SPL_KIND_AXES,
     SPL_KIND_MODEL,
+    SPL_KIND_PROJECTION,
     SPL_KIND_CRS,  /* a number of EPSG's list */
     SPL_KIND_FORM, /* an object that stands for other values; only in JSON */
     SPL_KIND_END,  /* the service's own kinds go on from here */
@@ -33,7 +34,8 @@ enum spl_value_place {
     SPL_PICK = 8,
     SPL_PICK_BODY = 16,
     SPL_PLACE = 32,
-    SPL_THUMBNAIL = 64
+    SPL_THUMBNAIL = 64,
+    SPL_TILE = 128
 };
 
 enum spl_camera_param {
@@ -48,7 +50,7 @@ enum { SPL_VALUE_NUMBERS = 16, SPL_VALUE_WORD = 64 };
 struct spl_value {
     bool given;
     unsigned count;
-    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov: glTF's aspect ratio in n[1] */
+    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov and view_height: glTF's aspect ratio in n[1] */
     const char *source;          /* the member of a form that said it, a literal; NULL: the parameter itself */
     char word[SPL_VALUE_WORD];   /* of a name */
 };
@@ -108,6 +110,7 @@ int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum s
                               const json_t *json, struct spl_error *err);
 
 #define SPL_GLTF_ASPECT "gltf.perspective.aspectRatio"
+#define SPL_GLTF_XMAG "gltf.orthographic.xmag"
 
 /* Whether a "camera" object has a form that says width and height. */
 bool spl_camera_form_has_size(const json_t *camera);

@@ -45,6 +45,9 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
     if (path->count && (camera->width != first->width || camera->height != first->height))
         return spl_fail_field(err, SPL_E_INPUT, "width", "%u x %u after cameras of %u x %u", camera->width,
                               camera->height, first->width, first->height);
+    if (path->count && camera->projection != first->projection)
+        return spl_fail_field(err, SPL_E_INPUT, "projection", "%s after cameras that are %s",
+                              spl_projection_name(camera->projection), spl_projection_name(first->projection));
     if (path->count == path->capacity && grow(path, err))
         return SPL_E_NOMEM;
     if (!path->count && isnan(time)) {

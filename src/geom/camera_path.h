@@ -33,8 +33,8 @@ struct spl_camera_path {
 /* Takes NULL and zeroed paths. */
 void spl_camera_path_finish(struct spl_camera_path *path);
 
-/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size than the first, a
- * time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX
+/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size or projection than
+ * the first, a time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX
  * (SPL_E_LIMIT, field "cameras"). */
 int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,
                         struct spl_error *err);

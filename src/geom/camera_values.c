@@ -50,20 +50,24 @@ static int missing(enum spl_camera_param param, enum spl_camera_param because, s
 }
 
 /* glTF's aspect ratio is that of the image: sides that are given may differ from it by the rounding to pixels. */
-static int check_aspect(double aspect, const double size[2], struct spl_error *err)
+static int check_aspect(double aspect, const char *name, const double size[2], struct spl_error *err)
 {
     if (aspect == 0 || fabs(size[1] * aspect - size[0]) < 0.501 || fabs(size[0] / aspect - size[1]) < 0.501)
         return 0;
-    return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_ASPECT,
-                          SPL_GLTF_ASPECT " %g contradicts %.0f x %.0f pixels; leave it out, or width or height",
-                          aspect, size[0], size[1]);
+    if (!strcmp(name, SPL_GLTF_XMAG))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s over ymag, %g, contradicts %.0f x %.0f pixels; leave out width or height",
+                              name, aspect, size[0], size[1]);
+    return spl_fail_field(err, SPL_E_INPUT, name, "%s %g contradicts %.0f x %.0f pixels; leave it out, or width or height",
+                          name, aspect, size[0], size[1]);
 }
 
 static int resolve_size(const struct spl_value *v, const struct spl_camera_limits *limits, uint32_t *width,
                         uint32_t *height, struct spl_error *err)
 {
     static const enum spl_camera_param sides[] = {SPL_CAMERA_width, SPL_CAMERA_height};
-    double aspect = v[SPL_CAMERA_fov].n[1], size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
+    const bool parallel = v[SPL_CAMERA_view_height].n[1] != 0;
+    const char *said = parallel ? SPL_GLTF_XMAG : SPL_GLTF_ASPECT;
+    double aspect = v[parallel ? SPL_CAMERA_view_height : SPL_CAMERA_fov].n[1], size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
     const double shape[2] = {aspect != 0 ? SPL_HEIGHT_DEFAULT * aspect : SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT};
     const char *const fields[] = {"width", "height"};
     for (int i = 0; i < 2; i++)
@@ -71,9 +75,9 @@ static int resolve_size(const struct spl_value *v, const struct spl_camera_limit
             return spl_fail_field(err, SPL_E_INPUT, fields[i], "%s %.0f is outside 1 to %u", fields[i], size[i],
                                   limits->side_px);
     spl_size_follow(size, shape);
-    int rc = check_aspect(aspect, size, err);
+    int rc = check_aspect(aspect, said, size, err);
     const char *cause = given(v, sides[0])                   ? fields[0]
-                        : aspect != 0 && !given(v, sides[1]) ? SPL_GLTF_ASPECT
+                        : aspect != 0 && !given(v, sides[1]) ? said
                                                              : fields[1];
     for (int i = 0; !rc && i < 2; i++)
         if (size[i] > limits->side_px)
@@ -89,14 +93,73 @@ static int resolve_size(const struct spl_value *v, const struct spl_camera_limit
     return 0;
 }
 
+/* Is the view one of parallel rays? A size of one that is said is enough. */
+static bool is_orthographic(const struct spl_value *v)
+{
+    return given(v, SPL_CAMERA_projection)
+               ? v[SPL_CAMERA_projection].n[0] == SPL_ORTHOGRAPHIC
+               : given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
+}
+
+/* The field of view where nobody says one. */
+static double usual_fov(const struct spl_camera_defaults *defaults, const struct spl_camera *camera)
+{
+    return defaults->fit[0] > 0 ? spl_fit_fov(defaults->fit, camera->width, camera->height) : defaults->fov;
+}
+
+/* How high its image is: said, or as high as the pinhole's image is where it looks. */
+static int resolve_orthographic(const struct spl_value *v, const struct spl_camera_defaults *defaults,
+                                struct spl_camera *camera, double distance, struct spl_error *err)
+{
+    static const enum spl_camera_param sizes[] = {SPL_CAMERA_view_height, SPL_CAMERA_units_per_pixel, SPL_CAMERA_fx},
+                                       others[] = {SPL_CAMERA_fov, SPL_CAMERA_model, SPL_CAMERA_params};
+    double height = 2 * tan(usual_fov(defaults, camera) * M_PI / 360) * distance;
+    for (int i = 0; i < 3; i++)
+        if (given(v, others[i]))
+            return conflict(v, others[i], given(v, SPL_CAMERA_projection) ? SPL_CAMERA_projection : sizes[!given(v, sizes[0])],
+                            err);
+    for (int i = 1; i < 3; i++)
+        for (int j = 0; j < i; j++)
+            if (given(v, sizes[i]) && given(v, sizes[j]))
+                return conflict(v, sizes[i], sizes[j], err);
+    if (given(v, SPL_CAMERA_fy) && !given(v, SPL_CAMERA_fx))
+        return missing(SPL_CAMERA_fx, SPL_CAMERA_fy, err);
+    if (given(v, SPL_CAMERA_units_per_pixel)) {
+        double step = v[SPL_CAMERA_units_per_pixel].n[0];
+        if (!(step >= 1e-9 && step <= 1e9))
+            return spl_fail_field(err, SPL_E_INPUT, "units_per_pixel", "units_per_pixel %g is not within 1e-9 and 1e9", step);
+        height = step * camera->height;
+    } else if (given(v, SPL_CAMERA_view_height)) {
+        height = v[SPL_CAMERA_view_height].n[0];
+    } else if (given(v, SPL_CAMERA_fx)) {
+        height = 1; // which fx replaces
+    } else if (!(distance > 0)) {
+        return spl_fail_field(err, SPL_E_INPUT, "view_height",
+                              "an orthographic view of this pose needs view_height, units_per_pixel or fx");
+    }
+    int rc = spl_camera_set_orthographic(camera, height, camera->width, camera->height, err);
+    if (rc)
+        return rc;
+    camera->fx = get(v, SPL_CAMERA_fx, camera->fx);
+    camera->fy = get(v, SPL_CAMERA_fy, camera->fx);
+    camera->cx = get(v, SPL_CAMERA_cx, camera->cx);
+    camera->cy = get(v, SPL_CAMERA_cy, camera->cy);
+    return 0;
+}
+
 static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                               struct spl_camera *camera, struct spl_error *err)
 {
     static const enum spl_camera_param pinhole[] = {SPL_CAMERA_fx, SPL_CAMERA_fy, SPL_CAMERA_cx, SPL_CAMERA_cy};
-    double fov = defaults->fit[0] > 0 ? spl_fit_fov(defaults->fit, camera->width, camera->height) : defaults->fov;
-    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, fov), camera->width, camera->height, err);
+    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, usual_fov(defaults, camera)), camera->width, camera->height,
+                                err);
     if (rc)
         return rc;
+    for (int i = 0; i < 2; i++) {
+        enum spl_camera_param size = i ? SPL_CAMERA_units_per_pixel : SPL_CAMERA_view_height;
+        if (given(v, size)) /* and perspective is said */
+            return conflict(v, size, SPL_CAMERA_projection, err);
+    }
     if (given(v, SPL_CAMERA_params) && !given(v, SPL_CAMERA_model))
         return missing(SPL_CAMERA_model, SPL_CAMERA_params, err);
     if (given(v, SPL_CAMERA_model)) {
@@ -145,13 +208,34 @@ static int get_point(const struct spl_value *v, enum spl_camera_param param, con
                                       err);
 }
 
+/* What is up where nobody says so: of a plan, which looks along the default, +y, or +z where that is along it. */
+static void get_up(const struct spl_value *v, const struct spl_camera_defaults *defaults, const double eye[3],
+                   const double target[3], double up[3])
+{
+    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up;
+    double along[3], square = 0, product = 0, length = 0;
+    memcpy(up, given_up, 3 * sizeof *up);
+    for (int i = 0; i < 3; i++) {
+        along[i] = target[i] - eye[i];
+        square += along[i] * along[i];
+        length += up[i] * up[i];
+        product += along[i] * up[i];
+    }
+    if (given(v, SPL_CAMERA_up) || !is_orthographic(v) || product * product < square * length * (1 - 1e-12))
+        return;
+    const bool lies = fabs(up[1]) > fabs(up[2]); /* +y itself is up */
+    memcpy(up, lies ? (double[]){0, 0, -1} : (double[]){0, 1, 0}, 3 * sizeof *up);
+}
+
+/* *distance: from the eye to what it looks at, 0 where the pose does not say. */
 static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
-                        struct spl_camera *camera, struct spl_error *err)
+                        struct spl_camera *camera, double *distance, struct spl_error *err)
 {
     static const enum spl_camera_param look_at[] = {SPL_CAMERA_eye, SPL_CAMERA_target, SPL_CAMERA_up},
                                        colmap[] = {SPL_CAMERA_q, SPL_CAMERA_t};
-    double eye[3], target[3];
+    double eye[3], target[3], up[3];
     int rc = check_places(v, defaults, err);
+    *distance = 0;
     if (rc)
         return rc;
     if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
@@ -179,7 +263,9 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
     if ((rc = get_point(v, SPL_CAMERA_eye, defaults->eye, defaults, eye, err)) ||
         (rc = get_point(v, SPL_CAMERA_target, defaults->target, defaults, target, err)))
         return rc;
-    return spl_camera_look_at(camera, eye, target, given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up, err);
+    get_up(v, defaults, eye, target, up);
+    *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
+    return spl_camera_look_at(camera, eye, target, up, err);
 }
 
 /* Without a default view, a camera that says only where it stands would be drawn from a made-up angle. */
@@ -191,10 +277,11 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
                               "a pose is missing: eye and target, matrix, q and t, gltf.matrix, open3d or nerfstudio");
     if (!free_pose && !given(v, SPL_CAMERA_target))
         return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
-    if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model))
+    bool sized = is_orthographic(v) || given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
+    if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model) && !sized)
         return spl_fail_field(
             err, SPL_E_INPUT, "fov",
-            "intrinsics are missing: fov, fx, model and params, gltf.perspective, open3d, ros or nerfstudio");
+            "intrinsics are missing: fov, fx, model and params, view_height, gltf.perspective, open3d, ros or nerfstudio");
     return 0;
 }
 
@@ -203,6 +290,7 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
 {
     static const struct spl_camera_defaults fallback = {
         .up = {0, 0, 1}, .fov = 60, .near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
+    double distance;
     int rc;
     *camera = (struct spl_camera){0};
     if (!defaults && (rc = check_complete(values, err)))
@@ -210,7 +298,9 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
     if (!defaults)
         defaults = &fallback;
     if ((rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
-        (rc = resolve_intrinsics(values, defaults, camera, err)) || (rc = resolve_pose(values, defaults, camera, err)))
+        (!is_orthographic(values) && (rc = resolve_intrinsics(values, defaults, camera, err))) ||
+        (rc = resolve_pose(values, defaults, camera, &distance, err)) ||
+        (is_orthographic(values) && (rc = resolve_orthographic(values, defaults, camera, distance, err))))
         return rc;
     camera->near = get(values, SPL_CAMERA_near, defaults->near);
     camera->far = get(values, SPL_CAMERA_far, defaults->far);

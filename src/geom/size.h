@@ -33,6 +33,12 @@ static inline void spl_camera_scale(struct spl_camera *camera, double across, do
     camera->cy *= down;
 }
 
+/* What offsets from the axis at view depth z are divided by on the image. */
+static inline double spl_camera_ray_scale(const struct spl_camera *camera, double z)
+{
+    return camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
+}
+
 /* The same picture in width x height pixels. */
 static inline void spl_camera_resize(struct spl_camera *camera, uint32_t width, uint32_t height)
 {

@@ -39,7 +39,7 @@ static const struct {
 } formats[SPL_FORMAT_COUNT] = {
     [SPL_FORMAT_JPEG] = {"jpeg", "image/jpeg"},      [SPL_FORMAT_PNG] = {"png", "image/png"},
     [SPL_FORMAT_NPY] = {"npy", "application/x-npy"}, [SPL_FORMAT_RAW] = {"raw", "application/octet-stream"},
-    [SPL_FORMAT_WEBP] = {"webp", "image/webp"},
+    [SPL_FORMAT_WEBP] = {"webp", "image/webp"},     [SPL_FORMAT_TIFF] = {"tiff", "image/tiff"},
 };
 
 const char *spl_layer_name(enum spl_layer layer)
@@ -76,7 +76,7 @@ int spl_format_from_name(const char *name)
     for (int i = 0; name && i < SPL_FORMAT_COUNT; i++)
         if (!strcmp(name, formats[i].name))
             return i;
-    return !name || strcmp(name, "jpg") ? -1 : SPL_FORMAT_JPEG;
+    return !name ? -1 : !strcmp(name, "jpg") ? SPL_FORMAT_JPEG : !strcmp(name, "tif") ? SPL_FORMAT_TIFF : -1;
 }
 
 const char *spl_format_media_type(enum spl_format format)
@@ -86,7 +86,9 @@ const char *spl_format_media_type(enum spl_format format)
 
 bool spl_format_is_built(enum spl_format format)
 {
-    return format == SPL_FORMAT_WEBP ? spl_webp_is_built : (unsigned)format < SPL_FORMAT_COUNT;
+    return format == SPL_FORMAT_WEBP   ? spl_webp_is_built
+           : format == SPL_FORMAT_TIFF ? spl_tiff_is_built
+                                       : (unsigned)format < SPL_FORMAT_COUNT;
 }
 
 int spl_encode_chroma(const struct spl_encode_options *options)
@@ -158,6 +160,9 @@ static int encode(const struct spl_image *image, const struct spl_encode_options
         break;
     case SPL_FORMAT_WEBP:
         rc = spl_encode_webp(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
+        break;
+    case SPL_FORMAT_TIFF:
+        rc = spl_encode_tiff(image, &options->ground, out, err);
         break;
     case SPL_FORMAT_NPY:
         rc = spl_encode_npy(image, out, err);

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "geom/size.h"
+
 /* The depth is lowered by how far a sample off its disc may lie in front of it (disc.glsl), and by what the kernels'
  * floats may round. */
 struct spl_chunk_bounds spl_footprint_bounds(const struct spl_camera *camera, const double low[2],
@@ -16,13 +18,16 @@ struct spl_chunk_bounds spl_footprint_bounds(const struct spl_camera *camera, co
         last[i] = (uint32_t)fmin(fmax(high[i], 0), size[i] - 1) / SPL_OCCLUSION_TILE;
     }
     bool few = (last[0] - first[0] + 1) * (last[1] - first[1] + 1) <= SPL_OCCLUSION_TILES_MAX;
-    double share = fmax(0, 1 - SPL_LOW_PASS_REACH / camera->fx) * (1 - 1e-5);
+    double reach = SPL_LOW_PASS_REACH / camera->fx;
+    double least = camera->projection == SPL_ORTHOGRAPHIC ? fmax(0, near - reach) : near * fmax(0, 1 - reach);
     return (struct spl_chunk_bounds){
-        .first = first[0] | first[1] << 16, .last = last[0] | last[1] << 16, .near = few ? (float)(near * share) : 0};
+        .first = first[0] | first[1] << 16, .last = last[0] | last[1] << 16, .near = few ? (float)(least * (1 - 1e-5)) : 0};
 }
 
 double spl_footprint_side(const struct spl_camera *camera, double radius, double near)
 {
+    if (camera->projection == SPL_ORTHOGRAPHIC)
+        return near > 0 ? 2 * radius * fmax(camera->fx, camera->fy) + 3 : INFINITY;
     double slope_x = fmax(camera->cx, camera->width - camera->cx) / camera->fx;
     double slope_y = fmax(camera->cy, camera->height - camera->cy) / camera->fy;
     return near > 0 ? 2 * radius * fmax(camera->fx * (1 + slope_x), camera->fy * (1 + slope_y)) / near + 3 : INFINITY;

@@ -31,6 +31,7 @@ struct spl_frame_job {
     struct spl_hold hold;          /* what the frame waits with, between its steps */
     struct spl_frame_whole whole;
     struct spl_soft_pause pause;   /* what of the piece is walked */
+    double advance; /* of spl_camera_advance(): what depths of the view are more by than those that are drawn */
 };
 
 /* What `camera` sees of the job's dataset, by the view's method and level. Borrows both. */

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-#include <splatd/camera.h>
+#include "geom/size.h"
 
 /* An axis-aligned box in view space: centre and the half extents of its bounding view-aligned box. */
 struct spl_view_box {
@@ -33,14 +33,16 @@ static inline bool spl_view_box_visible(const struct spl_camera *camera, const s
     double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
     if (far < camera->near || near > camera->far)
         return false;
-    /* The plane through the eye and an image edge at slope s: outside when x - s z > 0 over the whole box. */
+    /* The plane through the eye and an image edge at slope s: outside when x - s z > 0 over the whole box; parallel to
+     * the axis at x = s. */
+    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
     double edges[4] = {(camera->width + pad - camera->cx) / camera->fx, (-pad - camera->cx) / camera->fx,
                        (camera->height + pad - camera->cy) / camera->fy, (-pad - camera->cy) / camera->fy};
     for (int i = 0; i < 4; i++) {
         int axis = i / 2;
         double sign = i % 2 ? -1 : 1;
-        double distance = sign * (box->center[axis] - edges[i] * box->center[2]);
-        if (distance > box->half[axis] + fabs(edges[i]) * box->half[2])
+        double distance = sign * (box->center[axis] - edges[i] * (parallel ? 1 : box->center[2]));
+        if (distance > box->half[axis] + fabs(edges[i]) * (parallel ? 0 : box->half[2]))
             return false;
     }
     return true;
@@ -54,6 +56,8 @@ static inline bool spl_view_box_project(const struct spl_camera *camera, const s
     double near = box->center[2] - box->half[2], far = box->center[2] + box->half[2];
     if (near < camera->near)
         return false;
+    near = spl_camera_ray_scale(camera, near);
+    far = spl_camera_ray_scale(camera, far);
     const double focal[2] = {camera->fx, camera->fy}, center[2] = {camera->cx, camera->cy};
     for (int i = 0; i < 2; i++) {
         double a = box->center[i] - box->half[i], b = box->center[i] + box->half[i];

@@ -31,9 +31,11 @@ static int make(struct spl_gpu *gpu, const struct spl_kernel_key *key, struct sp
     return spl_gpu_kernel_create(gpu, name, key->constants, SPL_KERNEL_CONSTANTS, out, err);
 }
 
-int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const struct spl_kernel_key *key,
+int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const struct spl_kernel_key *wanted,
                     struct spl_gpu_kernel **out, struct spl_error *err)
 {
+    struct spl_kernel_key known = *wanted, *key = &known;
+    key->constants[SPL_KERNEL_PARALLEL] = kernels->parallel;
     for (size_t i = 0; i < kernels->count; i++) {
         if (is_same(&kernels->made[i].key, key)) {
             *out = kernels->made[i].kernel;

@@ -9,7 +9,8 @@
 
 #include "gpu/gpu.h"
 
-enum { SPL_KERNEL_CONSTANTS = 5 };
+/* SPL_KERNEL_PARALLEL says of all kernels of a frame alike how rays go: shaders/common/frame.glsl. */
+enum { SPL_KERNEL_PARALLEL = 6, SPL_KERNEL_CONSTANTS };
 
 struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */
@@ -22,6 +23,7 @@ struct spl_kernel_key {
 struct spl_kernels {
     struct spl_kernel_made *made;
     size_t count, capacity;
+    bool parallel; /* the frame's rays are: what is got is made so */
 };
 
 /* Gets or makes the kernel of `key`; it lives until finish. SPL_E_NOMEM, and as spl_gpu_kernel_create(). */

@@ -60,6 +60,8 @@ static void find_cells(const struct spl_map_cells *cells, const struct spl_view_
     const struct spl_camera *camera = cells->params->camera;
     const double focal[2] = {camera->fx, camera->fy}, center[2] = {camera->cx, camera->cy};
     double near = fmax(box->center[2] - box->half[2], camera->near), far = fmax(box->center[2] + box->half[2], near);
+    near = spl_camera_ray_scale(camera, near);
+    far = spl_camera_ray_scale(camera, far);
     for (int i = 0; i < 2; i++) {
         double a = box->center[i] - box->half[i], b = box->center[i] + box->half[i];
         double low = focal[i] * (a / (a < 0 ? near : far)) + center[i] - around;

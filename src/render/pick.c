@@ -8,6 +8,7 @@
 
 #include "dataset/dataset.h"
 #include "dataset/panels.h"
+#include "geom/size.h"
 
 void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
 {
@@ -26,7 +27,8 @@ void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_v
 static void place(const struct spl_camera *camera, double u, double v, double z, double p[3])
 {
     const double *r = camera->rotation;
-    double x = (u - camera->cx) / camera->fx * z, y = (v - camera->cy) / camera->fy * z;
+    double scale = spl_camera_ray_scale(camera, z);
+    double x = (u - camera->cx) / camera->fx * scale, y = (v - camera->cy) / camera->fy * scale;
     for (int i = 0; i < 3; i++)
         p[i] = camera->eye[i] + r[i] * x + r[3 + i] * y + r[6 + i] * z;
 }

@@ -1,4 +1,5 @@
-/* Tile words to image pixels: rows are copied as they are, but for normals, which come as one octahedral word. */
+/* Tile words to image pixels: rows are copied as they are, but for normals, which come as one octahedral word, and depths
+ * of parallel rays, which are from where their eye was brought to. */
 #include "render/readback.h"
 
 #include <math.h>
@@ -41,6 +42,15 @@ static void unpack_normal(uint32_t word, float out[3])
     out[2] = z * scale;
 }
 
+/* NaN, where there is nothing, stays. */
+static void add_advance(const struct spl_tile *tile, uint32_t layer, float *depths)
+{
+    if (tile->advance == 0 || (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE))
+        return;
+    for (uint32_t x = 0; x < tile->width; x++)
+        depths[x] = (float)((double)depths[x] + tile->advance);
+}
+
 void spl_readback_tile(const struct spl_tile *tile, const uint32_t *words, struct spl_image images[SPL_LAYER_COUNT])
 {
     uint32_t layers = tile->view->layers;
@@ -54,6 +64,7 @@ void spl_readback_tile(const struct spl_tile *tile, const uint32_t *words, struc
             void *to = (char *)spl_image_row(image, tile->y + y) + tile->x * pixel_bytes;
             if (layer != SPL_LAYER_NORMAL) {
                 memcpy(to, from, tile->width * pixel_bytes);
+                add_advance(tile, layer, to);
                 continue;
             }
             for (uint32_t x = 0; x < tile->width; x++)

@@ -84,6 +84,7 @@ struct spl_tile {
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
     uint64_t soft_drawn;                         /* spheres */
+    double advance;                              /* what depths of the view are more by than those that are drawn */
     uint32_t stamps;                             /* timestamps written */
     uint8_t stamp_stage[SPL_GPU_TIMESTAMPS_MAX]; /* enum spl_stage that ended at each */
 };

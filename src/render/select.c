@@ -39,7 +39,8 @@ struct spl_view_box spl_walk_drawn_box(const struct spl_walk *w, const struct sp
 static bool is_drawn(const struct spl_walk *w, const struct spl_node *node, const struct spl_view_box *box)
 {
     double near = fmax(box->center[2] - box->half[2], w->params->camera->near), lod = w->params->lod;
-    return !node->child_count || (lod > 0 && node->spacing * w->focal <= lod * near);
+    return !node->child_count ||
+           (lod > 0 && node->spacing * w->focal <= lod * spl_camera_ray_scale(w->params->camera, near));
 }
 
 /* Can anything of the node be seen? Pruned discs grow by up to their radius, and that of the largest is at most half of

@@ -39,7 +39,8 @@ static uint32_t drawn_texture(struct spl_walk *w, const struct spl_chunk *chunk,
     const struct spl_select_params *params = w->params;
     const uint32_t *textures = w->tables->textures;
     uint32_t texture = params->atoms && textures ? textures[chunk - w->tables->chunks] : 0;
-    double samples = 2 * chunk->radius_mean * w->focal / fmax(near, params->camera->near);
+    double samples = 2 * chunk->radius_mean * w->focal /
+                     spl_camera_ray_scale(params->camera, fmax(near, params->camera->near));
     if (!texture || samples < least)
         return 0;
     if (params->textured(params->context, page) != SPL_SELECT_YES) {
@@ -82,7 +83,8 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
         return SPL_OK;
     double origin[3], radius_share = found->node->child_count ? cluster_radius_share : 1;
     struct spl_view_box box = spl_walk_chunk_box(w, node_to_eye, chunk, origin), centers = box;
-    double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal / fmax(box.center[2], camera->near);
+    double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal /
+                     spl_camera_ray_scale(camera, fmax(box.center[2], camera->near));
     uint32_t count = drawn_count(chunk, spacing, w->params->lod);
     double scale = sqrt((double)chunk->count / count) * radius_share;
     double radius = spl_walk_largest_radius(chunk) * scale, sphere = radius / radius_share;
@@ -140,7 +142,8 @@ static bool stands_for_splats(const struct spl_walk *w, const struct spl_chunk *
 /* Samples that are looked at for a piece of lines that are `half` as wide, at most. */
 static double count_line_looks(const struct spl_camera *camera, double half, double near, double focal)
 {
-    double widest = fmax(SPL_LINE_SLANT * focal * half / fmax(near, camera->near), SPL_LINE_THIN);
+    double widest = fmax(SPL_LINE_SLANT * focal * half / spl_camera_ray_scale(camera, fmax(near, camera->near)),
+                         SPL_LINE_THIN);
     double across = ceil(2 * sqrt(2) * widest) + 1, along = fmax(camera->width, camera->height);
     return across * along;
 }
@@ -238,7 +241,8 @@ static int draw_panels(struct spl_walk *w, const struct spl_node *node, const do
     if (!w->judged.solid && (w->covered || !w->params->draws_soft))
         return SPL_OK;
     if (w->covered) { // as if every cell were there: headers do not say
-        add_spacing(w, (double)chunk->step * w->focal / fmax(box.center[2], camera->near), chunk->count * cells);
+        double scale = spl_camera_ray_scale(camera, fmax(box.center[2], camera->near));
+        add_spacing(w, (double)chunk->step * w->focal / scale, chunk->count * cells);
         return SPL_OK;
     }
     int rc = w->panels.cells ? SPL_OK : spl_occupancy_init(&w->panels, camera->width, camera->height, err);

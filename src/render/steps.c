@@ -15,6 +15,7 @@
 #include "geom/size.h"
 #include "image/enlarge.h"
 #include "image/rows.h"
+#include "render/advance.h"
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
@@ -161,7 +162,9 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     steps->view = steps->wanted;
     if (view->supersample < 1)
         make_coarse(&steps->view);
-    steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame};
+    double advance = spl_camera_advance(&steps->view.camera, info);
+    steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame,
+                                        .advance = advance};
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
@@ -233,7 +236,8 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
                                 .view = &steps->view,
                                 .paint = job->paint.kind ? &job->paint : NULL,
                                 .cancelled = job->cancelled,
-                                .pause = &job->pause};
+                                .pause = &job->pause,
+                                .advance = job->advance};
         spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
         int rc = spl_frame_render_tile(job, &tile, err);
         steps->paused = rc == SPL_FRAME_PAUSED;

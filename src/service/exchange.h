@@ -56,7 +56,7 @@ struct spl_call {
     enum spl_http_method method;
     char id[256];                    /* of the dataset in the path, decoded; "" without */
     struct spl_catalog_entry *entry; // may be NULL: no {id} in the path, or a route of scope ADMIN
-    char name[256];                  /* the path's other segment, decoded; "" without */
+    char name[256];                  /* the path's other segment, or a tile's three, decoded; "" without */
     char number[24];                 /* the path's {n}, decoded; "" without */
 };
 

@@ -50,6 +50,10 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
     spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
+    if (format == SPL_FORMAT_TIFF) { // heights
+        spl_headers_add(headers, "Splatd-Height-Unit", "%s", request->encode.unit);
+        return;
+    }
     spl_headers_add(headers, "Splatd-Depth-Unit", "%s", request->encode.unit);
     switch (format) {
     case SPL_FORMAT_PNG:
@@ -75,15 +79,17 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
 void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
-    char far[32] = "null", text[640]; // JSON has no infinity
+    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
+    char far[32] = "null", text[672]; // JSON has no infinity
     if (isfinite(camera->far))
         snprintf(far, sizeof far, "%.9g", camera->far);
     snprintf(
         text, sizeof text,
         "{\"eye\":[%.17g,%.17g,%.17g],\"rotation\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g],"
-        "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
+        "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s%s}",
         eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
-        camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+        camera->cx, camera->cy, camera->width, camera->height, camera->near, far,
+        parallel ? ",\"projection\":\"orthographic\"" : "");
     spl_headers_add(headers, "Splatd-Camera", "%s", spl_decimal_shorten(text));
 }
 

@@ -13,6 +13,7 @@
 #include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
+#include "service/tiles/tiles.h"
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
@@ -67,7 +68,7 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request));
 }
 
-/* "{id}" stands for a dataset, "{n}" for a number, "{name}" for any other segment. Methods of one pattern that need
+/* "{id}" stands for a dataset, "{n}" for a number, "{z}/{x}/{y}" for a tile, "{name}" for any other segment. Methods of one pattern that need
  * different scopes are rows of their own. */
 static const struct route {
     const char *pattern;
@@ -92,6 +93,8 @@ static const struct route {
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
     {"/v1/datasets/{id}/legend.svg", GET, SPL_SCOPE_VIEW, true, spl_show_legend},
     {"/v1/datasets/{id}/place", GET, SPL_SCOPE_VIEW, true, spl_show_place},
+    {"/v1/datasets/{id}/tiles.json", GET, SPL_SCOPE_VIEW, false, spl_show_tiles},
+    {"/v1/datasets/{id}/tiles/{z}/{x}/{y}", GET, SPL_SCOPE_VIEW, true, spl_make_tile},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
     {"/v1/datasets/{id}/thumbnail.jpg", GET, SPL_SCOPE_VIEW, true, spl_make_thumbnail},
     {"/v1/datasets/{id}/views/{name}", PUT, SPL_SCOPE_ADMIN, false, spl_put_saved_view}, // before the body, and behind it
@@ -130,6 +133,8 @@ static bool match(const char *pattern, const char *path, struct holes *holes)
             holes->id = path, holes->id_length = length;
         else if (!strncmp(pattern, "{n}", 3))
             holes->number = path, holes->number_length = length;
+        else if (!strncmp(pattern, "{x}", 3) || !strncmp(pattern, "{y}", 3)) // one name with {z}
+            holes->name_length = (size_t)(path - holes->name) + length;
         else
             holes->name = path, holes->name_length = length;
         pattern = strchr(pattern, '}') + 1;

@@ -158,6 +158,30 @@ def test_the_camera_is_the_one_of_the_service():
         )
 
 
+def test_plans_and_elevations():
+    """A button looks from a side, orthographically, and back; what a point's pixel shows is there."""
+    with page() as tab:
+        before = settled(tab)
+        home = link(tab)
+        tab.run("document.querySelector('#top').click()")
+        top = next_link(tab, lambda now: now.get("projection") == "orthographic")
+        assert settled(tab, before)[1] > 0 and "fov" not in top and far(top["eye"][:2], top["target"][:2]) < 1e-6
+        assert top["eye"][2] > top["target"][2] and top["up"] == [0, 1, 0]
+        high = 2 * far(home["eye"], home["target"]) * math.tan(math.radians(float(home["fov"])) / 2)
+        assert abs(float(top["view_height"]) / high - 1) < 1e-3, (top, home)
+        assert tab.run("document.querySelector('#top').ariaPressed") == "true"
+        tab.run("document.querySelector('#front').click()")
+        front = next_link(tab, lambda now: now["up"] == [0, 0, 1] and "projection" in now)
+        assert abs(front["eye"][2] - front["target"][2]) < 1e-6 and front["eye"][1] < front["target"][1]
+        tab.run("document.querySelector('#front').click()")
+        again = next_link(tab, lambda now: "fov" in now)
+        assert far(again["eye"], home["eye"]) < 0.01 and tab.run("document.querySelector('#front').ariaPressed") == "false"
+    with page(f"{SITE}/#" + urllib.parse.urlencode({k: ",".join(map(str, v)) if isinstance(v, list) else v for k, v in front.items()})) as tab:
+        settled(tab)
+        now = link(tab)
+        assert far(now["target"], front["target"]) < 1e-3 and abs(float(now["view_height"]) / float(front["view_height"]) - 1) < 1e-3
+
+
 def test_dragging_orbits_and_pans():
     with page() as tab:
         start, digest = link(tab), settled(tab)

@@ -130,8 +130,10 @@ static struct spl_view make_view(const struct golden *golden)
     struct spl_view view;
     spl_view_init(&view);
     struct spl_camera *camera = &view.camera;
-    if (spl_camera_set_fov(camera, golden->fov, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL) ||
-        spl_camera_look_at(camera, golden->eye, golden->target, (double[3]){0, 0, 1}, NULL))
+    const double height = golden->view_height, up[3] = {0, height > 0, height == 0};
+    if ((height > 0 ? spl_camera_set_orthographic(camera, height, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL)
+                    : spl_camera_set_fov(camera, golden->fov, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL)) ||
+        spl_camera_look_at(camera, golden->eye, golden->target, up, NULL))
         abort();
     camera->cx += golden->shift;
     camera->cy -= golden->shift;

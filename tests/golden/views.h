@@ -28,6 +28,7 @@ struct golden {
     enum spl_soft_model model;
     double opacity, blend;
     const char *shade, *color_by; /* NULL: none, rgb */
+    double view_height;       /* of an orthographic view; 0 = fov */
 };
 
 static const struct golden goldens[] = {
@@ -91,6 +92,9 @@ static const struct golden goldens[] = {
     /* heights over a terrain's ramp by the nearest disc: an entry of the palette more or less is a level or two */
     {"color-height", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {2, 0.004}, .color_by = "height"},
+    /* parallel rays, straight down: walls are their upper edges, and a column's foot lies under its head */
+    {"plan-splat", {1, 0.5, 30}, {1, 0.5, 0}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0, {1, 0.002},
+     .view_height = 14},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

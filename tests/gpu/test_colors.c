@@ -25,22 +25,31 @@ static double depth_at(const struct spl_frame *frame, size_t at)
     return (double)((const float *)frame->images[SPL_LAYER_DEPTH].pixels)[at];
 }
 
+/* The view through parallel rays, as large at the cube. */
+static void make_parallel(struct spl_view *view, double height)
+{
+    struct spl_camera *camera = &view->camera;
+    assert_int_equal(spl_camera_set_orthographic(camera, height, camera->width, camera->height, NULL), SPL_OK);
+}
+
 /* What shade.comp is to say, from depths. */
 static double edl(const struct spl_frame *frame, const struct spl_view *view, int x, int y)
 {
     const int width = (int)view->camera.width, height = (int)view->camera.height;
     const int r = (int)view->shade.radius, c = (int)(0.7071068 * r + 0.5);
     const int steps[4][2] = {{r, 0}, {c, c}, {0, r}, {c, -c}};
-    const double z = depth_at(frame, (size_t)(y * width + x));
+    const bool parallel = view->camera.projection == SPL_ORTHOGRAPHIC;
+    const double z = depth_at(frame, (size_t)(y * width + x)), far_off = (double)SPL_PARALLEL_FOCAL / view->camera.fx;
     double deeper = 0;
     for (int i = 0; i < 4; i++) {
         const int at[2][2] = {{x - steps[i][0], y - steps[i][1]}, {x + steps[i][0], y + steps[i][1]}};
         double sum = 0;
         for (int k = 0; k < 2; k++) {
             const bool inside = at[k][0] >= 0 && at[k][1] >= 0 && at[k][0] < width && at[k][1] < height;
-            sum += inside ? 1 / depth_at(frame, (size_t)(at[k][1] * width + at[k][0])) : NAN;
+            const double there = inside ? depth_at(frame, (size_t)(at[k][1] * width + at[k][0])) : NAN;
+            sum += parallel ? there : 1 / there;
         }
-        deeper += fmax(sum / 2 * z - 1, 0); /* of NaN it is 0 */
+        deeper += fmax(parallel ? (z - sum / 2) / far_off : sum / 2 * z - 1, 0); /* of NaN it is 0 */
     }
     return 1 - view->shade.strength * (SPL_SHADE_DEPTH * deeper / (1 + SPL_SHADE_DEPTH * deeper));
 }
@@ -51,7 +60,9 @@ static double light(const struct spl_frame *frame, const struct spl_view *view, 
     const struct spl_camera *camera = &view->camera;
     const float *n = (const float *)frame->images[SPL_LAYER_NORMAL].pixels + 3 * ((size_t)y * camera->width + (size_t)x);
     const double *r = camera->rotation, degree = acos(-1) / 180, *sun = view->shade.sun;
-    const double ray[3] = {(x + 0.5 - camera->cx) / camera->fx, (y + 0.5 - camera->cy) / camera->fy, 1};
+    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
+    const double ray[3] = {parallel ? 0 : (x + 0.5 - camera->cx) / camera->fx,
+                           parallel ? 0 : (y + 0.5 - camera->cy) / camera->fy, 1};
     const double to[3] = {sin(sun[0] * degree) * cos(sun[1] * degree), cos(sun[0] * degree) * cos(sun[1] * degree),
                           sin(sun[1] * degree)};
     double along = 0, facing = 0, kept = 1;
@@ -66,15 +77,12 @@ static double light(const struct spl_frame *frame, const struct spl_view *view, 
     return kept;
 }
 
-static void shading_is_as_in_c(void **state)
+static void compare_shading(struct spl_dataset *dataset, struct spl_view view)
 {
-    (void)state;
     static const struct {
         const char *text;
         int levels; /* normals are compared as the layer has them, in 32 bits, colours as sums of rounded factors */
     } cases[] = {{"edl", 1}, {"headlight", 1}, {"sun:200,30", 1}, {"edl+headlight+sun:10,70", 1}};
-    struct spl_dataset *dataset = random_cube(9000, origin, 0.02);
-    struct spl_view view = looking(origin, 2.5, 160, 120);
     view.method = SPL_METHOD_POINTS;
     view.lod = 0;
     view.shade.kinds = SPL_SHADE_NONE;
@@ -108,6 +116,16 @@ static void shading_is_as_in_c(void **state)
         spl_frame_finish(&shaded);
     }
     spl_frame_finish(&plain);
+}
+
+static void shading_is_as_in_c(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(9000, origin, 0.02);
+    struct spl_view view = looking(origin, 2.5, 160, 120);
+    compare_shading(dataset, view);
+    make_parallel(&view, 2.4);
+    compare_shading(dataset, view);
     done(dataset);
 }
 
@@ -135,8 +153,9 @@ static double value_of(const struct spl_dataset *dataset, const struct spl_view 
         assert_true(spl_dataset_find_value(dataset, paint->stream, id, &value));
         return value;
     }
-    const double x = ((double)(at % camera->width) + 0.5 - camera->cx) / camera->fx * z;
-    const double y = ((double)(at / camera->width) + 0.5 - camera->cy) / camera->fy * z;
+    const double scale = camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
+    const double x = ((double)(at % camera->width) + 0.5 - camera->cx) / camera->fx * scale;
+    const double y = ((double)(at / camera->width) + 0.5 - camera->cy) / camera->fy * scale;
     value = paint->plane[3];
     for (int i = 0; i < 3; i++)
         value += paint->plane[i] *
@@ -189,6 +208,8 @@ static void values_are_shown(void **state)
         compare_shown(dataset, &view, "height", NULL);
         char plane[200];
         snprintf(plane, sizeof plane, "plane:%.17g,%.17g,%.17g,1,-2,0.5", origin[0], origin[1], origin[2]);
+        compare_shown(dataset, &view, plane, "-1..1");
+        make_parallel(&view, 2.4);
         compare_shown(dataset, &view, plane, "-1..1");
         done(dataset);
     }

@@ -16,7 +16,7 @@ from harness import REAL, VIEW, WALL, Daemon, run
 
 PICK = VIEW.replace("/view", "/pick")
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
-WEBP = os.environ["SPLATD_WEBP"] == "1"
+WEBP, TIFF = (os.environ[f"SPLATD_{name}"] == "1" for name in ("WEBP", "TIFF"))
 COMPONENTS = {"color": ("|u1", 4, 1), "depth": ("<f4", 1, 4), "range": ("<f4", 1, 4), "normal": ("<f4", 3, 4),
               "id": ("<u4", 1, 4), "coverage": ("<f4", 1, 4), "primitive": ("<u4", 1, 4)}
 LOOK = dict(eye="3,0.2,1", target="0,0,1", up="0,0,1")
@@ -65,7 +65,7 @@ def test_datasets_are_described():
         low, high = full["bounds"]["min"], full["bounds"]["max"]
         assert all(abs(a - b) < 0.02 for a, b in zip(low + high, [-0.17, -1, 0, 0.17, 0.95, 1.95])), (low, high)
         assert full["layers"] == list(COMPONENTS) and full["methods"] == ["splat", "points", "fill", "nearest"]
-        assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP
+        assert full["formats"] == ["jpeg", "png", "npy", "raw"] + ["webp"] * WEBP + ["tiff"] * TIFF
         assert full["default_view"]["fov"] > 0 and len(full["default_view"]["eye"]) == 3
 
 
@@ -261,8 +261,41 @@ def test_cameras_of_other_programs_are_the_same_camera():
                     assert len(wanted) == len(got) and max(abs(a - b) for a, b in zip(wanted, got)) < 1e-12, (form, name, got)
         views = d.post({"views": [{"camera": form} for form in forms], "format": "raw"}, VIEW + "s")
         assert views.status == 200 and views.headers["Splatd-Failed"] == "0", views.body[:500]
-        ortho = d.post({"camera": {"gltf": {"orthographic": {"xmag": 1, "ymag": 1, "znear": 1, "zfar": 9}}}})
-        assert ortho.status == 400 and "perspective" in ortho.json()["detail"], ortho.body
+
+
+def test_orthographic_views():
+    """A plan by every way to ask for it is one image; picks, batches and layers speak of the same place."""
+    eye, down = {"eye": "0.3,0.2,9", "target": "0.3,0.2,0"}, {"eye": [0.3, 0.2, 9], "target": [0.3, 0.2, 0]}
+    size, npy = {"width": 64, "height": 48}, {"layer": "depth", "format": "npy"}
+    matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.3, 0.2, 9, 1]  # looks down, +y is up in the image
+    with Daemon(REAL) as d:
+        first = d.view(**eye, projection="orthographic", view_height=6, **size, **npy)
+        assert first.status == 200, first.body
+        used = json.loads(first.headers["Splatd-Camera"])
+        assert used["projection"] == "orthographic" and abs(used["fx"] - 8) < 1e-12
+        assert max(abs(a - b) for a, b in zip(used["rotation"], [1, 0, 0, 0, -1, 0, 0, 0, -1])) < 1e-12
+        for same in (d.view(**eye, units_per_pixel=0.125, **size, **npy), d.view(**eye, projection="orthographic", fx=8, **size, **npy),
+                     d.post({"camera": {**down, "view_height": 6}, **size, **npy})):
+            assert same.body == first.body and same.headers["ETag"] in (None, first.headers["ETag"]), same.headers  # a POST has none
+        lens = {"orthographic": {"xmag": 4, "ymag": 3, "znear": used["near"], "zfar": 1e12}, "matrix": matrix}
+        gltf = d.post({"camera": {"gltf": lens}, "height": 48, **npy})
+        assert gltf.status == 200 and gltf.body == first.body, gltf.headers
+        assert "projection" not in json.loads(d.view(**eye, up="0,1,0", **size).headers["Splatd-Camera"])
+        ranges = d.view(**eye, view_height=6, layer="range", format="npy", **size)
+        assert ranges.body == first.body
+        floats = struct.unpack("<3072f", first.body[-4 * 3072:])
+        at = next(i for i, z in enumerate(floats) if z == z)
+        point = {"x": at % 64 + 0.5, "y": at // 64 + 0.5}
+        query = "&".join(f"{k}={v}" for k, v in {**eye, "view_height": 6, **size, **point}.items())
+        pick = d.ask(f"{PICK}?{query}").json()
+        wanted = [0.3 + (point["x"] - 32) / 8, 0.2 - (point["y"] - 24) / 8, 9 - floats[at]]
+        assert max(abs(a - b) for a, b in zip(pick["position"], wanted)) < 1e-5, (pick, wanted)
+        assert pick["distance"] == pick["depth"]
+        views = d.post({"views": [{"camera": {**down, "view_height": h}} for h in (6, 2)], **size, **npy}, VIEW + "s")
+        assert views.status == 200 and first.body in views.body
+        assert d.view(**eye, view_height=6, near=0, **size).status == 200
+        wrong = d.view(**eye, projection="perspective", near=0, up="0,1,0", **size)
+        assert wrong.status == 400 and wrong.json()["field"] == "near", wrong.body
 
 
 def test_a_body_says_all_that_a_query_does():
@@ -403,12 +436,13 @@ def test_openapi_knows_every_parameter_and_route():
     params = [[cell.strip() for cell in row.replace("\\\n", " ").split(",")] for row in
               re.findall(r"^    (?:REAL|COUNT|CHOICE)\(([^\"]+?),[\s\\\\]*\"", methods, re.M)]
     assert len(params) >= 6
-    rows += [(row[0], "", "SPL_QUERY | SPL_BODY" + (" | SPL_PICK" if row[-1] != "SPL_CHANGES_TEXTURES" else "")) for row in params]
+    rows += [(row[0], "", "SPL_QUERY | SPL_BODY | SPL_TILE" + (" | SPL_PICK" if row[-1] != "SPL_CHANGES_TEXTURES" else "")) for row in params]
     assert len(rows) > 20
     assert listed["getView"] == {name for name, _, places in rows if "QUERY" in places}
     camera = {name for name, _, places in rows if "QUERY" in places and f"PARAM({name}," in
               (ROOT / "src/geom/camera_params.def").read_text()}
     assert listed["pick"] == {name for name, _, places in rows if "PICK" in places} | camera
+    assert listed["getTile"] == {name for name, _, places in rows if "TILE" in places}
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
     assert listed["showPlace"] == {name for name, _, places in rows if "PLACE" in places}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}

@@ -23,6 +23,12 @@ struct selection {
     size_t count;
 };
 
+/* What depth divides by on the image: itself, or nothing where rays are parallel. */
+static double scale_of(const struct spl_camera *camera, double depth)
+{
+    return camera->projection == SPL_ORTHOGRAPHIC ? 1 : fmax(depth, camera->near);
+}
+
 static double focal_of(const struct spl_camera *camera)
 {
     return camera->fx > camera->fy ? camera->fx : camera->fy;
@@ -57,10 +63,11 @@ static bool is_beside(const struct spl_camera *camera, double corners[8][3], dou
     unsigned out[6] = {0};
     for (int k = 0; k < 8; k++) {
         double x = k & 1 ? high[0] : low[0], y = k & 2 ? high[1] : low[1], z = k & 4 ? high[2] : low[2];
-        out[0] += camera->fx * x + camera->cx * z < -(double)SPL_LOW_PASS * z;
-        out[1] += camera->fx * x + camera->cx * z > (camera->width + (double)SPL_LOW_PASS) * z;
-        out[2] += camera->fy * y + camera->cy * z < -(double)SPL_LOW_PASS * z;
-        out[3] += camera->fy * y + camera->cy * z > (camera->height + (double)SPL_LOW_PASS) * z;
+        double w = camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
+        out[0] += camera->fx * x + camera->cx * w < -(double)SPL_LOW_PASS * w;
+        out[1] += camera->fx * x + camera->cx * w > (camera->width + (double)SPL_LOW_PASS) * w;
+        out[2] += camera->fy * y + camera->cy * w < -(double)SPL_LOW_PASS * w;
+        out[3] += camera->fy * y + camera->cy * w > (camera->height + (double)SPL_LOW_PASS) * w;
         out[4] += z < camera->near;
         out[5] += z > camera->far;
     }
@@ -108,7 +115,7 @@ static void add_panels(struct selection *s, const struct spl_node *node, const s
     }
     out->panels = true;
     out->middle = (least + most) / 2;
-    out->spacing = frame.cell * focal_of(camera) / fmax(out->middle, camera->near);
+    out->spacing = frame.cell * focal_of(camera) / scale_of(camera, out->middle);
     out->beside = beside || is_beside(camera, corners, radius);
 }
 
@@ -141,7 +148,7 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
         out->near = fmin(out->near, corners[k][2]);
         out->middle += corners[k][2] / 8;
     }
-    double depth = fmax(out->middle, camera->near);
+    double depth = scale_of(camera, out->middle);
     double apart = (double)chunk->radius_mean / (double)SPL_RADIUS_SPACING * focal_of(camera) / depth;
     if (lod > 0 && apart < lod) {
         double share = fmax(0.25, apart * apart / (lod * lod)), wanted = share * chunk->count;
@@ -157,7 +164,7 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
 
     const uint32_t *textures = spl_dataset_get_chunk_textures(s->options->dataset);
     uint32_t word = textures && s->options->atoms ? textures[index] : 0;
-    double samples = 2 * (double)chunk->radius_mean * focal_of(camera) / fmax(out->near, camera->near);
+    double samples = 2 * (double)chunk->radius_mean * focal_of(camera) / scale_of(camera, out->near);
     if (!word || samples < texture_samples)
         return;
     out->planes = word >> SPL_CHUNK_TEXTURE_PLANES;
@@ -177,7 +184,7 @@ static void add_node(struct selection *s, uint32_t index)
     corners_of(camera, least, size, corners);
     for (int k = 0; k < 8; k++)
         near = fmin(near, corners[k][2] - 2 * node->spacing); /* what is pruned grows by as much */
-    bool fine = s->options->lod > 0 && node->spacing * focal_of(camera) / fmax(near, camera->near) <= s->options->lod;
+    bool fine = s->options->lod > 0 && node->spacing * focal_of(camera) / scale_of(camera, near) <= s->options->lod;
     if (!fine && node->child_count) {
         for (uint32_t child = 0; child < node->child_count; child++)
             add_node(s, node->first_child + child);

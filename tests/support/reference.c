@@ -12,8 +12,8 @@
 #include "dataset/dictionary.h"
 #include "dataset/texture.h"
 #include "geom/octahedral.h"
-#include "geom/octahedral.h"
 #include "geom/tangent.h"
+#include "render/advance.h"
 #include "support/naive_select.h"
 #include "support/reference_fill.h"
 #include "support/reference_lines.h"
@@ -58,11 +58,14 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
     /* No tight bound here: the sphere's, which the tight one must agree with. */
     double f[2] = {s->camera.fx, s->camera.fy}, c[2] = {s->camera.cx, s->camera.cy};
     int size[2] = {(int)s->camera.width, (int)s->camera.height};
-    float inverse = 1.0f / d->p[2];
+    float inverse = 1.0f / ray_scale(&s->camera, d->p[2]);
     for (int i = 0; i < 2; i++) {
         center[i] = (float)f[i] * (d->p[i] * inverse) + (float)c[i];
         double a = (double)d->p[2] * d->p[2] - (double)d->radius * d->radius, low = -1e9, high = 1e9;
-        if (a > 0) {
+        if (s->camera.projection == SPL_ORTHOGRAPHIC) {
+            low = f[i] * ((double)d->p[i] - d->radius) + c[i];
+            high = f[i] * ((double)d->p[i] + d->radius) + c[i];
+        } else if (a > 0) {
             double b = (double)d->p[i] * d->p[2];
             double root = d->radius * sqrt((double)d->p[i] * d->p[i] + a);
             low = f[i] * (b - root) / a + c[i];
@@ -87,6 +90,16 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float tilt = 1.0f / (fabsf(facing) < 1e-6f ? 1e-6f : facing), scale = p[2] / d->radius;
     float spans = sqrtf(fmaxf(1 - n[2] * n[2], 0)) / scale, low = SPL_LOW_PASS_REACH * ifx;
     float reach = spans > low ? spans : low;
+    if (s->camera.projection == SPL_ORTHOGRAPHIC) { /* depth is linear along the plane's image */
+        float each = 1.0f / d->radius, flat = 1.0f / (fabsf(n[2]) < 1e-6f ? 1e-6f : n[2]);
+        float drop = -(n[0] * ifx * flat * ox + n[1] * ify * flat * oy);
+        float most = fmaxf(sqrtf(fmaxf(1 - n[2] * n[2], 0)) / each, low);
+        memcpy(offset, (float[]){ifx * each * ox, ify * each * oy, each * drop}, 3 * sizeof *offset);
+        *z = p[2] + (drop < -most ? -most : drop > most ? most : drop);
+        float there = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+        bool clipped = offset[0] * d->line[0] + offset[1] * d->line[1] + offset[2] * d->line[2] >= d->end;
+        return clipped ? 1 : fminf(there, near_center);
+    }
     float divisor = 1.0f + (n[0] * ifx * tilt * ox + n[1] * ify * tilt * oy);
     float k = 1.0f / (divisor > 1e-6f ? divisor : 1e-6f), w = k - 1, fall = scale * w;
     float qx = rx * scale * w + ifx * scale * ox * k, qy = ry * scale * w + ify * scale * oy * k;
@@ -127,7 +140,7 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
 {
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
     int size = (int)dictionary->size, side = SPL_TEXTURE_SIDE_MIN;
-    float diameter = 2 * d->radius / d->texture_scale * (float)s->camera.fx / d->p[2], u[3], v[3], uv[3], vv[3];
+    float diameter = 2 * d->radius / d->texture_scale * (float)s->camera.fx / ray_scale(&s->camera, d->p[2]), u[3], v[3], uv[3], vv[3];
     while (side < size && (float)side <= diameter)
         side *= 2;
     spl_tangent_frame(d->world, u, v);
@@ -226,7 +239,7 @@ static struct sample *sample_of(struct scene *s, int64_t x, int64_t y)
 
 static float margin_of(const struct scene *s, float radius, float z, float slant)
 {
-    float pixel = SPL_LOW_PASS * z / (float)s->camera.fx;
+    float pixel = SPL_LOW_PASS * ray_scale(&s->camera, z) * (1 / (float)s->camera.fx);
     return s->margin * (radius > pixel ? radius : pixel) * slant;
 }
 
@@ -236,7 +249,9 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     float center[2], p[3];
     footprint(s, d, first, last, center);
     float inverse = 1.0f / d->p[2], rx = d->p[0] * inverse, ry = d->p[1] * inverse;
-    float facing = d->n[0] * rx + d->n[1] * ry + d->n[2], slant = 1.0f / fmaxf(fabsf(facing), 1e-6f);
+    float facing = d->n[0] * rx + d->n[1] * ry + d->n[2];
+    facing = s->camera.projection == SPL_ORTHOGRAPHIC ? d->n[2] : facing;
+    float slant = 1.0f / fmaxf(fabsf(facing), 1e-6f);
     slant = slant < 1 ? 1 : slant > SPL_MARGIN_SLANT ? SPL_MARGIN_SLANT : slant;
     struct fragment f = {.margin = margin_of(s, d->radius, d->p[2], slant),
                          .behind = s->sided && facing > 0 ? d->radius : 0};
@@ -314,8 +329,9 @@ static void wide_piece(struct scene *s, const struct disc ends[2], const struct 
 
 static void project(const struct scene *s, const float p[3], float out[2])
 {
-    out[0] = (float)s->camera.fx * (p[0] / p[2]) + (float)s->camera.cx;
-    out[1] = (float)s->camera.fy * (p[1] / p[2]) + (float)s->camera.cy;
+    float scale = ray_scale(&s->camera, p[2]);
+    out[0] = (float)s->camera.fx * (p[0] / scale) + (float)s->camera.cx;
+    out[1] = (float)s->camera.fy * (p[1] / scale) + (float)s->camera.cy;
 }
 
 /* Of several at one depth the least wins, of each layer's own word. */
@@ -364,8 +380,9 @@ static void line(struct scene *s, const struct disc ends[2], const float from[3]
             continue;
         place[main_axis] = (float)k;
         place[other] = a[other] + t * (b[other] - a[other]);
-        float z = 1 / (w0 + t * (w1 - w0));
-        put(s, place, z, &ends[!(t * w1 * z < middle)], SPL_FILL_LINEAR);
+        bool parallel = s->camera.projection == SPL_ORTHOGRAPHIC;
+        float z = parallel ? from[2] + t * (to[2] - from[2]) : 1 / (w0 + t * (w1 - w0));
+        put(s, place, z, &ends[!((parallel ? t : t * w1 * z) < middle)], SPL_FILL_LINEAR);
     }
 }
 
@@ -538,7 +555,7 @@ static void fill(struct scene *s, const struct fill_plan *plan)
             samples[i].normal[c] = at->normal_winner[c];
         }
     }
-    reference_fill(samples, s->camera.width, s->camera.height, (const double[2]){s->camera.fx, s->camera.fy},
+    reference_fill(samples, &s->camera,
                    spl_dataset_get_info(s->dataset)->splat_radius, s->view, plan);
     for (size_t i = 0; i < count; i++) {
         struct sample *at = &s->samples[i];
@@ -561,6 +578,7 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
 {
     memset(frame, 0, sizeof *frame);
     struct scene s = {.dataset = dataset, .view = view, .camera = view->camera};
+    s.advance = spl_camera_advance(&s.camera, spl_dataset_get_info(dataset));
     s.camera.width *= (uint32_t)view->supersample;
     s.camera.height *= (uint32_t)view->supersample;
     s.camera.fx *= view->supersample;

@@ -24,6 +24,7 @@ struct filter {
     struct cell *nearest[SPL_FILL_LEVELS_MAX + 1], *means[SPL_FILL_LEVELS_MAX + 1];
     uint32_t width[SPL_FILL_LEVELS_MAX + 1], height[SPL_FILL_LEVELS_MAX + 1];
     float focal, radius, reach, margin, threshold;
+    bool parallel; /* rays: spacings on the image are the same at all depths */
     const struct spl_view *view;
     const struct fill_plan *plan;
 };
@@ -104,8 +105,9 @@ static void pull(struct filter *f, uint32_t level)
 /* Whether the sample of `c` is nearer than z; then it blocks its sector, where it is near enough. */
 static bool block(const struct filter *f, const struct cell *c, float z, int dx, int dy, bool constant, float steep[8])
 {
-    float angle = c->w * c->spacing * f->radius, kernel = (float)f->plan->kernel, squared = (float)(dx * dx + dy * dy);
-    float reach = constant ? kernel : fminf(angle * f->reach, kernel), nearer = z * c->w - 1 - f->margin * angle;
+    float angle = (f->parallel ? 1 : c->w) * c->spacing * f->radius, kernel = (float)f->plan->kernel;
+    float squared = (float)(dx * dx + dy * dy);
+    float reach = constant ? kernel : fminf(angle * f->reach, kernel), nearer = (f->parallel ? z - 1 / c->w : z * c->w - 1) - f->margin * angle;
     if (c->w <= 0 || nearer <= 0)
         return false;
     if (squared > 0 && squared <= reach * reach) {
@@ -126,7 +128,7 @@ static float coarse_reach(const struct filter *f, int x, int y)
         cx = cx < 0 ? 0 : cx < w ? cx : w - 1;
         cy = cy < 0 ? 0 : cy < h ? cy : h - 1;
         const struct cell *c = &f->nearest[level][cy * w + cx];
-        angle = fmaxf(angle, c->w * c->spacing);
+        angle = fmaxf(angle, (f->parallel ? (float)(c->w > 0) : c->w) * c->spacing);
     }
     return fminf(angle * f->radius * f->reach, (float)f->plan->kernel);
 }
@@ -175,7 +177,7 @@ static const struct cell *find_surface(const struct filter *f, const struct cell
         if (cells[i] && cells[i]->w > 0 && cells[i]->w < most && !cells[i]->hole && (!near || cells[i]->w > near->w))
             near = cells[i];
     if (near) {
-        float slope = samples * SPL_FILL_SLOPE * (1 / f->focal);
+        float slope = samples * SPL_FILL_SLOPE * (1 / f->focal) * (f->parallel ? near->w : 1);
         *least = near->w / (1 + (slope + f->margin * f->radius * near->w * near->spacing));
     }
     return near;
@@ -263,10 +265,13 @@ static void finish_sample(const struct filter *f, struct fill_sample *s, int x, 
     memcpy(s->normal, c.normal, sizeof c.normal);
 }
 
-void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, const double focal[2], double median,
+void reference_fill(struct fill_sample *samples, const struct spl_camera *camera, double median,
                     const struct spl_view *view, const struct fill_plan *plan)
 {
+    const uint32_t width = camera->width, height = camera->height;
+    const double focal[2] = {camera->fx, camera->fy};
     struct filter f = {.view = view, .plan = plan, .focal = (float)focal[0]};
+    f.parallel = camera->projection == SPL_ORTHOGRAPHIC;
     f.reach = (float)(3 / 1.128379f * (focal[0] > focal[1] ? focal[0] : focal[1]));
     f.margin = (float)(1 / 1.128379f);
     f.radius = (float)(median / 16);

@@ -31,7 +31,7 @@ uint32_t reference_fill_code(float radius, double median);
 
 /* Filters the samples in place; `focal` along x and y, in samples: points reach as far as the longer one
  * says. */
-void reference_fill(struct fill_sample *samples, uint32_t width, uint32_t height, const double focal[2], double median,
+void reference_fill(struct fill_sample *samples, const struct spl_camera *camera, double median,
                     const struct spl_view *view, const struct fill_plan *plan);
 
 #endif

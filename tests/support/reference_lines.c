@@ -33,6 +33,8 @@ static float scale_of(const struct spl_camera *camera, const float p[3], const f
 {
     float focal = (float)fmax(camera->fx, camera->fy);
     float n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+    if (camera->projection == SPL_ORTHOGRAPHIC) /* of the plane along the viewing axis */
+        memcpy(n, (float[]){q[1] - p[1], p[0] - q[0], 0}, sizeof n);
     float squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     float gx = n[0] * (1 / (float)camera->fx), gy = n[1] * (1 / (float)camera->fy), gradient = gx * gx + gy * gy;
     return gradient > 0 ? fminf(sqrtf(squared / gradient), SPL_LINE_SLANT * focal) : focal;
@@ -43,11 +45,13 @@ struct reference_capsule reference_capsule(const struct spl_camera *camera, cons
     struct reference_capsule c = {.w = {1 / piece->from[2], 1 / piece->to[2]},
                                   .half = piece->half * scale_of(camera, piece->from, piece->to),
                                   .middle = piece->middle,
+                                  .begin = piece->from[2],
                                   .end = piece->to[2]};
+    c.parallel = camera->projection == SPL_ORTHOGRAPHIC;
     const float f[2] = {(float)camera->fx, (float)camera->fy}, center[2] = {(float)camera->cx, (float)camera->cy};
     for (int i = 0; i < 2; i++) {
-        c.a[i] = f[i] * (piece->from[i] / piece->from[2]) + center[i];
-        c.b[i] = f[i] * (piece->to[i] / piece->to[2]) + center[i];
+        c.a[i] = f[i] * (c.parallel ? piece->from[i] : piece->from[i] / piece->from[2]) + center[i];
+        c.b[i] = f[i] * (c.parallel ? piece->to[i] : piece->to[i] / piece->to[2]) + center[i];
     }
     return c;
 }
@@ -59,9 +63,9 @@ float reference_capsule_sample(const struct reference_capsule *c, int x, int y, 
     float squared = along[0] * along[0] + along[1] * along[1];
     float t = squared > 1e-6f ? (off[0] * along[0] + off[1] * along[1]) * (1 / squared) : 0;
     t = t < 0 ? 0 : t > 1 ? 1 : t;
-    float w = c->w[0] + t * (c->w[1] - c->w[0]), half = fmaxf(c->half * w, SPL_LINE_THIN);
+    float w = c->w[0] + t * (c->w[1] - c->w[0]), half = fmaxf(c->half * (c->parallel ? 1 : w), SPL_LINE_THIN);
     float bx = off[0] - t * along[0], by = off[1] - t * along[1];
-    *z = 1 / w;
-    *second = !(t * *z < c->middle * c->end);
+    *z = c->parallel ? c->begin + t * (c->end - c->begin) : 1 / w;
+    *second = !(c->parallel ? t < c->middle : t * *z < c->middle * c->end);
     return (bx * bx + by * by) / (half * half);
 }

@@ -20,7 +20,8 @@ bool reference_cut(const struct spl_camera *camera, const float p[3], const floa
 struct reference_capsule {
     float a[2], b[2], w[2]; /* ends and inverse depths there */
     float half;             /* samples times depth */
-    float middle, end;      /* of the piece; depth of its end */
+    float middle, begin, end; /* of the piece; depths of its ends */
+    bool parallel;          /* rays: half is in samples */
 };
 
 struct reference_capsule reference_capsule(const struct spl_camera *camera, const struct reference_piece *piece);

@@ -121,7 +121,7 @@ float reference_map_color(const struct reference_map *map, const struct referenc
     float area = sqrtf(dot(n, n));
     for (int i = 0; i < 3; i++)
         n[i] /= area;
-    float cosine = facing(map, n, d), on_ray = fabsf(dot(n, sample->p)) / sample->p[2];
+    float cosine = facing(map, n, d), on_ray = sample->parallel ? fabsf(n[2]) : fabsf(dot(n, sample->p)) / sample->p[2];
     float grown = fminf(fmaxf(1 / fmaxf(on_ray, 1e-6f), 1), SPL_MARGIN_SLANT);
     float off = map->row->slack + 0.35f * sample->radius / grown + slant(map, cosine, range), seen = 0;
     codes_around(map, d, codes, along);

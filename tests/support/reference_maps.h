@@ -26,6 +26,7 @@ bool reference_map_trims(const struct reference_map *map, const float p[3], cons
 struct reference_sample {
     float p[3], right[3], down[3]; /* where it lies, and how far the surface goes to the next */
     float radius;                  /* of its discs, as far as that is known */
+    bool parallel;                 /* rays */
 };
 
 /* The weight of the station's colour there, and that colour, 0..255. */

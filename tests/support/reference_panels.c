@@ -68,10 +68,16 @@ static void place(const struct reference_plane *plane, float x, float y, float p
         p[i] = plane->o[i] + along[0] * plane->u[i] + along[1] * plane->v[i];
 }
 
+static bool is_parallel(const struct reference_plane *plane)
+{
+    return plane->camera->projection == SPL_ORTHOGRAPHIC;
+}
+
 static void project(const struct reference_plane *plane, const float p[3], float at[2])
 {
-    at[0] = (float)plane->camera->fx * (p[0] / p[2]) + (float)plane->camera->cx;
-    at[1] = (float)plane->camera->fy * (p[1] / p[2]) + (float)plane->camera->cy;
+    float scale = is_parallel(plane) ? 1 : p[2];
+    at[0] = (float)plane->camera->fx * (p[0] / scale) + (float)plane->camera->cx;
+    at[1] = (float)plane->camera->fy * (p[1] / scale) + (float)plane->camera->cy;
 }
 
 /* Panel `i`; false where it lies off the chunk's grid. */
@@ -166,7 +172,7 @@ static void put(const struct drawn *d, int64_t x, int64_t y, float z, float tilt
     const struct spl_camera *camera = d->plane->camera;
     const int cell[2] = {(int)clamped(at[0], 0, side - 0.5f), (int)clamped(at[1], 0, side - 0.5f)};
     struct reference_fragment f = {.x = x, .y = y, .z = z, .slant = slant_of(tilt), .light = light, .id = d->id};
-    f.behind = d->offset > 0;
+    f.behind = is_parallel(d->plane) ? d->normal[2] > 0 : d->offset > 0;
     memcpy(f.normal, d->normal, sizeof f.normal);
     if (x < 0 || y < 0 || x >= camera->width || y >= camera->height || !(d->panel.cells[cell[1]] >> cell[0] & 1) ||
         !(z >= (float)camera->near && z <= (float)camera->far))
@@ -176,14 +182,23 @@ static void put(const struct drawn *d, int64_t x, int64_t y, float z, float tilt
     each(context, &f);
 }
 
+/* The depth at which the ray through r (sample - principal point) meets the plane; *tilt: one over its normal along it. */
+static float meet(const struct drawn *d, const float r[2], float *tilt)
+{
+    bool parallel = is_parallel(d->plane);
+    float across = d->n[0] * r[0] + d->n[1] * r[1];
+    *tilt = 1.0f / (parallel ? d->n[2] : across + d->n[2]);
+    return (parallel ? d->offset - d->n[0] * r[0] - d->n[1] * r[1] : d->offset) * *tilt;
+}
+
 static void show_sample(const struct drawn *d, int64_t x, int64_t y,
                         void (*each)(void *, const struct reference_fragment *), void *context)
 {
     const struct spl_camera *camera = d->plane->camera;
     float r[2] = {(float)x + 0.5f - (float)camera->cx, (float)y + 0.5f - (float)camera->cy};
-    float tilt = 1.0f / (d->n[0] * r[0] + d->n[1] * r[1] + d->n[2]), z = d->offset * tilt;
-    float at[2] = {(d->u[0] * r[0] + d->u[1] * r[1] + d->u[2]) * z - d->eye[0],
-                   (d->v[0] * r[0] + d->v[1] * r[1] + d->v[2]) * z - d->eye[1]};
+    float tilt, z = meet(d, r, &tilt), scale = is_parallel(d->plane) ? 1 : z, deep = z / scale;
+    float at[2] = {(d->u[0] * r[0] + d->u[1] * r[1] + d->u[2] * deep) * scale - d->eye[0],
+                   (d->v[0] * r[0] + d->v[1] * r[1] + d->v[2] * deep) * scale - d->eye[1]};
     if (!(z > 0))
         return;
     for (int i = 0; i < 2; i++)
@@ -278,8 +293,8 @@ static float middle_depth(const struct drawn *d, const float p[3], const float a
 {
     const struct spl_camera *camera = d->plane->camera;
     float r[2] = {floorf(at[0]) + 0.5f - (float)camera->cx, floorf(at[1]) + 0.5f - (float)camera->cy};
-    float there = d->offset / (d->n[0] * r[0] + d->n[1] * r[1] + d->n[2]);
-    float farthest = fmaxf(d->farthest, p[2] * (1 + SPL_CELL_REACH * (1 / (float)camera->fx)));
+    float tilt, there = meet(d, r, &tilt), reach = SPL_CELL_REACH * (1 / (float)camera->fx);
+    float farthest = fmaxf(d->farthest, is_parallel(d->plane) ? p[2] + reach : p[2] * (1 + reach));
     return clamped(there > 0 ? there : p[2], d->nearest, farthest);
 }
 
@@ -307,10 +322,9 @@ static void show_piece(const struct drawn *d, float corner, const float rise[2],
         for (int i = 0; i < 3; i++)
             p[i] += height * d->plane->n[i];
         project(d->plane, p, place);
-        float z = middle_depth(d, p, place);
+        float z = middle_depth(d, p, place), tilt = is_parallel(d->plane) ? 1 / d->normal[2] : z / fmaxf(fabsf(d->offset), 1e-30f);
         if (p[2] > 0 && place[0] >= 0 && place[1] >= 0)
-            put(d, (int64_t)place[0], (int64_t)place[1], z, z / fmaxf(fabsf(d->offset), 1e-30f), true, at, each,
-                context);
+            put(d, (int64_t)place[0], (int64_t)place[1], z, tilt, true, at, each, context);
     }
 }
 

@@ -63,7 +63,7 @@ static float smooth_color(const struct scene *s, const struct sample *at, int c)
             bool inside = x + i >= 0 && x + i < width && y + j >= 0 && y + j < s->camera.height;
             const struct sample *beside = inside ? at + j * width + i : at;
             double weight = i && j ? 0.5 : i || j ? 1 : 4;
-            if (!(fabsf(beside->first - at->first) <= SPL_SMOOTH_SHARE * at->first))
+            if (!(fabsf(beside->first - at->first) <= depth_slack(s, at->first, SPL_SMOOTH_SHARE)))
                 continue;
             sum += weight * (beside->payload >> 8 * c & 255);
             weights += weight;
@@ -124,7 +124,8 @@ void reference_add_maps(struct scene *s)
         struct sample *at = &s->samples[i];
         if (!(depths[i] > 0))
             continue;
-        struct reference_sample sample = {.radius = fmaxf(at->first - depths[i], 0) / fmaxf(s->margin, 1)};
+        struct reference_sample sample = {.parallel = s->camera.projection == SPL_ORTHOGRAPHIC,
+                                          .radius = fmaxf(at->first - depths[i], 0) / fmaxf(s->margin, 1)};
         float weights = SPL_MAP_BASE, sum[3];
         for (int c = 0; c < 3; c++)
             sum[c] = SPL_MAP_BASE * (sums(s) ? (float)at->color[c] / (float)at->weight : smooth_color(s, at, c));
@@ -158,7 +159,7 @@ void reference_resolve_pixel(const struct scene *s, uint32_t x, uint32_t y, stru
             if (at->first == INFINITY)
                 continue;
             if (pass == 1) {
-                if (at->first <= nearest * 1.01f) {
+                if (at->first <= nearest + depth_slack(s, nearest, 0.01f)) {
                     depth += depth_of(s, at);
                     near_count++;
                 }
@@ -185,13 +186,14 @@ void reference_resolve_pixel(const struct scene *s, uint32_t x, uint32_t y, stru
             out[c] = weight ? (uint8_t)((255 * color[c] + back_weight * back[c] + weight / 2) / weight) : 0;
         out[3] = (uint8_t)((weight + side * side / 2) / (side * side));
     }
-    float z = covered ? (float)(depth / near_count) : NAN;
+    float z = covered ? (float)(depth / near_count + s->advance) : NAN;
+    const bool parallel = s->camera.projection == SPL_ORTHOGRAPHIC;
     if (images[SPL_LAYER_DEPTH].pixels)
         ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
     if (images[SPL_LAYER_RANGE].pixels) {
         double rx = ((x + 0.5) * side + s->guard - s->camera.cx) / s->camera.fx,
                ry = ((y + 0.5) * side + s->guard - s->camera.cy) / s->camera.fy;
-        ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(z * sqrt(1 + rx * rx + ry * ry));
+        ((float *)images[SPL_LAYER_RANGE].pixels)[pixel] = (float)(parallel ? z : z * sqrt(1 + rx * rx + ry * ry));
     }
     if (images[SPL_LAYER_NORMAL].pixels) {
         float *out = (float *)images[SPL_LAYER_NORMAL].pixels + 3 * pixel;

@@ -38,6 +38,7 @@ struct scene {
     uint32_t weight_max;
     float margin;
     bool sided;
+    double advance; /* what depths of the image are more by than those that are drawn: spl_camera_advance() */
     uint32_t *atoms;    /* the dictionary, expanded */
     uint32_t *textures; /* of page textures_page */
     uint32_t textures_page;
@@ -64,11 +65,24 @@ static inline bool sums(const struct scene *s)
     return s->view->method == SPL_METHOD_SPLAT;
 }
 
+/* Parallel rays: what is divided by depth under perspective is not. */
+static inline float ray_scale(const struct spl_camera *camera, float z)
+{
+    return camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
+}
+
+/* How far depths of one surface differ: a share of them, or of where a pinhole of 640 pixels sees pixels as large. */
+static inline float depth_slack(const struct scene *s, float z, float share)
+{
+    float pixel = (float)s->view->supersample / (float)s->camera.fx;
+    return share * (s->camera.projection == SPL_ORTHOGRAPHIC ? SPL_PARALLEL_FOCAL * pixel : z);
+}
+
 /* The point of view space at depth z of sample (x, y). */
 static inline void view_point(const struct scene *s, int64_t x, int64_t y, float z, float p[3])
 {
-    p[0] = ((float)x + 0.5f - (float)s->camera.cx) * (1 / (float)s->camera.fx) * z;
-    p[1] = ((float)y + 0.5f - (float)s->camera.cy) * (1 / (float)s->camera.fy) * z;
+    p[0] = ((float)x + 0.5f - (float)s->camera.cx) * (1 / (float)s->camera.fx) * ray_scale(&s->camera, z);
+    p[1] = ((float)y + 0.5f - (float)s->camera.cy) * (1 / (float)s->camera.fy) * ray_scale(&s->camera, z);
     p[2] = z;
 }
 

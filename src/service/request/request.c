@@ -6,6 +6,8 @@
 
 #include <math.h>
 
+#include "geom/ground.h"
+
 #include "service/request/values.h"
 
 static bool given(const struct values *values, enum param param)
@@ -47,7 +49,11 @@ int spl_values_resolve_encoding(const struct values *values, struct spl_view_req
     out->natural = !given(values, PARAM_format);
     out->encode = SPL_SIZED(spl_encode_options, .format = format, .quality = (int)quality, .chroma = (int)chroma,
                             .depth_scale = scale);
-    return 0;
+    if (format != SPL_FORMAT_TIFF) { // what is none has no world file
+        spl_camera_get_ground(&out->view.camera, &out->encode.ground, NULL);
+        return 0;
+    }
+    return spl_camera_get_ground(&out->view.camera, &out->encode.ground, err);
 }
 
 static int resolve_layers(const struct values *values, struct spl_view_request *out, struct spl_error *err)

@@ -47,6 +47,17 @@ int spl_view_request_from_json(const char *body, size_t length, const struct spl
 int spl_thumbnail_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
                                      const struct spl_camera_limits *limits, struct spl_view_request *out,
                                      struct spl_error *err);
+/* GET …/tiles/z/x/y.png: `query` holds how splats are drawn; the rest is the tile's. What no background is said for is
+ * transparent. */
+struct spl_tile_view {
+    double eye[3], up[2]; /* it looks down; what is up in the image */
+    double scale[2];      /* pixels a unit, along its rows and columns */
+    uint32_t side;        /* pixels */
+    enum spl_format format;
+};
+int spl_tile_request_from_query(const char *query, size_t length, const struct spl_tile_view *tile,
+                                const struct spl_camera_defaults *defaults, const struct spl_camera_limits *limits,
+                                struct spl_view_request *out, struct spl_error *err);
 
 /* GET …/pick: `query` holds x, y, the camera and how splats are drawn. */
 int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,

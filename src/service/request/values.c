@@ -179,6 +179,14 @@ static int built_format_from_name(const char *name)
     return format >= 0 && spl_format_is_built((enum spl_format)format) ? format : -1;
 }
 
+/* The names of the formats that are built in. */
+static const char *format_names(void)
+{
+    static const char *const names[] = {"jpeg, png, npy, raw", "jpeg, png, npy, raw, webp", "jpeg, png, npy, raw, tiff",
+                                        "jpeg, png, npy, raw, webp, tiff"};
+    return names[spl_format_is_built(SPL_FORMAT_WEBP) + 2 * spl_format_is_built(SPL_FORMAT_TIFF)];
+}
+
 static int flag_from_name(const char *name)
 {
     return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
@@ -199,9 +207,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         [SPL_KIND_SWITCH] = {switch_from_name, "0, 1"},
         [SPL_KIND_METHOD] = {spl_method_from_name, spl_method_names()},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
-        [SPL_KIND_FORMAT] = {built_format_from_name, spl_format_is_built(SPL_FORMAT_WEBP)
-                                                         ? "jpeg, png, webp, npy, raw"
-                                                         : "jpeg, png, npy, raw (this build makes no webp)"},
+        [SPL_KIND_FORMAT] = {built_format_from_name, format_names()},
         [SPL_KIND_CONTAINER] = {container_from_name, "multipart, zip"},
     };
     if (kind == SPL_KIND_COLOR)

@@ -11,6 +11,7 @@
 #include <jansson.h>
 
 #include "base/memory.h"
+#include "geom/ground.h"
 #include "service/headers.h"
 #include "service/zip.h"
 
@@ -23,7 +24,7 @@ const char *spl_container_media_type(enum spl_container container)
 
 const char *spl_format_suffix(enum spl_format format)
 {
-    static const char *const suffixes[SPL_FORMAT_COUNT] = {".jpg", ".png", ".npy", ".raw", ".webp"};
+    static const char *const suffixes[SPL_FORMAT_COUNT] = {".jpg", ".png", ".npy", ".raw", ".webp", ".tif"};
     return suffixes[format];
 }
 
@@ -103,13 +104,31 @@ int spl_bundle(enum spl_container container, const struct spl_part *parts, size_
     return rc;
 }
 
+/* Of a layer of a map, beside its picture. */
+static int add_world_file(struct spl_part *part, enum spl_layer layer, const char *ending, const char *text,
+                          struct spl_error *err)
+{
+    struct spl_headers headers;
+    spl_headers_open(&headers);
+    spl_headers_add(&headers, "Content-Type", "text/plain");
+    if (!spl_headers_close(&headers))
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for the headers of a world file");
+    snprintf(part->name, sizeof part->name, "%s%s", spl_layer_name(layer), ending);
+    part->headers = headers.text;
+    part->bytes = (const uint8_t *)text;
+    part->length = strlen(text);
+    return 0;
+}
+
 int spl_bundle_layers(const struct spl_view_request *request, const struct spl_frame *frame, struct spl_encoded *out,
                       struct spl_error *err)
 {
-    struct spl_part parts[SPL_LAYER_COUNT] = {0};
+    struct spl_part parts[2 * SPL_LAYER_COUNT] = {0};
+    char worlds[SPL_LAYER_COUNT][SPL_WORLD_FILE_BYTES];
     struct spl_encoded encoded[SPL_LAYER_COUNT] = {0};
     size_t count = 0;
     int rc = 0;
+    const bool mapped = request->container == SPL_CONTAINER_ZIP && request->encode.ground.placed;
     for (unsigned i = 0; !rc && i < SPL_LAYER_COUNT; i++) {
         if (!(request->view.layers >> i & 1))
             continue;
@@ -117,24 +136,28 @@ int spl_bundle_layers(const struct spl_view_request *request, const struct spl_f
         struct spl_encode_options options = spl_view_get_encoding(request, layer);
         struct spl_part *part = &parts[count];
         struct spl_headers headers;
-        if ((rc = spl_image_encode(&frame->images[i], &options, &encoded[count], err)))
+        if ((rc = spl_image_encode(&frame->images[i], &options, &encoded[i], err)))
             break;
         spl_headers_open(&headers);
         spl_headers_add(&headers, "Splatd-Layer", "%s", spl_layer_name(layer));
-        spl_headers_add_layer(&headers, request, layer, &encoded[count]);
+        spl_headers_add_layer(&headers, request, layer, &encoded[i]);
         if (!spl_headers_close(&headers))
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the headers of a layer");
         snprintf(part->name, sizeof part->name, "%s%s", spl_layer_name(layer), spl_format_suffix(options.format));
         part->headers = headers.text;
-        part->bytes = encoded[count].bytes;
-        part->length = encoded[count].length;
+        part->bytes = encoded[i].bytes;
+        part->length = encoded[i].length;
         count++;
+        const char *ending = spl_format_world_file(options.format);
+        if (!rc && mapped && ending)
+            rc = add_world_file(&parts[count++], layer, ending,
+                                spl_ground_print_world_file(&request->encode.ground, worlds[i]), err);
     }
     if (!rc)
         rc = spl_bundle(request->container, parts, count, out, err);
-    for (size_t i = 0; i < SPL_LAYER_COUNT; i++) {
+    for (size_t i = 0; i < SPL_LAYER_COUNT; i++)
         spl_encoded_finish(&encoded[i]);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
         free((char *)parts[i].headers);
-    }
     return rc;
 }

@@ -69,6 +69,7 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
     add_number(form, camera->near);
     add_number(form, camera->far);
     add(form, (uint64_t)camera->width << 32 | camera->height);
+    add(form, (uint64_t)camera->projection);
 }
 
 /* Their one text stands for what is soft; another order of terms is another key. */

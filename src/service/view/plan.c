@@ -24,7 +24,8 @@ static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
                                                         [SPL_FORMAT_PNG] = 60,
                                                         [SPL_FORMAT_NPY] = 3,
                                                         [SPL_FORMAT_RAW] = 3,
-                                                        [SPL_FORMAT_WEBP] = 60}; /* ms a megapixel */
+                                                        [SPL_FORMAT_WEBP] = 60,
+                                                        [SPL_FORMAT_TIFF] = 60}; /* ms a megapixel */
 
 struct spl_plan {
     char *path; /* of the profile */

@@ -62,38 +62,43 @@ static bool answer_at_once(struct request *request, const struct spl_view_reques
     return request->head;
 }
 
-static void make(struct request *request, const struct spl_call *call, parse_fn *parse, spl_handler *handler)
+void spl_view_answer(struct request *request, const struct spl_call *call, struct spl_view_request *view,
+                     struct spl_error *err)
 {
     struct spl_catalog_entry *entry = call->entry;
     struct spl_service *service = request->service;
-    struct spl_error err = {0};
-    struct spl_view_request view;
     struct spl_key key = {0};
-    int rc = parse_view(request, call, parse, &view, &err);
-    if (rc && spl_place_wait(request, call, handler, &err))
-        return;
-    if (rc || spl_view_check_dataset(&view, entry->info, &err))
+    if (err->code || spl_view_check_dataset(view, entry->info, err))
         goto refuse;
-    if (!view.planned) {
-        key = spl_key_make(&view, entry->info, spl_pipeline_get_renderer(service->views->pipeline));
+    if (!view->planned) {
+        key = spl_key_make(view, entry->info, spl_pipeline_get_renderer(service->views->pipeline));
         request->validated = call->method == SPL_GET;
-        request->versioned = view.versioned && !view.named;
-        if (answer_at_once(request, &view, &key))
+        request->versioned = view->versioned && !view->named;
+        if (answer_at_once(request, view, &key))
             return;
     }
-    request->large = spl_request_is_large(&view);
-    if (spl_view_has_no_room(service, &view, &err))
+    request->large = spl_request_is_large(view);
+    if (spl_view_has_no_room(service, view, err))
         goto refuse;
     request->ticket.done = answer;
     request->ticket.route = request->route;
     request->ticket.deadline_ns = spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS;
-    if (!spl_flight_board(service, &request->ticket, entry, &view, &key, &err)) {
+    if (!spl_flight_board(service, &request->ticket, entry, view, &key, err)) {
         spl_waiting_add(request, request->ticket.deadline_ns);
         return;
     }
     spl_count(service->counters, refused_full);
 refuse:
-    spl_reply_error(request, &err);
+    spl_reply_error(request, err);
+}
+
+static void make(struct request *request, const struct spl_call *call, parse_fn *parse, spl_handler *handler)
+{
+    struct spl_error err = {0};
+    struct spl_view_request view;
+    if (parse_view(request, call, parse, &view, &err) && spl_place_wait(request, call, handler, &err))
+        return;
+    spl_view_answer(request, call, &view, &err);
 }
 
 void spl_make_view(struct request *request, const struct spl_call *call)

@@ -100,6 +100,7 @@ int spl_view_blame(struct spl_error *err)
 void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_info *info)
 {
     snprintf(view->encode.unit, sizeof view->encode.unit, "%s", spl_unit_word(info));
+    view->encode.ground.epsg = info->epsg;
 }
 
 int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err)

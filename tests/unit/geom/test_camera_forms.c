@@ -33,6 +33,7 @@
 #define LENS "\"perspective\":{\"yfov\":1,\"znear\":0.5}"
 #define GLTF(members) "{\"camera\":{\"gltf\":{" members "}," SIZE "}}"
 #define PERSPECTIVE(members) GLTF("\"matrix\":" I16 ",\"perspective\":{" members "}")
+#define ORTHOGRAPHIC(members) GLTF("\"matrix\":" I16 ",\"orthographic\":{" members "}")
 #define K "[500,0,330.75,0,510,228,0,0,1]"
 #define P "[500,0,330.75,0,0,510,228,0,0,0,1,0]"
 #define OPEN3D(extrinsic, intrinsic)                                                                                   \
@@ -69,6 +70,10 @@ static void every_form_hits_the_golden_pixel(void **state)
         {GLTF("\"type\":\"perspective\",\"matrix\":" NODE ",\"perspective\":{\"yfov\":1,\"znear\":0.5,"
               "\"zfar\":90,\"aspectRatio\":1.3333334}"),
          391.38902114678562, 278.44024215596149, 0.5, 90},
+        /* parallel rays: 1.3 beside the axis and 0.7 below it, of 8 x 6; at 0.0125 a pixel; at 80 pixels a unit */
+        {GLTF("\"matrix\":" NODE ",\"orthographic\":{\"xmag\":4,\"ymag\":3,\"znear\":0,\"zfar\":9}"), 424, 296, 0, 9},
+        {"{\"camera\":{" POSE ",\"units_per_pixel\":0.0125,\"near\":1}," SIZE "}", 424, 296, 1, INFINITY},
+        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"fx\":80,\"cx\":321.5,\"near\":1}," SIZE "}", 425.5, 296, 1, INFINITY},
         {GLTF("\"matrix\":" NODE "," LENS), 391.38902114678562, 278.44024215596149, 0.5, INFINITY},
         {"{\"camera\":{\"gltf\":{\"matrix\":" NODE
          "},\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5,\"near\":1}," SIZE "}",
@@ -142,7 +147,24 @@ static void faults_carry_the_members_name(void **state)
         {GLTF("\"type\":5," LENS), "gltf.type"},
         {GLTF("\"type\":\"panorama\"," LENS), "gltf.type"},
         {GLTF("\"type\":\"orthographic\""), "gltf.orthographic"},
-        {GLTF("\"orthographic\":{\"xmag\":1,\"ymag\":1,\"znear\":1,\"zfar\":9}"), "gltf.orthographic"},
+        {ORTHOGRAPHIC("\"xmag\":1,\"ymag\":1,\"znear\":1,\"zfar\":9"), "gltf.orthographic.xmag"}, /* 640 x 480 */
+        {ORTHOGRAPHIC("\"xmag\":4,\"ymag\":0,\"znear\":1,\"zfar\":9"), "gltf.orthographic.ymag"},
+        {ORTHOGRAPHIC("\"xmag\":-4,\"ymag\":3,\"znear\":1,\"zfar\":9"), "gltf.orthographic.xmag"},
+        {ORTHOGRAPHIC("\"xmag\":4,\"ymag\":3,\"zfar\":9"), "gltf.orthographic.znear"},
+        {ORTHOGRAPHIC("\"xmag\":4,\"ymag\":3,\"znear\":1"), "gltf.orthographic.zfar"},
+        {ORTHOGRAPHIC("\"xmag\":4,\"ymag\":3,\"znear\":1,\"zfar\":9,\"yfov\":1"), "gltf.orthographic.yfov"},
+        {ORTHOGRAPHIC("\"xmag\":4,\"ymag\":3,\"znear\":-1,\"zfar\":9"), "gltf.orthographic.znear"},
+        {GLTF("\"type\":\"perspective\",\"matrix\":" I16 ",\"orthographic\":{}"), "gltf.type"},
+        {GLTF("\"type\":\"orthographic\",\"matrix\":" I16 "," LENS), "gltf.type"},
+        {"{\"camera\":{" POSE ",\"view_height\":4,\"fov\":50}," SIZE "}", "fov"},
+        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\"}," SIZE "}", "view_height"},
+        {"{\"camera\":{" POSE ",\"projection\":\"perspective\",\"view_height\":4}," SIZE "}", "view_height"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"view_height\":4}," SIZE "}", "projection"},
+        {"{\"camera\":{" POSE ",\"view_height\":4,\"units_per_pixel\":4}," SIZE "}", "units_per_pixel"},
+        {"{\"camera\":{" POSE ",\"view_height\":4,\"fx\":4}," SIZE "}", "fx"},
+        {"{\"camera\":{" POSE ",\"view_height\":0}," SIZE "}", "view_height"},
+        {"{\"camera\":{" POSE ",\"units_per_pixel\":-1}," SIZE "}", "units_per_pixel"},
+        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"model\":\"PINHOLE\",\"params\":[9,9,9,9]}," SIZE "}", "model"},
         {GLTF("\"translation\":[1,2,3]," LENS), "gltf.translation"},
         {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"xfov\":1"), "gltf.perspective.xfov"},
         {PERSPECTIVE("\"znear\":1"), "gltf.perspective.yfov"},

@@ -340,12 +340,14 @@ static void npy_header_is_as_numpy_writes_it(void **state)
     }
 }
 
+static const struct spl_ground a_map = {.placed = true, .across = {1, 0}, .down = {0, -1}};
+
 static void one_pixel_encodes_everywhere(void **state)
 {
     (void)state;
     struct spl_image image = make_color(1, 1);
     for (int format = 0; format < SPL_FORMAT_COUNT; format++) {
-        struct spl_encoded out = ENCODE(&image, .format = (enum spl_format)format);
+        struct spl_encoded out = ENCODE(&image, .format = (enum spl_format)format, .ground = a_map);
         assert_true(out.length >= 4);
         spl_encoded_finish(&out);
     }
@@ -380,8 +382,8 @@ static void rows_may_lie_apart(void **state)
     for (int format = 0; format < SPL_FORMAT_COUNT; format++) {
         if (!spl_format_is_built((enum spl_format)format))
             continue;
-        struct spl_encoded one = ENCODE(&image, .format = (enum spl_format)format);
-        struct spl_encoded two = ENCODE(&other, .format = (enum spl_format)format);
+        struct spl_encoded one = ENCODE(&image, .format = (enum spl_format)format, .ground = a_map);
+        struct spl_encoded two = ENCODE(&other, .format = (enum spl_format)format, .ground = a_map);
         assert_int_equal(one.length, two.length);
         assert_memory_equal(one.bytes, two.bytes, one.length);
         spl_encoded_finish(&one);
@@ -413,6 +415,8 @@ static void bad_requests_are_refused_by_field(void **state)
     assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG, .depth_scale = -5), SPL_E_USAGE,
                    "depth_scale");
     assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_COUNT), SPL_E_UNSUPPORTED, "format");
+    assert_refused(&image, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_TIFF),
+                   spl_format_is_built(SPL_FORMAT_TIFF) ? SPL_E_INPUT : SPL_E_UNSUPPORTED, "format");
     struct spl_image mistyped = image, empty = image;
     mistyped.type = SPL_PIXEL_F32;
     assert_refused(&mistyped, SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_RAW), SPL_E_UNSUPPORTED, "layer");
@@ -442,7 +446,7 @@ static void every_failed_allocation_is_reported(void **state)
                 struct spl_encoded out;
                 spl_memory_fail_after(attempt);
                 rc = spl_image_encode(layer ? &distance : &color, &SPL_SIZED(spl_encode_options,
-                                      .format = (enum spl_format)format),
+                                      .format = (enum spl_format)format, .ground = a_map),
                                       &out, &err);
                 spl_memory_fail_after(0);
                 assert_int_equal(rc, err.code);
@@ -467,6 +471,7 @@ static void names_round_trip(void **state)
         assert_int_equal(spl_format_from_name(spl_format_name((enum spl_format)i)), i);
     assert_int_equal(spl_layer_from_name("color"), SPL_LAYER_COLOR);
     assert_int_equal(spl_format_from_name("jpg"), SPL_FORMAT_JPEG);
+    assert_int_equal(spl_format_from_name("tif"), SPL_FORMAT_TIFF);
     assert_int_equal(spl_layer_from_name("Color"), -1);
     assert_int_equal(spl_layer_from_name(""), -1);
     assert_int_equal(spl_format_from_name("gif"), -1);

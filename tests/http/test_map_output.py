@@ -1,0 +1,241 @@
+"""Maps: GeoTIFFs and world files of plans, and tiles. Corners, steps and heights are those of the views and picks that ask for
+the same place; tiles are pieces of one picture, whoever asks for them."""
+import io
+import json
+import math
+import os
+import struct
+import zipfile
+import zlib
+
+import openapi
+from harness import FAKE, REAL, VIEW, Daemon, run
+
+TREE = os.environ["SPLATD_TREE"]
+PLAN = "/v1/datasets/tree/view?projection=orthographic&eye=10.125,9.25,30&target=10.125,9.25,0&units_per_pixel=0.25&width=96&height=64"
+PICK = PLAN.replace("/view", "/pick")
+WEBP, TIFF, PROJ = (os.environ[f"SPLATD_{name}"] == "1" for name in ("WEBP", "TIFF", "PROJ"))
+SCALE, TIEPOINT, MATRIX, KEYS, NODATA = 33550, 33922, 34264, 34735, 42113
+
+
+def undo_floats(row, count, stride):
+    """Of predictor 3."""
+    row = bytearray(row)
+    for i in range(stride, len(row)):
+        row[i] = (row[i] + row[i - stride]) & 255
+    return b"".join(bytes(row[k * count + i] for k in (3, 2, 1, 0)) for i in range(count))
+
+
+def undo_differences(row, stride, form):
+    values = list(struct.unpack(form, row))
+    for i in range(stride, len(values)):
+        values[i] = (values[i] + values[i - stride]) & (255 if "B" in form else 0xffffffff)
+    return struct.pack(form, *values)
+
+
+def read_tiff(data):
+    """({tag: values}, bytes of the pixels)"""
+    assert data[:4] == b"II*\0", data[:8]
+    at, = struct.unpack("<I", data[4:8])
+    count, = struct.unpack("<H", data[at:at + 2])
+    sizes, tags = {2: "c", 3: "H", 4: "I", 12: "d"}, {}
+    for i in range(count):
+        tag, kind, n = struct.unpack("<HHI", data[at + 2 + 12 * i:at + 10 + 12 * i])
+        form = f"<{n}{sizes[kind]}"
+        where = at + 10 + 12 * i
+        if struct.calcsize(form) > 4:
+            where, = struct.unpack("<I", data[where:where + 4])
+        values = struct.unpack(form, data[where:where + struct.calcsize(form)])
+        tags[tag] = b"".join(values).rstrip(b"\0").decode() if kind == 2 else values
+    width, samples, bits = tags[256][0], tags[277][0], tags[258][0]
+    assert tags[259] == (8,) and tags[274] == (1,), tags
+    pixels = b""
+    for start, length in zip(tags[273], tags[279]):
+        strip = zlib.decompress(data[start:start + length])
+        size = width * samples * bits // 8
+        for y in range(0, len(strip), size):
+            row, values = strip[y:y + size], width * samples
+            pixels += (undo_floats(row, values, samples) if tags[317] == (3,) else
+                       undo_differences(row, samples, f"<{values}{'B' if bits == 8 else 'I'}"))
+    return tags, pixels
+
+
+def read_png(data):
+    """(width, height, rows of RGBA)"""
+    at, idat, rows = 8, b"", []
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", data[at + 8:at + 18])
+            assert (depth, color) == (8, 6)
+        idat += data[at + 8:at + 8 + length] if kind == b"IDAT" else b""
+        at += 12 + length
+    bytes_, before = zlib.decompress(idat), bytearray(4 * width)
+    for y in range(height):
+        start = y * (4 * width + 1)
+        kind, row = bytes_[start], bytearray(bytes_[start + 1:start + 1 + 4 * width])
+        for i in range(4 * width if kind else 0):
+            a, b, c = (row[i - 4], before[i], before[i - 4]) if i >= 4 else (0, before[i], 0)
+            if kind == 4:
+                p, q, r = abs(b - c), abs(a - c), abs(a + b - 2 * c)
+                guess = a if p <= q and p <= r else b if q <= r else c
+            else:
+                guess = (0, a, b, (a + b) // 2)[kind]
+            row[i] = (row[i] + guess) & 255
+        rows.append(bytes(row))
+        before = row
+    return width, height, rows
+
+
+def floats(data):
+    return struct.unpack(f"<{len(data) // 4}f", data)
+
+
+def test_geotiffs_are_where_they_say():
+    if not TIFF:
+        with Daemon(REAL, datasets=[TREE]) as d:
+            assert d.ask(f"{PLAN}&format=tiff").json()["field"] == "format"
+        return
+    with Daemon(REAL, datasets=[TREE]) as d:
+        tags, color = read_tiff(d.ask(f"{PLAN}&transparent=true&format=tiff").body)
+        assert tags[SCALE] == (0.25, 0.25, 0) and tags[TIEPOINT] == (0, 0, 0, 10.125 - 12, 9.25 + 8, 0), tags
+        assert tags[KEYS] == (1, 1, 1, 1, 1025, 0, 1, 1) and tags[338] == (2,) and NODATA not in tags, tags
+        assert d.ask(f"{PLAN}&transparent=true&format=raw").body == color
+        reply = d.ask(f"{PLAN}&layer=depth&format=tiff")
+        assert reply.headers["Content-Type"] == "image/tiff" and reply.headers["Splatd-Height-Unit"]
+        assert "Splatd-Depth-Unit" not in reply.headers
+        tags, heights = read_tiff(reply.body)
+        heights = floats(heights)
+        assert tags[NODATA] == "nan" and tags[339] == (3,), tags
+        depths = floats(d.ask(f"{PLAN}&layer=depth&format=raw").body)
+        seen = [i for i, z in enumerate(depths) if not math.isnan(z)]
+        assert 200 < len(seen) < 96 * 64 and all(math.isnan(h) == math.isnan(z) for h, z in zip(heights, depths))
+        assert all(abs(heights[i] - (30 - depths[i])) < 2e-6 for i in seen)
+        for i in seen[::len(seen) // 7]:  # the photograph's pixel, the surface's, and the point that is picked are one
+            x, y = i % 96 + 0.5, i // 96 + 0.5
+            picked = d.ask(f"{PICK}&x={x}&y={y}").json()["position"]
+            wanted = (10.125 - 12 + 0.25 * x, 9.25 + 8 - 0.25 * y, heights[i])
+            assert all(abs(a - b) < 1e-5 for a, b in zip(picked, wanted)), (picked, wanted)
+        for layer, form in (("normal", 3), ("id", 1), ("coverage", 1), ("primitive", 1), ("range", 1)):
+            tags, pixels = read_tiff(d.ask(f"{PLAN}&layer={layer}&format=tiff").body)
+            assert tags[277] == (form,) and len(pixels) == 96 * 64 * 4 * form, layer
+            if layer != "range":
+                assert pixels == d.ask(f"{PLAN}&layer={layer}&format=raw").body, layer
+        tags, _ = read_tiff(d.ask(f"{PLAN}&up=1,1,0&format=tiff").body)
+        assert SCALE not in tags and len(tags[MATRIX]) == 16
+        picked = d.ask(f"{PICK}&up=1,1,0&x=40.5&y=30.5").json()["position"]
+        m = tags[MATRIX]
+        assert all(abs(picked[i] - (m[4 * i] * 40.5 + m[4 * i + 1] * 30.5 + m[4 * i + 3])) < 1e-5 for i in (0, 1)), (m, picked)
+        for wrong in ("eye=10,9,30&target=10,8,0&up=0,1,0&units_per_pixel=1", "eye=10,9,30&target=10,9,0&up=0,1,0",
+                      "eye=10,9,-30&target=10,9,0&units_per_pixel=1"):
+            refused = d.ask(f"/v1/datasets/tree/view?{wrong}&width=16&height=16&format=tiff")
+            assert refused.status == 400 and refused.json()["field"] == "format", (wrong, refused.body)
+    with Daemon(REAL) as d:  # its coordinates are those of EPSG:2263
+        reply = d.view(eye="0.25,0.5,9", target="0.25,0.5,0", view_height=3, width=24, height=24, format="tiff")
+        assert read_tiff(reply.body)[0][KEYS] == (1, 1, 1, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 2263)
+        views = d.post({"format": "tiff", "width": 8, "height": 8, "views": [
+            {"camera": {"eye": [x, 0, 9], "target": [x, 0, 0], "view_height": 2}} for x in (0, 5)]}, VIEW + "s")
+        assert views.headers["Splatd-Failed"] == "0" and views.body.count(b"image/tiff") == 2
+
+
+def test_world_files_lie_beside_pictures():
+    with Daemon(REAL, datasets=[TREE]) as d:
+        zipped = zipfile.ZipFile(io.BytesIO(d.ask(f"{PLAN}&layers=color,depth&container=zip").body))
+        assert zipped.namelist() == ["color.jpg", "color.jgw", "depth.png", "depth.pgw", "index.json"]
+        lines = [float(line) for line in zipped.read("depth.pgw").split()]
+        assert lines == [0.25, 0, 0, -0.25, 10.125 - 12 + 0.125, 9.25 + 8 - 0.125] and zipped.read("color.jgw") == zipped.read("depth.pgw")
+        assert len(json.loads(zipped.read("index.json"))) == 4
+        other = d.ask("/v1/datasets/tree/view?layers=color,depth&container=zip&format=png&width=32")
+        assert zipfile.ZipFile(io.BytesIO(other.body)).namelist() == ["color.png", "depth.png", "index.json"]
+
+
+def tile_pixels(reply):
+    assert reply.status == 200, reply.body
+    width, height, rows = read_png(reply.body)
+    assert (width, height) == (256, 256)
+    return rows
+
+
+def test_tiles_of_a_plane():
+    """tree has no coordinate system: its own square, of which level 0 is one tile."""
+    with Daemon(REAL, datasets=[TREE]) as d:
+        tiles = d.ask("/v1/datasets/tree/tiles.json").json()
+        own = tiles["splatd"]
+        assert tiles["tilejson"] == "3.0.0" and own["scheme"] == "plane" and "bounds" not in tiles, tiles
+        west, north, side = *own["corner"], own["side"]
+        low, high = own["bounds"][:2], own["bounds"][2:]
+        wide = [b - a for a, b in zip(low, high)]
+        assert abs(side - max(wide)) < 1e-9, own
+        assert all(abs(c - w) < 1e-9 for c, w in zip((west + side / 2, north - side / 2), (low[0] + wide[0] / 2, low[1] + wide[1] / 2))), own
+        first = tiles["tiles"][0].format(z=0, x=0, y=0)
+        top = d.ask(first)
+        assert "immutable" in top.headers["Cache-Control"] and json.loads(top.headers["Splatd-Camera"])["projection"]
+        again = d.ask(first, headers={"If-None-Match": top.headers["ETag"]})
+        assert again.status == 304
+        # As the view of the same place, and level 1 as one picture of 512 pixels.
+        look = f"eye={west + side / 2},{north - side / 2},50&target={west + side / 2},{north - side / 2},0&transparent=true&format=raw"
+        view = d.ask(f"/v1/datasets/tree/view?{look}&units_per_pixel={side / 512}&width=512&height=512")
+        tall = d.ask("/v1/datasets/tree/tiles/0/0/0@2x.png")
+        assert struct.unpack(">II", tall.body[16:24]) == (512, 512)
+        off = 0
+        for y in range(2):
+            for x in range(2):
+                rows = tile_pixels(d.ask(f"/v1/datasets/tree/tiles/1/{x}/{y}.png"))
+                for j, row in enumerate(rows):
+                    start = 2048 * (256 * y + j) + 1024 * x
+                    part = view.body[start:start + 1024]
+                    off += sum(row[4 * i:4 * i + 4] != part[4 * i:4 * i + 4] for i in range(256)) if row != part else 0
+        assert off <= 512 * 512 // 500, off  # an eye elsewhere rounds elsewhere: a fragment at a border here and there
+        opaque = tile_pixels(d.ask("/v1/datasets/tree/tiles/1/0/0.png?background=ff0000"))
+        assert all(row[3::4] == b"\xff" * 256 for row in opaque)
+        for name in ("0/0/1.png", "1/2/0.png", "31/0/0.png", "0/0/0.jpg", "0/0/0", "00/0/0.png", "0/0/0@3x.png", "-1/0/0.png",
+                     "0/0/0.png.png", "a/b/c.png"):
+            wrong = d.ask(f"/v1/datasets/tree/tiles/{name}")
+            assert wrong.status == 404 and wrong.json()["field"] == "tile", (name, wrong.body)
+        assert d.ask("/v1/datasets/tree/tiles/0/0/0.png?eye=1,2,3").json()["field"] == "eye"
+        assert d.ask("/v1/datasets/tree/tiles/0/0/0.png?lod=-1").json()["field"] == "lod"
+        webp = d.ask("/v1/datasets/tree/tiles/0/0/0.webp?quality=50")
+        assert webp.headers.get("Content-Type") == "image/webp" if WEBP else webp.status == 404
+
+
+def test_tiles_of_the_earth():
+    """What a tile shows of the world is where PROJ says that its pixels are."""
+    with Daemon(REAL) as d:
+        tiles = d.ask("/v1/datasets/wall/tiles.json").json()
+        if not PROJ:
+            assert tiles["splatd"]["scheme"] == "plane"
+            return
+        west, south, east, north = tiles["bounds"]
+        assert tiles["splatd"]["scheme"] == "mercator" and west < east and south < north and -90 < west < -70 and 38 < south < 42, tiles
+        turn, z = 2 * math.pi * 6378137, tiles["maxzoom"]
+        for z, most in ((z, 0.01), (z - 4, 0.01), (14, 0.02), (9, 0.5), (0, 0.5)):
+            for point in ((0, 0, 1), (0.3, 0.9, 0)):
+                place = d.ask(f"/v1/datasets/wall/place?crs=EPSG:3857&world={','.join(map(str, point))}").json()["position"]
+                at = [(place[0] / turn + 0.5) * 2 ** z, (0.5 - place[1] / turn) * 2 ** z]
+                name = f"{z}/{int(at[0])}/{int(at[1])}"
+                camera = json.loads(d.ask(f"/v1/datasets/wall/tiles/{name}.png").headers["Splatd-Camera"])
+                offset = [p - e for p, e in zip(point, camera["eye"])]
+                seen = [camera["fx" if i == 0 else "fy"] * sum(a * b for a, b in zip(camera["rotation"][3 * i:], offset)) + 128 for i in (0, 1)]
+                wanted = [256 * (v - int(v)) for v in at]
+                assert max(abs(a - b) for a, b in zip(seen, wanted)) < most, (z, point, seen, wanted)
+        empty = d.ask("/v1/datasets/wall/tiles/5/30/2.png")  # Siberia's
+        assert not any(any(row[3::4]) for row in tile_pixels(empty)) and empty.headers["Splatd-Splats"] == "0"
+        rotated = abs(camera["rotation"][1])
+        assert 0.01 < rotated < 0.1, camera  # of the grid's north and the map's
+
+
+def test_every_parameter_of_a_tile():
+    query = {p["name"]: p for _, _, operation, parameters in openapi.operations() if operation["operationId"] == "getTile"
+             for p in parameters if p["in"] == "query"}
+    values = {"method": "points", "lod": 2, "margin": 1, "atoms": 1, "maps": "off", "primitives": "off", "visibility": "none", "kernel": 5,
+              "threshold": 0.5, "pyramid": 3, "soft": "uncertainty>1", "soft_model": "base", "soft_opacity": 0.5, "soft_cover": 0.5,
+              "soft_blend": 0.1, "of": "first", "supersample": 2, "background": "white", "quality": 80, "wait": 0}
+    with Daemon(FAKE) as d:
+        values["v"] = d.ask("/v1/datasets/wall").json()["version"]
+        assert set(query) == set(values), set(query) ^ set(values)
+        for name, value in values.items():
+            reply = d.ask(f"/v1/datasets/wall/tiles/0/0/0.png?{name}={value}")
+            assert reply.status == 200, (name, reply.body)
+
+
+run(globals())
