@@ -40,7 +40,12 @@ if [ -f "$build/build.ninja" ]; then
 else
     meson setup "$build" "$top" "${options[@]}"
 fi >"$build/setup.log" 2>&1 || { cat "$build/setup.log" >&2; exit 1; }
-ninja -C "$build" --quiet
+targets=(src/splatd)
+if $tests; then
+    mapfile -t kernels < <(ninja -C "$build" -t targets all | sed -n 's|^\(tests/gpu/test-gpu-[a-z-]*\): .*|\1|p')
+    targets+=("${kernels[@]}" tests/golden/golden tests/stability/stability)
+fi
+ninja -C "$build" --quiet "${targets[@]}"
 
 rm -rf "$out"
 mkdir -p "$out"/{bin,lib/fallback,share/proj}
