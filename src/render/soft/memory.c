@@ -40,7 +40,8 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     bytes[SPL_SOFT_TOLD] = software ? 0 : bytes[SPL_SOFT_SLOTS];
     bytes[SPL_SOFT_FIRSTS] = word * (slots ? slots : 1);
     bytes[SPL_SOFT_DIGITS] = word * digits_max;
-    bytes[SPL_SOFT_TOTALS] = bytes[SPL_SOFT_STARTS] = word * sizes->tiles;
+    bytes[SPL_SOFT_STARTS] = word * sizes->tiles;
+    bytes[SPL_SOFT_TOTALS] = word * (sizes->tiles + (uint64_t)SPL_SOFT_WALK_GROUPS);
     bytes[SPL_SOFT_LISTS] = 3 * word * sizes->tiles;
     bytes[SPL_SOFT_STEPS_OF] = (uint64_t)SPL_SOFT_STEP_STRIDE * SPL_SOFT_STEPS;
     bytes[SPL_SOFT_STATE] = SPL_SOFT_STATE_WORDS * word * sizes->samples;

@@ -20,6 +20,8 @@
 enum { SPL_SOFT_STEP_STRIDE = 256, SPL_SOFT_STEPS = 256 };
 /* Where many invocations run: pairs a block, bits of a digit. */
 enum { SPL_SOFT_MANY_BLOCK = 64, SPL_SOFT_MANY_BITS = 5 };
+/* Groups of tiles whose walks are recorded together, at most. */
+enum { SPL_SOFT_WALK_GROUPS = 256 };
 
 /* Device memory, of so much that any window of depth that is planned for it fits. */
 struct spl_soft_sizes {
@@ -43,7 +45,7 @@ enum spl_soft_buffer {
     SPL_SOFT_TOLD,    /* counted there, since a GPU's atomics and scattered words are slow in the host's memory; else NULL */
     SPL_SOFT_FIRSTS,  /* their first items, from the host */
     SPL_SOFT_DIGITS,  /* totals of a sort */
-    SPL_SOFT_TOTALS,  /* of tiles, for the host */
+    SPL_SOFT_TOTALS,  /* of tiles, for the host; then whether groups of walks are done */
     SPL_SOFT_STARTS,  /* of tiles, from the host */
     SPL_SOFT_LISTS,   /* tiles to blend, from the host */
     SPL_SOFT_STEPS_OF,/* struct spl_soft_step[], from the host */

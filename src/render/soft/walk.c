@@ -11,7 +11,7 @@ enum {
     samples = SPL_SOFT_TILE * SPL_SOFT_TILE_ROWS,
     tile_words = 3,
     kept_words = samples * SPL_SOFT_KEPT_WORDS,
-    groups_max = 256,      // of a batch
+    groups_max = SPL_SOFT_WALK_GROUPS, // of a batch
     group_work = 1 << 25,  // samples that are looked at in a dispatch
     round_work = 4         // of a round, in such samples
 };
@@ -116,11 +116,12 @@ static int run(struct spl_soft_order *order, const struct spl_soft_blend *blend,
     spl_gpu_barrier(order->gpu);
     for (uint32_t i = 0; i < batch->count && !rc; i++)
         spl_gpu_copy(order->gpu, buffers[SPL_SOFT_COUNTS], word * batch->groups[i].progress, buffers[SPL_SOFT_TOTALS],
-                     word * i, word);
+                     word * (order->memory->sizes.tiles + i), word);
     rc = rc ? rc : spl_soft_run(order, err);
     if (rc)
         return rc;
     const uint32_t *left = spl_gpu_buffer_map(buffers[SPL_SOFT_TOTALS]);
+    left += order->memory->sizes.tiles; // behind the tiles' own, which may say where lists start
     for (uint32_t i = 0; i < batch->count; i++)
         batch->groups[i].done = !left[i];
     return SPL_OK;
