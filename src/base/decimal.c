@@ -64,20 +64,27 @@ static char *shorten(const char *from, const char *end, char *out)
 
 char *spl_decimal_shorten(char *json)
 {
+    const char *at = json;
     char *out = json;
     bool quoted = false;
-    for (const char *at = json; at && *at;) {
-        size_t length = quoted ? 0 : strspn(at, "-+.eE0123456789");
-        if (length && *at != 'e' && *at != 'E') { /* of true and false the e is no number's */
+    while (at && *at) {
+        size_t plain = strcspn(at, quoted ? "\"\\" : "\"-0123456789"); /* in one go: lists are megabytes */
+        memmove(out, at, plain);
+        at += plain;
+        out += plain;
+        if (quoted && *at == '\\' && at[1]) {
+            *out++ = *at++;
+            *out++ = *at++;
+        } else if (*at == '"') {
+            quoted = !quoted;
+            *out++ = *at++;
+        } else if (*at && !quoted) {
+            size_t length = strspn(at, "-+.eE0123456789");
             out = shorten(at, at + length, out);
             at += length;
-            continue;
-        }
-        if (quoted && *at == '\\' && at[1])
+        } else if (*at) { /* a text that ends in the middle of an escape */
             *out++ = *at++;
-        else if (*at == '"')
-            quoted = !quoted;
-        *out++ = *at++;
+        }
     }
     if (out)
         *out = '\0';

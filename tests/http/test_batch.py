@@ -78,7 +78,7 @@ def test_bad_batches_are_refused_by_name():
         for body, said in ((b"{}", "1 to 256; it is missing"), ({"views": []}, "it is an array of 0"), ({"views": 5}, "it is a number")):
             assert d.post(body, BATCH).json()["detail"].endswith(said)
         wrong = d.post({"views": [one, {**one, "v": "0" * 16}]}, BATCH)
-        assert wrong.status == 404 and wrong.json()["field"] == "v"
+        assert wrong.status == 404 and wrong.json()["field"] == "views[1].v"
         assert d.ask(BATCH).status == 405 and d.ask(BATCH + "?width=5", "POST", "{}").json()["field"] == "width"
         assert d.post({"views": [{"width": 50, "height": 50}] * 4}, BATCH).status == 200
         counters = d.status()["counters"]

@@ -67,11 +67,11 @@ def test_what_is_not_documented_is_found():
         (("GET", "/", 200, {"X-Request-Id": "a b"}, index), "X-Request-Id"), (("GET", harness.VIEW + "?width=64", 200, image), ""),
         (("GET", harness.VIEW + "?poi=1,2,3", 200, image), ""), (("GET", harness.VIEW + "?poi=1,2", 200, image), "poi"),
         (("GET", harness.VIEW + "?width=0", 200, image), "width"),
-        (("GET", harness.VIEW + "?shade=1", 200, image), "'?shade'"),
+        (("GET", harness.VIEW + "?tint=1", 200, image), "'?tint'"),
         (("GET", harness.VIEW, 200, {**image, "Splatd-Camera": camera}), "Splatd-Camera"),
         (("POST", harness.VIEW, 200, image, b"", b'{"lod": 1}'), ""),
         (("POST", harness.VIEW, 200, image, b"", b'{"lod": "much"}'), "lod"),
-        (("POST", harness.VIEW, 200, image, b"", b'{"shade": 1}'), "shade"),
+        (("POST", harness.VIEW, 200, image, b"", b'{"tint": 1}'), "tint"),
     ]:
         fault = fault_of(*request)
         assert said in fault and bool(said) == bool(fault), (request, fault)
