@@ -591,7 +591,7 @@ static void the_command_line_names_what_is_wrong(void **state)
         {"courtyard -o x --format e57", "e57"},
         {"courtyard --output", "--help"},
     };
-    char output[4096], arguments[256], expected[256];
+    char output[16384], arguments[256], expected[256];
     if (!getenv("SPLATD_BINARY"))
         skip();
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
