@@ -294,6 +294,7 @@ static float middle_depth(const struct drawn *d, const float p[3], const float a
     const struct spl_camera *camera = d->plane->camera;
     float r[2] = {floorf(at[0]) + 0.5f - (float)camera->cx, floorf(at[1]) + 0.5f - (float)camera->cy};
     float tilt, there = meet(d, r, &tilt), reach = SPL_CELL_REACH * (1 / (float)camera->fx);
+    there = is_parallel(d->plane) ? there : d->offset / (d->n[0] * r[0] + d->n[1] * r[1] + d->n[2]); /* rounded once */
     float farthest = fmaxf(d->farthest, is_parallel(d->plane) ? p[2] + reach : p[2] * (1 + reach));
     return clamped(there > 0 ? there : p[2], d->nearest, farthest);
 }
