@@ -14,6 +14,7 @@
 #include <splatd/image.h>
 #include <splatd/method.h>
 #include <splatd/soft.h>
+#include <splatd/terms.h>
 
 SPL_BEGIN_DECLARATIONS
 
@@ -36,6 +37,7 @@ struct spl_view {
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
     enum spl_shapes shapes;     /* the same */
     struct spl_soft_params soft; /* what is soft, of every method */
+    struct spl_terms clip;      /* conditions, all of which hold for what is drawn, solid or soft; none: all is drawn */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

@@ -7,6 +7,7 @@
 #ifndef SPL_CAPSULE_GLSL
 #define SPL_CAPSULE_GLSL
 
+#include "common/cut.glsl"
 #include "common/piece.glsl"
 
 struct capsule {
@@ -132,6 +133,14 @@ float capsule_sample(capsule c, capsule_walk walk, out float z, out bool second)
     z = depth;
     second = !(way < c.middle);
     return distance;
+}
+
+/* The point of view space at depth z of the sample. */
+vec3 capsule_point(capsule c, capsule_walk walk, float z)
+{
+    precise vec2 uv = vec2(sample_of(c, walk)) + 0.5 - vec2(frame.cx, frame.cy);
+    precise vec3 p = vec3(uv.x * frame.inverse_fx, uv.y * frame.inverse_fy, 1.0) * z;
+    return p;
 }
 
 /* How far depth z is pushed back for blending: as a disc's of the half width that faces the eye. */

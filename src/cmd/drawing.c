@@ -96,6 +96,20 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
     return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
 }
 
+int spl_cmd_take_clip(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_terms_parse(text, "clip", &((struct spl_cmd_drawing *)drawing)->view.clip, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "clip", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_terms_parse_classes(text, &((struct spl_cmd_drawing *)drawing)->view.clip, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "class", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     return spl_cmd_parse_color(option, text, ((struct spl_cmd_drawing *)drawing)->view.background, err);
@@ -148,6 +162,16 @@ void spl_cmd_print_methods(FILE *out, size_t column)
             if ((info->params & ~SPL_PARAMS_OF_ALL) >> i & 1)
                 print_param(out, (enum spl_method_param)i, column);
     }
+}
+
+void spl_cmd_print_clip(FILE *out, size_t column)
+{
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --clip TERMS"), column,
+                          "what is drawn: 'z<2.5', 'z:1.2..1.3', 'box:x0,y0,z0,x1,y1,z1' (and degrees it is turned), "
+                          "'polygon:x,y,x,y,x,y' ('@0..2.5': its heights), 'plane:x,y,z,nx,ny,nz>0', 'intensity>0.2', any "
+                          "term of --soft; '!' before a term: what is not in it; ' or ' joins; of several --clip all hold");
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --class LIST"), column,
+                          "the classes that are drawn: 2,6 or 3-5; '!7': all others");
 }
 
 void spl_cmd_print_soft(FILE *out, size_t column)

@@ -35,6 +35,9 @@ int spl_cmd_take_format(void *drawing, const char *option, char *text, struct sp
 int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_error *err);
 void spl_cmd_print_soft(FILE *out, size_t column);
+int spl_cmd_take_clip(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl_error *err);
+void spl_cmd_print_clip(FILE *out, size_t column);
 void spl_cmd_print_methods(FILE *out, size_t column);
 
 #define SPL_CMD_PARAM_ROW(param, ...) {.name = #param, .form = "X", .take = spl_cmd_take_param},
@@ -46,6 +49,9 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
          .take = spl_cmd_take_background},                                                                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
+        {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \
+        {"clip", "TERMS", NULL, .take = spl_cmd_take_clip},                                                            \
+        {"class", "LIST", NULL, .take = spl_cmd_take_class},                                                           \
         {.help = "Soft transparency, with any method:", .print = spl_cmd_print_soft},                                  \
         {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
         {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \

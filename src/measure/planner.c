@@ -223,7 +223,7 @@ static struct standing assess(const struct spl_planner *planner, size_t index, c
     struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
     double spread = planner->spread;
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
-    if (demand->soft && demand->soft->count)
+    if (demand->soft && demand->soft->what.count)
         s.ms = spl_soft_costs_estimate(&planner->soft, demand->soft,
                                        work_of(&c->setting, demand->width, demand->height, demand->layer), s.ms,
                                        &spread);

@@ -9,7 +9,7 @@
 
 #include "gpu/gpu.h"
 
-enum { SPL_KERNEL_CONSTANTS = 4 };
+enum { SPL_KERNEL_CONSTANTS = 5 };
 
 struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */

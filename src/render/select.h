@@ -46,6 +46,7 @@ struct spl_select_params {
                                                                           NULL where maps is 0 */
     const struct spl_marks *marks; /* what is soft; NULL = nothing */
     bool draws_soft;               /* it is listed, too */
+    const struct spl_marks *clip;  /* what is drawn; NULL = all */
     void *context;
 };
 enum { SPL_MAP_TRIMS = 1, SPL_MAP_COLORS = 2 };

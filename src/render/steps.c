@@ -165,6 +165,8 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc)
         rc = spl_marks_init(&steps->job.marks, &view->soft, dataset, err);
     if (!rc)
+        rc = spl_marks_init_clip(&steps->job.clip, &view->clip, dataset, err);
+    if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);

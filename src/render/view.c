@@ -68,7 +68,8 @@ static int check(const struct spl_view *view, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
-    return rc ? rc : spl_soft_check(&view->soft, err);
+    rc = rc ? rc : spl_soft_check(&view->soft, err);
+    return rc ? rc : spl_terms_check(&view->clip, "clip", err);
 }
 
 static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
@@ -91,7 +92,7 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
                               "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
-    return spl_marks_resolve(&view->soft, info, NULL, err);
+    return spl_marks_check_view(view, info, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)

@@ -257,7 +257,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 static bool is_soft(const struct scene *s, uint64_t id, const float p[3])
 {
     double world[3];
-    if (!s->view->soft.count)
+    if (!s->view->soft.what.count)
         return false;
     for (int a = 0; a < 3; a++) {
         world[a] = s->camera.eye[a];

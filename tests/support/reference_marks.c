@@ -9,10 +9,10 @@
 #include "dataset/dataset.h"
 #include "shared.h"
 
-double reference_distance(const struct spl_soft_term *term, const double p[3])
+double reference_distance(const struct spl_term *term, const double p[3])
 {
     const double *s = term->shape;
-    if (term->measure == SPL_SOFT_BOX) {
+    if (term->measure == SPL_TERM_BOX) {
         double outside = 0, inside = INFINITY;
         for (int i = 0; i < 3; i++) {
             double beyond = fmax(s[i] - p[i], p[i] - s[i + 3]);
@@ -24,7 +24,7 @@ double reference_distance(const struct spl_soft_term *term, const double p[3])
     double length = sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5]), along = 0, square = 0;
     for (int i = 0; i < 3; i++)
         along += (p[i] - s[i]) * s[i + 3] / length;
-    if (term->measure == SPL_SOFT_PLANE)
+    if (term->measure == SPL_TERM_PLANE)
         return along;
     for (int i = 0; i < 3; i++) {
         double off = p[i] - s[i] - along * s[i + 3] / length;
@@ -33,7 +33,7 @@ double reference_distance(const struct spl_soft_term *term, const double p[3])
     return sqrt(square);
 }
 
-double reference_share(const struct spl_soft_term *term, double blend, double value)
+double reference_share(const struct spl_term *term, double blend, double value)
 {
     const double least = term->least, most = term->most;
     bool above = term->with_least ? value >= least : value > least;
@@ -52,14 +52,14 @@ bool reference_is_soft(const struct spl_dataset *dataset, const struct spl_soft_
                        const double p[3])
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    for (uint32_t t = 0; t < soft->count; t++) {
-        struct spl_soft_term term = soft->terms[t];
+    for (uint32_t t = 0; t < soft->what.count; t++) {
+        struct spl_term term = soft->what.terms[t];
         double value = NAN;
-        if (term.measure >= SPL_SOFT_AXIS) {
+        if (term.measure >= SPL_TERM_AXIS) {
             value = reference_distance(&term, p);
         } else {
             int stream = spl_dataset_find_stream(dataset, term.name);
-            spl_assert(stream >= 0 && term.measure == SPL_SOFT_ATTRIBUTE);
+            spl_assert(stream >= 0 && term.measure == SPL_TERM_ATTRIBUTE);
             if (!strcmp(term.name, "uncertainty")) {
                 const struct spl_stream_values *values = spl_dataset_info_get_values(info, (uint32_t)stream);
                 spl_assert(values);

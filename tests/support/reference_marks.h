@@ -11,11 +11,11 @@
 #include <splatd/soft.h>
 
 /* The distance that a term of a shape measures at `p`, world. */
-double reference_distance(const struct spl_soft_term *term, const double p[3]);
+double reference_distance(const struct spl_term *term, const double p[3]);
 
 /* W of eq. 22 of what measures `value` in a term whose range is blended over `blend`: 0 to 1; negative where it is not
  * soft. NaN is no value. */
-double reference_share(const struct spl_soft_term *term, double blend, double value);
+double reference_share(const struct spl_term *term, double blend, double value);
 
 /* Is splat, panel or mesh `id`, at `p`, soft? Opens no quantiles: of terms by value alone, `p99` that of uncertainty. */
 bool reference_is_soft(const struct spl_dataset *dataset, const struct spl_soft_params *soft, uint64_t id,

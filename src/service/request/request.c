@@ -164,7 +164,8 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
     int rc;
     if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_soft(values, defaults, &out->view, err)) || (rc = resolve_encoding(values, out, err)) ||
+        (rc = spl_values_resolve_terms(values, defaults, &out->view, err)) ||
+        (rc = resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
