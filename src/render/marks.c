@@ -147,9 +147,9 @@ enum spl_marks_verdict spl_marks_judge_term(const struct spl_marks *marks, uint3
                                             uint32_t test[SPL_TEST_WORDS])
 {
     const struct spl_marks_term *term = &marks->terms[index];
-    const struct spl_chunk *chunk = &tables->chunks[chunk_index];
     if (term->stream < 0)
         return spl_marks_judge_shape(marks, index, view, box, test);
+    const struct spl_chunk *chunk = &tables->chunks[chunk_index];
     const uint32_t s = (uint32_t)term->stream;
     const struct spl_stream_code code = {tables->base[s][chunk_index], tables->width[s][chunk_index]};
     enum spl_stream_type type = spl_stream_type_from_name(marks->streams[s].type);

@@ -33,7 +33,7 @@ static bool check_polygon(const struct spl_term *term, const double *corners, ch
     const double low = term->shape[0], high = term->shape[1];
     if (term->corners > SPL_TERMS_CORNERS_MAX || term->first_corner > SPL_TERMS_CORNERS_MAX - term->corners)
         return say(fault, "has corners that are not there");
-    if (isinf(low) != isinf(high))
+    if (!isinf(low) != !isinf(high))
         return say(fault, "has a polygon with one height");
     if (!(low < high)) {
         snprintf(fault, SPL_TERM_FAULT_MAX, "has a polygon that ends at height %.9g, not above %.9g", high, low);

@@ -20,6 +20,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     int rc = spl_soft_parse(text, &soft, &err);
     if (rc ? err.code != rc || !err.message[0] || strcmp(err.field, "soft") || soft.what.count : err.code || !soft.what.count)
         abort();
+    struct spl_terms clip, same;
+    struct spl_error why = {0};
+    memset(&clip, 0, sizeof clip);
+    memset(&same, 0, sizeof same);
+    if (!spl_terms_parse(text, "clip", &clip, &why)) {
+        int bytes = spl_terms_print(&clip, printed, sizeof printed);
+        if (!clip.count || bytes <= 0 || bytes > SPL_TERMS_TEXT_MAX || spl_terms_parse(printed, "clip", &same, NULL) ||
+            memcmp(&clip, &same, sizeof clip) != 0)
+            abort();
+    } else if (strcmp(why.field, "clip") || clip.count)
+        abort();
     if (rc)
         return 0;
     int length = spl_soft_print(&soft, printed, sizeof printed);

@@ -145,6 +145,8 @@ static struct spl_view make_view(const struct golden *golden)
     view.maps = golden->maps ? SPL_MAPS_ON : SPL_MAPS_OFF;
     if (golden->soft && spl_soft_parse(golden->soft, &view.soft, NULL))
         abort();
+    if (golden->clip && spl_terms_parse(golden->clip, "clip", &view.clip, NULL))
+        abort();
     view.soft.model = golden->model;
     view.soft.opacity = golden->opacity;
     view.soft.blend = golden->blend;

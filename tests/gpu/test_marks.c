@@ -81,11 +81,11 @@ static void attributes_filter(void **state)
         struct spl_dataset *dataset = mixed(3000, levels);
         struct spl_view view = looking(origin, 3.2, 160, 120);
         view.lod = levels == 1 ? 0 : 1;
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}}};
         same_by_all(dataset, &view, "classes 2, 3 and 7");
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {uncertain(0.4, INFINITY)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {uncertain(0.4, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty above 0.4");
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty from 0.1 to 0.3, or class from 5");
         done(dataset);
     }
@@ -98,7 +98,7 @@ static void shapes_filter(void **state)
     struct spl_view view = looking(origin, 3.2, 160, 120);
     view.lod = 0;
     for (int measure = SPL_TERM_AXIS; measure <= SPL_TERM_BOX; measure++) {
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {shape_of((enum spl_term_measure)measure, origin)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of((enum spl_term_measure)measure, origin)}}};
         same_by_all(dataset, &view, measure == SPL_TERM_AXIS ? "axis" : measure == SPL_TERM_PLANE ? "plane" : "box");
         view.soft.what.terms[view.soft.what.count++] = class_of(0, 1);
         same_by_all(dataset, &view, "a shape or classes");
@@ -115,7 +115,7 @@ static void cells_are_cut(void **state)
         struct spl_view view = looking(origin, 3, 160, 120);
         view.lod = 0;
         view.shapes = SPL_SHAPES_OFF;
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {shape_of(SPL_TERM_PLANE, origin)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of(SPL_TERM_PLANE, origin)}}};
         same_by_all(dataset, &view, relief ? "meshes" : "panels");
         view.shapes = SPL_SHAPES_ALL;
         view.soft.what.terms[0] = class_of(1, 1); /* some of a chunk, as such */
@@ -153,7 +153,7 @@ static void panels_end_where_they_are_cut(void **state)
         view.method = methods[i % 2];
         const struct spl_term cut = shape_of(SPL_TERM_PLANE, origin); /* soft below 0 */
         for (int soft = 0; soft < 2; soft++) {
-            view.soft = (struct spl_soft_params){.count = (uint32_t)soft, .terms = {cut}};
+            view.soft = (struct spl_soft_params){.what = {.count = (uint32_t)soft, .terms = {cut}}};
             struct spl_frame frame = render(dataset, &view);
             const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
             for (uint32_t p = 0; p < 160 * 120; p++) {
@@ -207,7 +207,7 @@ static void mapped_splats_filter(void **state)
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
         struct spl_view view = looking(origin, 3.2, 160, 120);
         view.lod = 0;
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}}};
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             view.method = (enum spl_method)method;
             if (spl_method_get_params(view.method) & SPL_PARAM_BIT(maps))
@@ -236,7 +236,7 @@ static void textured_splats_filter(void **state)
         view.lod = 0;
         view.layers = 1u << SPL_LAYER_COLOR;
         view.disc.atoms = 8;
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(1, 2)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(1, 2)}}};
         struct spl_frame gpu = render(dataset, &view), cpu;
         assert_int_equal(reference_render(dataset, &view, &cpu, NULL), SPL_OK);
         const uint8_t *a = gpu.images[SPL_LAYER_COLOR].pixels, *b = cpu.images[SPL_LAYER_COLOR].pixels;
@@ -278,7 +278,7 @@ static void lines_give_way(void **state)
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     struct spl_view lined = looking(origin, 3, 160, 120), plain = lined, without;
     lined.lod = plain.lod = 0;
-    lined.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(1, 1)}};
+    lined.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(1, 1)}}};
     without = lined;
     without.shapes = SPL_SHAPES_OFF;
     equal_frames(dataset, &lined, &without);
@@ -298,12 +298,12 @@ static void nothing_and_everything(void **state)
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             plain.method = (enum spl_method)method;
             struct spl_view soft = plain, all = plain;
-            soft.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(200, 255)}};
+            soft.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(200, 255)}}};
             equal_frames(i ? panels : dataset, &plain, &soft);
             soft.soft.what.terms[0] = shape_of(SPL_TERM_BOX, (const double[3]){50, 50, 50}); /* far away */
             equal_frames(i ? panels : dataset, &plain, &soft);
-            soft.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(0, 255)}};
-            all.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}; /* by marks */
+            soft.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(0, 255)}}};
+            all.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}}; /* by marks */
             equal_frames(i ? panels : dataset, &soft, &all);
             struct spl_frame frame = render(i ? panels : dataset, &all);
             const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
