@@ -328,10 +328,9 @@ struct spl_draw_chunk {
 #define SPL_SHAPE_WITH_MOST 8u
 
 /* Shapes that samples are asked of: words of the tests, from frame.fill_from on: how many, and of each where it lies and
- * the flags of a test. Kernels are made for the kinds of them that there are: planes and coordinates; boxes and axes. */
+ * the flags of a test. Kernels are made for planes and coordinates alone, and for all. */
 #define SPL_CUT_PLANES 1u
-#define SPL_CUT_BODIES 2u
-#define SPL_CUT_POLYGONS 4u
+#define SPL_CUT_BODIES 2u /* these too */
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */

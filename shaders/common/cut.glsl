@@ -13,13 +13,13 @@ bool is_kept(vec3 p, uint known)
 {
     if (CUT == 0u)
         return true;
-    bool bodies = (CUT & SPL_CUT_BODIES) != 0u, polygons = (CUT & SPL_CUT_POLYGONS) != 0u;
+    bool bodies = (CUT & SPL_CUT_BODIES) != 0u;
     uint at = frame.fill_from, count = test_word(at);
     term_fold f = begin_fold();
     for (uint t = 0u; t < count; t++) {
         uint shape = test_word(at + 1u + 2u * t), flags = test_word(shape + 19u);
         uint joint = test_word(at + 2u + 2u * t), bit = joint >> SPL_TEST_BIT & 15u;
-        bool holds = is_within(shape, flags, distance_to(shape, flags & 3u, p, bodies, polygons));
+        bool holds = is_within(shape, flags, distance_to(shape, flags & 3u, p, bodies, bodies));
         fold_test(f, joint & ~(15u << SPL_TEST_BIT), holds, (known << 1u >> bit & 1u) != 0u && bit != 0u);
     }
     end_condition(f);

@@ -159,8 +159,8 @@ uint32_t spl_clip_get_kinds(const struct spl_marks *clip, uint32_t cut)
     uint32_t kinds = 0;
     for (uint32_t t = 0; t < clip->count; t++)
         if (cut >> t & 1)
-            kinds |= clip->terms[t].measure == SPL_TERM_POLYGON                                       ? SPL_CUT_POLYGONS
-                     : clip->terms[t].measure == SPL_TERM_BOX || clip->terms[t].measure == SPL_TERM_AXIS ? SPL_CUT_BODIES
-                                                                                                      : SPL_CUT_PLANES;
+            kinds |= clip->terms[t].measure == SPL_TERM_PLANE || clip->terms[t].measure == SPL_TERM_COORDINATE
+                         ? SPL_CUT_PLANES
+                         : SPL_CUT_PLANES | SPL_CUT_BODIES;
     return kinds;
 }

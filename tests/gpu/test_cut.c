@@ -43,7 +43,7 @@ static struct spl_terms terms_of(const char *field, const char *text)
 }
 
 static const char *const shapes[] = {
-    "z<%Z+1",
+    "z<%Z+1 and x:%X-4..%X+5",
     "!z:%Z-2..%Z+2",
     "box:%X-4,%Y-3,%Z-4,%X+4,%Y+2,%Z+3,30",
     "!box:%X-2,%Y-3,%Z-2,%X+3,%Y+2,%Z+1,20,-35,70",
@@ -52,15 +52,18 @@ static const char *const shapes[] = {
     "plane:%X,%Y,%Z,1,-0.4,0.5>0 and plane:%X,%Y,%Z+1,0.3,0.2,1<=0",
 };
 
-static void same_by_all(const struct spl_dataset *dataset, struct spl_view *view, const char *what)
+static void same_by_both(const struct spl_dataset *dataset, struct spl_view *view, const char *what)
 {
     char text[200];
+    static int turn;
     view->fill.kernel = 9; /* of what is left points lie as far apart as of all */
-    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
-        view->method = (enum spl_method)method;
+    for (int i = 0; i < 2; i++) { /* splat or nearest, which are cut, and points or fill */
+        view->method = i ? turn % 4 < 2 ? SPL_METHOD_POINTS : SPL_METHOD_FILL
+                         : turn % 2 ? SPL_METHOD_SPLAT : SPL_METHOD_NEAREST;
         snprintf(text, sizeof text, "%s, method %s, lod %g", what, spl_method_name(view->method), view->lod);
         same_images(dataset, view, text);
     }
+    turn++;
 }
 
 static struct spl_dataset *mixed(size_t count, int levels, double radius)
@@ -77,12 +80,12 @@ static struct spl_dataset *mixed(size_t count, int levels, double radius)
 static void discs_are_cut(void **state)
 {
     (void)state;
-    struct spl_dataset *dataset = mixed(1500, 1, 0.08);
-    struct spl_view view = looking(origin, 3.2, 120, 90);
+    struct spl_dataset *dataset = mixed(800, 1, 0.08);
+    struct spl_view view = looking(origin, 3.2, 96, 72);
     view.lod = 0;
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         view.clip = terms_of("clip", shapes[i]);
-        same_by_all(dataset, &view, shapes[i]);
+        same_by_both(dataset, &view, shapes[i]);
     }
     done(dataset);
 }
@@ -98,17 +101,17 @@ static void attributes_and_shapes_combine(void **state)
         "class:0-3 or x<%X+1 and class:3-6 or !y<%Y-1 and z:%Z-4..%Z+4",
         "!class:2,4 or plane:%X,%Y,%Z,1,1,1>0",
     };
-    struct spl_dataset *dataset = mixed(1500, 2, 0.06);
-    struct spl_view view = looking(origin, 3.2, 120, 90);
+    struct spl_dataset *dataset = mixed(800, 2, 0.06);
+    struct spl_view view = looking(origin, 3.2, 96, 72);
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         view.lod = i % 2 ? 0 : 1;
         view.clip = terms_of("clip", texts[i]);
-        same_by_all(dataset, &view, texts[i]);
+        same_by_both(dataset, &view, texts[i]);
     }
     view.soft = (struct spl_soft_params){.what = terms_of("soft", "class:4-5 or !box:%X-4,%Y-4,%Z-4,%X+4,%Y+4,%Z+4"),
                                          .cover = 1}; /* not drawn */
     view.clip = terms_of("clip", "class:2-6 or z<%Z and !axis:%X,%Y,%Z,0,0,1<0.2");
-    same_by_all(dataset, &view, "soft and clip");
+    same_by_both(dataset, &view, "soft and clip");
     done(dataset);
 }
 
@@ -117,16 +120,16 @@ static void panels_and_meshes_are_cut(void **state)
     (void)state;
     for (int relief = 0; relief < 2; relief++) {
         struct spl_dataset *dataset = random_panels(4, 200, origin, 0.012, relief ? 3 : 0);
-        struct spl_view view = looking(origin, 3, 120, 90);
+        struct spl_view view = looking(origin, 3, 96, 72);
         view.lod = 0;
         for (size_t i = relief; i < sizeof shapes / sizeof *shapes; i += 2) {
             view.clip = terms_of("clip", shapes[i]);
             view.shapes = i % 4 < 2 ? SPL_SHAPES_ALL : SPL_SHAPES_OFF;
-            same_by_all(dataset, &view, relief ? "meshes" : "panels");
+            same_by_both(dataset, &view, relief ? "meshes" : "panels");
         }
         view.shapes = SPL_SHAPES_ALL;
         view.clip = terms_of("clip", "class:1 or z<%Z and y<%Y+3");
-        same_by_all(dataset, &view, relief ? "class of meshes, or a plane" : "class of panels, or a plane");
+        same_by_both(dataset, &view, relief ? "class of meshes, or a plane" : "class of panels, or a plane");
         done(dataset);
     }
 }
@@ -145,7 +148,7 @@ static void lines_are_cut(void **state)
     struct spl_dataset *dataset = make_dataset(all, discs + vertices);
     free(all);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-    struct spl_view view = looking(origin, 3, 120, 90);
+    struct spl_view view = looking(origin, 3, 96, 72);
     view.lod = 0;
     view.clip = terms_of("clip", "plane:%X,%Y,%Z,1,1,1>0");
     view.method = SPL_METHOD_SPLAT;
@@ -201,8 +204,8 @@ static void cuts_are_exact(void **state)
 static void soft_spheres_are_dropped(void **state)
 {
     (void)state;
-    struct spl_dataset *dataset = mixed(1500, 1, 0.04);
-    struct spl_view view = looking(origin, 3.2, 120, 90);
+    struct spl_dataset *dataset = mixed(800, 1, 0.04);
+    struct spl_view view = looking(origin, 3.2, 96, 72);
     view.lod = 0;
     view.soft = (struct spl_soft_params){.what = terms_of("soft", "class:0-5"), .opacity = 0.3, .cover = 1};
     view.clip = terms_of("clip", "class:3-7"); /* 3 to 5 soft, 6 and 7 solid */
@@ -214,13 +217,13 @@ static void soft_spheres_are_dropped(void **state)
     all.clip = terms_of("clip", "class:0-7 and !class:9 and z<%Z+99 and x>%X-99");
     const struct spl_view *const pairs[2][2] = {{&view, &other}, {&plain, &all}};
     struct spl_frame first = render(dataset, &view), whole = render(dataset, &plain);
-    assert_memory_not_equal(first.images[SPL_LAYER_COLOR].pixels, whole.images[SPL_LAYER_COLOR].pixels, 120 * 90 * 4);
+    assert_memory_not_equal(first.images[SPL_LAYER_COLOR].pixels, whole.images[SPL_LAYER_COLOR].pixels, 96 * 72 * 4);
     assert_true(first.stats.soft_drawn > 0 && first.stats.soft_drawn < whole.stats.soft_drawn);
     spl_frame_finish(&first);
     spl_frame_finish(&whole);
     for (int i = 0; i < 2; i++) {
         struct spl_frame one = render(dataset, pairs[i][0]), same = render(dataset, pairs[i][1]);
-        assert_memory_equal(one.images[SPL_LAYER_COLOR].pixels, same.images[SPL_LAYER_COLOR].pixels, 120 * 90 * 4);
+        assert_memory_equal(one.images[SPL_LAYER_COLOR].pixels, same.images[SPL_LAYER_COLOR].pixels, 96 * 72 * 4);
         spl_frame_finish(&one);
         spl_frame_finish(&same);
     }

@@ -313,7 +313,7 @@ static void draw_fragment(void *context, const struct reference_fragment *from)
     memcpy(d.color, sums(s) ? from->smooth : from->color, sizeof d.color);
     float p[3];
     view_point(s, from->x, from->y, from->z, p);
-    if (is_dropped(s, from->id, p))
+    if (is_dropped(s, from->id, from->middle ? from->middle : p))
         return;
     if (!(sums(s) && panels->shade) && panels->trims && reference_map_trims(panels->trims, p, d.n, radius))
         return;
