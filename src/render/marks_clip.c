@@ -2,8 +2,8 @@
  * holds, any of which makes it hold (splatd/terms.h). What a chunk's header and its box decide is decided here; what is
  * left becomes tests of each splat, and of shapes that cut its discs and panels a few words for each sample.
  *
- * Discs and panels are cut by asking where a sample lies. So of a condition that has attributes and shapes, both open, a
- * splat's mark has a bit that says whether its attributes make it hold (shared.h). Pure functions; any thread. */
+ * Discs and panels are cut by asking where a sample lies. So of a condition that has attributes and shapes, both open,
+ * a splat's mark has a bit that says whether its attributes make it hold (shared.h). Pure functions; any thread. */
 #include <string.h>
 
 #include "render/marks.h"
@@ -12,14 +12,15 @@
 struct condition {
     uint32_t first, end;
     enum spl_marks_verdict of[SPL_TERMS_MAX]; /* by term */
-    enum spl_marks_verdict values; /* what its attributes say of it */
+    enum spl_marks_verdict values;            /* what its attributes say of it */
     bool open_values, open_shapes;
 };
 
 static uint32_t end_of(const struct spl_marks *clip, uint32_t first, bool of_list)
 {
     uint32_t end = first + 1;
-    while (end < clip->count && (of_list ? clip->terms[end].joint == SPL_TERM_ITEM : clip->terms[end].joint != SPL_TERM_AND))
+    while (end < clip->count &&
+           (of_list ? clip->terms[end].joint == SPL_TERM_ITEM : clip->terms[end].joint != SPL_TERM_AND))
         end++;
     return end;
 }
@@ -32,7 +33,9 @@ static enum spl_marks_verdict fold(const struct spl_marks *clip, struct conditio
         verdict = c->of[t] > verdict ? c->of[t] : verdict;
     verdict = verdict == SPL_VERDICT_BLENDED ? SPL_VERDICT_ALL : verdict;
     if (clip->terms[first].outside)
-        verdict = verdict == SPL_VERDICT_NONE ? SPL_VERDICT_ALL : verdict == SPL_VERDICT_ALL ? SPL_VERDICT_NONE : verdict;
+        verdict = verdict == SPL_VERDICT_NONE  ? SPL_VERDICT_ALL
+                  : verdict == SPL_VERDICT_ALL ? SPL_VERDICT_NONE
+                                               : verdict;
     for (uint32_t t = first; t < end && verdict != SPL_VERDICT_SOME; t++)
         c->of[t] = SPL_VERDICT_NONE;
     return verdict;
@@ -61,8 +64,8 @@ static uint32_t flags_of(const struct spl_marks *clip, uint32_t t, uint32_t befo
 {
     bool of_list = false; /* the one before is an item of the same */
     for (uint32_t i = before + 1; !first && i <= t; i++)
-        of_list = i == before + 1 ? clip->terms[i].joint == SPL_TERM_ITEM
-                                  : of_list && clip->terms[i].joint == SPL_TERM_ITEM;
+        of_list =
+            i == before + 1 ? clip->terms[i].joint == SPL_TERM_ITEM : of_list && clip->terms[i].joint == SPL_TERM_ITEM;
     return (first ? SPL_TEST_AND : of_list ? 0 : SPL_TEST_OR) | (clip->terms[t].outside ? SPL_TEST_OUTSIDE : 0);
 }
 
@@ -144,8 +147,7 @@ uint32_t spl_clip_write_cut(const struct spl_marks *clip, const struct spl_marks
             if (!(cut >> t & 1))
                 continue;
             words[1 + 2 * count] = view->shapes[t].word;
-            words[2 + 2 * count++] =
-                flags_of(clip, t, before, begins) | clip->terms[t].mixed << SPL_TEST_BIT;
+            words[2 + 2 * count++] = flags_of(clip, t, before, begins) | clip->terms[t].mixed << SPL_TEST_BIT;
             before = t;
             begins = false;
         }

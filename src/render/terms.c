@@ -22,7 +22,8 @@ static bool check_box(const double s[9], char fault[SPL_TERM_FAULT_MAX])
         }
     for (int i = 6; i < 9; i++)
         if (!(fabs(s[i]) <= 360)) {
-            snprintf(fault, SPL_TERM_FAULT_MAX, "has a box that is turned by %.9g degrees, not within -360 and 360", s[i]);
+            snprintf(fault, SPL_TERM_FAULT_MAX, "has a box that is turned by %.9g degrees, not within -360 and 360",
+                     s[i]);
             return false;
         }
     return true;
@@ -108,8 +109,10 @@ static int check_clip(const struct spl_terms *terms, struct spl_error *err)
         mixed += attributes && shapes;
     }
     if (mixed > SPL_TERMS_MIXED_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "clip", "%u conditions have both attributes and shapes, of which there may "
-                              "be %d", mixed, SPL_TERMS_MIXED_MAX);
+        return spl_fail_field(err, SPL_E_USAGE, "clip",
+                              "%u conditions have both attributes and shapes, of which there may "
+                              "be %d",
+                              mixed, SPL_TERMS_MIXED_MAX);
     return SPL_OK;
 }
 

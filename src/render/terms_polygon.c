@@ -1,6 +1,6 @@
-/* Polygons in plan: which are refused, and how far a point is from one. A polygon may turn either way around; a side of no
- * length, and sides that touch or cross others, are refused, so that inside is where a line to infinity crosses an odd
- * number of sides. Pure functions; any thread. */
+/* Polygons in plan: which are refused, and how far a point is from one. A polygon may turn either way around; a side of
+ * no length, and sides that touch or cross others, are refused, so that inside is where a line to infinity crosses an
+ * odd number of sides. Pure functions; any thread. */
 #include <math.h>
 #include <stdio.h>
 
@@ -55,7 +55,8 @@ bool spl_polygon_check(const double *corners, uint32_t count, char fault[SPL_TER
             if (i == 0 && j == count - 1)
                 continue;
             if (meet(corners + 2 * i, corners + 2 * (i + 1), corners + 2 * j, corners + 2 * ((j + 1) % count))) {
-                snprintf(fault, SPL_TERM_FAULT_MAX, "has a polygon whose sides from corners %u and %u meet", i + 1, j + 1);
+                snprintf(fault, SPL_TERM_FAULT_MAX, "has a polygon whose sides from corners %u and %u meet", i + 1,
+                         j + 1);
                 return false;
             }
         }
@@ -69,8 +70,7 @@ double spl_polygon_distance(const double *corners, uint32_t count, const double 
     for (uint32_t i = 0; i < count; i++) {
         const double *a = corners + 2 * i, *b = corners + 2 * ((i + 1) % count);
         const double way[2] = {b[0] - a[0], b[1] - a[1]}, off[2] = {p[0] - a[0], p[1] - a[1]};
-        const double t =
-            fmin(fmax((off[0] * way[0] + off[1] * way[1]) / (way[0] * way[0] + way[1] * way[1]), 0), 1);
+        const double t = fmin(fmax((off[0] * way[0] + off[1] * way[1]) / (way[0] * way[0] + way[1] * way[1]), 0), 1);
         least = fmin(least, hypot(off[0] - t * way[0], off[1] - t * way[1]));
         const bool above = off[1] < 0, ends_above = p[1] - b[1] < 0;
         const double side = way[0] * off[1] - way[1] * off[0];

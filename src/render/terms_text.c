@@ -1,9 +1,9 @@
 /* Terms as people write them, and back (splatd/terms.h has the syntax).
  *
- * Read from left to right in one pass, one term after the other: '!', ends, what is measured, ends. A list (class:3-5,9)
- * becomes a term for each of its items. Invariant: what is handed out has passed spl_term_check() and is zeroed where it
- * says nothing, so that equal terms have equal bytes; what is printed reads as the same terms. Bounded by
- * SPL_TERMS_TEXT_MAX; nothing is allocated. Pure functions, any thread. */
+ * Read from left to right in one pass, one term after the other: '!', ends, what is measured, ends. A list
+ * (class:3-5,9) becomes a term for each of its items. Invariant: what is handed out has passed spl_term_check() and is
+ * zeroed where it says nothing, so that equal terms have equal bytes; what is printed reads as the same terms. Bounded
+ * by SPL_TERMS_TEXT_MAX; nothing is allocated. Pure functions, any thread. */
 #include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
@@ -150,8 +150,9 @@ static int read_polygon(struct reader *r, struct spl_term *term, struct spl_term
     if (!read_number(r, &term->shape[0]) || strncmp(r->at, "..", 2))
         return fail(r, "heights are two numbers with dots between them; write %s", shapes[SPL_TERM_POLYGON].example);
     r->at += 2;
-    return read_number(r, &term->shape[1]) ? 0 : fail(r, "the upper height is missing; write %s",
-                                                      shapes[SPL_TERM_POLYGON].example);
+    return read_number(r, &term->shape[1])
+               ? 0
+               : fail(r, "the upper height is missing; write %s", shapes[SPL_TERM_POLYGON].example);
 }
 
 static int read_shape(struct reader *r, struct spl_term *term, struct spl_terms *out)
@@ -471,8 +472,8 @@ static void put_item(struct writer *w, const struct spl_term *term, const char *
 static void put_term(struct writer *w, const struct spl_term *term, const double *corners)
 {
     const char *share = term->measure == SPL_TERM_QUANTILE ? "q" : "";
-    bool low = isfinite(term->least), high = isfinite(term->most), list = low && high && term->with_least &&
-                                                                         term->with_most;
+    bool low = isfinite(term->least), high = isfinite(term->most),
+         list = low && high && term->with_least && term->with_most;
     put(w, term->outside ? "!" : "");
     if (low && high && !list) {
         put(w, "%s", share);

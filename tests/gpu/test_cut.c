@@ -1,6 +1,6 @@
-/* What a view's clip leaves: against the plain C reference, which asks every sample of discs, panels and meshes where it
- * lies, and every point. By every method; conditions of attributes, shapes, both; with what is soft; samples end at a
- * plane, to a millimetre. One body for every backend. */
+/* What a view's clip leaves: against the plain C reference, which asks every sample of discs, panels and meshes where
+ * it lies, and every point. By every method; conditions of attributes, shapes, both; with what is soft; samples end at
+ * a plane, to a millimetre. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -56,10 +56,11 @@ static void same_by_both(const struct spl_dataset *dataset, struct spl_view *vie
 {
     char text[200];
     static int turn;
-    view->fill.kernel = 9; /* of what is left points lie as far apart as of all */
+    view->fill.kernel = 9;        /* of what is left points lie as far apart as of all */
     for (int i = 0; i < 2; i++) { /* splat or nearest, which are cut, and points or fill */
-        view->method = i ? turn % 4 < 2 ? SPL_METHOD_POINTS : SPL_METHOD_FILL
-                         : turn % 2 ? SPL_METHOD_SPLAT : SPL_METHOD_NEAREST;
+        view->method = i          ? turn % 4 < 2 ? SPL_METHOD_POINTS : SPL_METHOD_FILL
+                       : turn % 2 ? SPL_METHOD_SPLAT
+                                  : SPL_METHOD_NEAREST;
         snprintf(text, sizeof text, "%s, method %s, lod %g", what, spl_method_name(view->method), view->lod);
         same_images(dataset, view, text);
     }
@@ -164,8 +165,7 @@ static void cuts_are_exact(void **state)
     (void)state;
     size_t within = 0, beyond = 0, off = 0;
     for (int kind = 0; kind < 3; kind++) {
-        struct spl_dataset *dataset =
-            kind ? random_panels(4, 0, origin, 0.03, kind == 2 ? 3 : 0) : mixed(400, 1, 0.3);
+        struct spl_dataset *dataset = kind ? random_panels(4, 0, origin, 0.03, kind == 2 ? 3 : 0) : mixed(400, 1, 0.3);
         struct spl_view view = looking(origin, 10, 160, 120);
         view.lod = 0;
         view.method = SPL_METHOD_NEAREST;
@@ -233,9 +233,12 @@ static void soft_spheres_are_dropped(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        frames_test(discs_are_cut),   frames_test(attributes_and_shapes_combine),
-        frames_test(panels_and_meshes_are_cut), frames_test(lines_are_cut),
-        frames_test(cuts_are_exact),  frames_test(soft_spheres_are_dropped),
+        frames_test(discs_are_cut),
+        frames_test(attributes_and_shapes_combine),
+        frames_test(panels_and_meshes_are_cut),
+        frames_test(lines_are_cut),
+        frames_test(cuts_are_exact),
+        frames_test(soft_spheres_are_dropped),
     };
     return frames_run(argc, argv, "cut", tests, sizeof tests / sizeof *tests);
 }

@@ -61,9 +61,9 @@ int spl_values_add_terms_json(struct values *values, int param, const json_t *js
     values->v[param].given = true;
     for (size_t i = 0; !rc && i < json_array_size(json); i++) {
         const json_t *term = json_array_get(json, i);
-        rc = json_is_string(term) ? spl_values_add_terms(values, param, json_string_value(term), err)
-                                  : spl_fail_field(err, SPL_E_INPUT, name, "%s must hold text, not %s", name,
-                                                   spl_json_type_name(term));
+        rc = json_is_string(term)
+                 ? spl_values_add_terms(values, param, json_string_value(term), err)
+                 : spl_fail_field(err, SPL_E_INPUT, name, "%s must hold text, not %s", name, spl_json_type_name(term));
     }
     return rc;
 }
@@ -107,9 +107,11 @@ int spl_terms_to_world(struct spl_terms *terms, const char *field, uint32_t crs,
     for (uint32_t i = 0; !rc && i < terms->count; i++) {
         struct spl_term *term = &terms->terms[i];
         if (term->measure == SPL_TERM_BOX || term->measure == SPL_TERM_COORDINATE)
-            rc = spl_fail_field(err, SPL_E_INPUT, field,
-                                "a box, x, y and z are of the dataset's own axes and cannot be given in EPSG:%u; ask for "
-                                "the view without crs, in the dataset's coordinates", crs);
+            rc = spl_fail_field(
+                err, SPL_E_INPUT, field,
+                "a box, x, y and z are of the dataset's own axes and cannot be given in EPSG:%u; ask for "
+                "the view without crs, in the dataset's coordinates",
+                crs);
         else if (term->measure == SPL_TERM_POLYGON)
             rc = polygon_to_world(terms, term, crs, field, places, err);
         else if (term->measure >= SPL_TERM_AXIS)
@@ -123,7 +125,8 @@ static int join_clips(const struct values *values, struct spl_terms *out, struct
 {
     *out = values->clip;
     if (out->count + values->classes.count > SPL_TERMS_MAX)
-        return spl_fail_field(err, SPL_E_INPUT, "class", "clip and class have more than %d terms together", SPL_TERMS_MAX);
+        return spl_fail_field(err, SPL_E_INPUT, "class", "clip and class have more than %d terms together",
+                              SPL_TERMS_MAX);
     for (uint32_t i = 0; i < values->classes.count; i++)
         out->terms[out->count++] = values->classes.terms[i];
     return 0;

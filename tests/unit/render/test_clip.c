@@ -1,6 +1,6 @@
-/* Clips against boxes, by brute force: what is said of a box holds of each of its points, and what is left open is decided
- * for each point by the words that kernels get, as a plain evaluator in doubles decides it. Random conditions of shapes of
- * every kind; polygons; what is refused. */
+/* Clips against boxes, by brute force: what is said of a box holds of each of its points, and what is left open is
+ * decided for each point by the words that kernels get, as a plain evaluator in doubles decides it. Random conditions
+ * of shapes of every kind; polygons; what is refused. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
