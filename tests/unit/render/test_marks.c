@@ -128,7 +128,7 @@ static void numbers_are_as_they_decode(void **state)
         if (uniform() < 0.2)
             ends[0] = -INFINITY;
         double blend = uniform() < 0.5 ? 0 : 30 * uniform();
-        struct spl_soft_params soft = {.count = 1, .blend = blend};
+        struct spl_soft_params soft = {.what.count = 1, .blend = blend};
         soft.what.terms[0] = term_of(info.streams[s].name, fmin(ends[0], ends[1]), fmax(ends[0], ends[1]));
         struct spl_marks marks = {.count = 1, .streams = streams};
         assert_int_equal(spl_marks_resolve(&soft, &info, marks.terms, NULL), SPL_OK);
@@ -187,7 +187,7 @@ static void shapes_are_as_far_as_they_are(void **state)
             target[i] = far_away + 20 * uniform();
         }
         assert_int_equal(spl_camera_look_at(&camera, eye, target, (const double[3]){0.1, 0.2, 1}, NULL), SPL_OK);
-        struct spl_soft_params soft = {.count = 1, .blend = uniform() < 0.5 ? 0 : 4 * uniform()};
+        struct spl_soft_params soft = {.what.count = 1, .blend = uniform() < 0.5 ? 0 : 4 * uniform()};
         struct spl_term *term = &soft.what.terms[0];
         *term = term_of("", uniform() < 0.5 ? -INFINITY : 12 * uniform() - 4, INFINITY);
         term->measure = SPL_TERM_AXIS + round % 3;
@@ -258,7 +258,7 @@ static void any_term_will_do(void **state)
         c[0].chunk.geometry_word = (uint32_t)-(int32_t)spl_chunk_words(&c[0].chunk);
         memcpy(page, c[0].words, count * sizeof *page);
         memcpy(page + count, c[1].words, spl_stream_words(c[1].width, 60) * sizeof *page);
-        struct spl_soft_params soft = {.count = 1 + (uint32_t)(uniform() * SPL_TERMS_MAX)};
+        struct spl_soft_params soft = {.what.count = 1 + (uint32_t)(uniform() * SPL_TERMS_MAX)};
         for (uint32_t t = 0; t < soft.what.count; t++) {
             double at = (t % 2 ? 100 : 40) * (uniform() - 0.5);
             soft.what.terms[t] = term_of(info.streams[t % 2].name, at, at + 12 * uniform());
@@ -299,7 +299,7 @@ static void terms_meet_their_dataset(void **state)
 {
     struct spl_dataset_info info = describe(), bare = {.id = "bare"};
     struct spl_marks_term ends[SPL_TERMS_MAX];
-    struct spl_soft_params soft = {.count = 1, .blend = 0.125};
+    struct spl_soft_params soft = {.what.count = 1, .blend = 0.125};
     struct spl_error err = {0};
     (void)state;
     soft.what.terms[0] = term_of("height", 0.5, 0.995);

@@ -91,8 +91,8 @@ static void expect_same(const struct spl_soft_params *soft)
     int length = spl_soft_print(soft, text, sizeof text);
     assert_true(length > 0 && length < (int)sizeof text && strlen(text) == (size_t)length);
     struct spl_soft_params back = read_terms(text);
-    assert_int_equal(back.count, soft->what.count);
-    if (memcmp(back.terms, soft->what.terms, sizeof soft->what.terms) != 0)
+    assert_int_equal(back.what.count, soft->what.count);
+    if (memcmp(back.what.terms, soft->what.terms, sizeof soft->what.terms) != 0)
         fail_msg("'%s' reads as something else", text);
 }
 
@@ -135,6 +135,7 @@ static void test_sixteen_of_the_longest_fit(void **state)
     for (soft.what.count = 0; soft.what.count < SPL_TERMS_MAX; soft.what.count++) {
         struct spl_term *term = &soft.what.terms[soft.what.count];
         term->measure = SPL_TERM_PLANE;
+        term->joint = SPL_TERM_OR;
         term->least = -1.2345678901234567e-300;
         term->most = 1.2345678901234567e-300;
         for (int i = 0; i < 6; i++)
@@ -203,7 +204,7 @@ static void test_what_is_wrong_is_named(void **state)
         {"axis:1,2,3,0,0,1<q0.5", "no shares of splats"},
         {"axis:1,2,3,0,0,1", "no <, >"},
         {"box:1,2,3,0,5,6", "ends at 0 before it begins at 1"},
-        {"box:1,2,3,4,5,6,7", "neither the end"},
+        {"box:1,2,3,4,5,6,7,8", "by three"},
         {"a_name_that_is_far_too_long_for_it>4", "more than 31 characters"},
         {"\xc3\xbc>1", "term 1, '', at character 1"},
     };
@@ -235,7 +236,7 @@ static void test_there_are_bounds(void **state)
     memcpy(text, "class:1", 7);
     err = (struct spl_error){0};
     assert_int_equal(spl_soft_parse(text, &soft, &err), SPL_E_INPUT);
-    assert_non_null(strstr(err.message, "longer than 4096"));
+    assert_non_null(strstr(err.message, "longer than 8192"));
     text[SPL_TERMS_TEXT_MAX] = '\0';
     assert_int_equal(spl_soft_parse(text, &soft, NULL), SPL_OK);
 }

@@ -144,7 +144,7 @@ static void headers_say_what_a_body_would(void **state)
     assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.10000000000000001,"
                             "\"soft_cover\":1,\"soft_blend\":0,\"of\":\"solid\"}");
     struct spl_soft_params again = soft_asked(at);
-    assert_memory_equal(again.terms, r.view.soft.what.terms, sizeof again.terms);
+    assert_memory_equal(again.what.terms, r.view.soft.what.terms, sizeof again.what.terms);
     free(headers.text);
 }
 
