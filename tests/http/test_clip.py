@@ -23,12 +23,12 @@ def test_what_is_drawn_comes_back():
         again = d.post({"width": 16, "height": 16, "clip": clip(first)})
         assert again.headers["Splatd-Cache"] == "hit" and clip(again) == clip(first)
         parts = d.post({"width": 16, "height": 16, "clip": clip(first)[:2], "class": "!5,7"})
-        assert parts.headers["ETag"] == first.headers["ETag"]
+        assert parts.headers["Splatd-Cache"] == "hit" and clip(parts) == clip(first)
         pick = d.ask(f"{PICK}?x=8&y=8&{query}")
         assert pick.status == 200 and clip(pick) == clip(first)
         plain = d.ask(f"{VIEW}?width=16&height=16")
         assert plain.headers["Splatd-Clip"] is None and plain.headers["ETag"] != first.headers["ETag"]
-        assert d.post({"width": 16, "height": 16, "clip": [], "class": []}).headers["ETag"] == plain.headers["ETag"]
+        assert d.post({"width": 16, "height": 16, "clip": [], "class": []}).headers["Splatd-Cache"] == "hit"
         for given, shown in ((2, "class:2"), ([2, 6], "class:2 or class:6"), ("3-5", "class:3..5")):
             assert clip(d.post({"width": 8, "height": 8, "class": given})) == [shown]
         batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "clip": "z<1", "class": [0],
@@ -46,7 +46,7 @@ def test_what_is_left_out_is_not_there():
         whole, half = count(), count(clip="z<1")
         assert whole > 1000 and 0.3 < half / whole < 0.7, (whole, half)
         assert abs(whole - half - count(clip="z>=1")) <= 64
-        assert count(clip="!z<1") == count(clip="z>=1") and count(clip=["z<1", "z>1"]) == 0
+        assert count(clip="!z<1") == count(clip="z>=1") and count(clip="z<1 and z>1") == 0
         assert count(**{"class": 9}) == 0 and count(**{"class": "!9"}) == whole
         assert count(clip="polygon:-1,0,1,0,1,0.8,-1,0.8") > 0
         for method in "points", "fill", "nearest":
