@@ -34,11 +34,12 @@ done
 # An old RPATH, unlike RUNPATH, also holds for the libraries of libraries.
 options=(-Dvideo=disabled -Dtests=$tests -Dbuildtype=release -Db_ndebug=false
     "-Dc_link_args=['-Wl,--disable-new-dtags,-rpath,\$ORIGIN/../lib']")
+mkdir -p "$build"
 if [ -f "$build/build.ninja" ]; then
     meson configure "$build" "${options[@]}"
 else
     meson setup "$build" "$top" "${options[@]}"
-fi >"$build.log" 2>&1 || { cat "$build.log" >&2; exit 1; }
+fi >"$build/setup.log" 2>&1 || { cat "$build/setup.log" >&2; exit 1; }
 ninja -C "$build" --quiet
 
 rm -rf "$out"
@@ -54,6 +55,9 @@ fi
 for program in "${programs[@]}"; do
     [ -f "$program" ] && [ -x "$program" ] && cp "$program" "$out/bin/"
 done
+if $tests; then # what loads the daemon
+    cp "$(command -v wrk)" "$(command -v curl)" "$out/bin/"
+fi
 strip "$out"/bin/*
 
 # All libraries but the C library's own, which belongs to the system. The C++ runtime is the system's too where it has

@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
+#include "common/paint.glsl"
 #include "common/piece.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -13,7 +14,7 @@ layout(local_size_x = SPL_WORKGROUP) in;
 uint payload(spl_draw_chunk chunk, splat vertex)
 {
     if (GROUP == SPL_SUMS_COLOR) {
-        uvec3 c = load_color(chunk, vertex.index);
+        uvec3 c = shown_color(chunk, vertex);
         return c.x | c.y << 8 | c.z << 16;
     }
     if (GROUP == SPL_SUMS_NORMAL)
@@ -60,8 +61,8 @@ void main()
     uint i = run.first + gl_GlobalInvocationID.x % SPL_RUN_SPLATS;
     if (i >= run.end || !is_piece(run, i))
         return;
-    splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL);
-    splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL);
+    splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL && !PAINTS_NORMALS);
+    splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL && !PAINTS_NORMALS);
     if (is_between(a.position, b.position))
         draw(cut_piece(a.position, b.position), uvec2(payload(run.chunk, a), payload(run.chunk, b)));
 }

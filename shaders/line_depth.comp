@@ -11,7 +11,7 @@ coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 void draw(capsule c)
 {
     capsule_walk walk = begin_walk(c);
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         float z;
         bool second;
         float distance = capsule_sample(c, walk, z, second);

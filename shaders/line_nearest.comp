@@ -6,6 +6,7 @@
 #include "common/octahedral.glsl"
 #include "common/bend.glsl"
 #include "common/capsule.glsl"
+#include "common/paint.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 
@@ -13,7 +14,7 @@ layout(local_size_x = SPL_WORKGROUP) in;
 uint payload(spl_draw_chunk chunk, splat vertex)
 {
     if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
-        uvec3 c = load_color(chunk, vertex.index);
+        uvec3 c = shown_color(chunk, vertex);
         return c.x | c.y << 8 | c.z << 16;
     }
     if (GROUP == SPL_SUMS_NORMAL)
@@ -26,7 +27,7 @@ void draw(splat_run run, splat a, splat b)
     capsule c = make_capsule(cut_piece(a.position, b.position), run.chunk, run.low, run.high);
     uvec2 payloads = uvec2(payload(run.chunk, a), payload(run.chunk, b));
     capsule_walk walk = begin_walk(c);
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         float z;
         bool second;
         float distance = capsule_sample(c, walk, z, second);
@@ -52,8 +53,8 @@ void main()
     uint i = run.first + gl_GlobalInvocationID.x % SPL_RUN_SPLATS;
     if (i >= run.end || !is_piece(run, i))
         return;
-    splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL);
-    splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL);
+    splat a = load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL && !PAINTS_NORMALS);
+    splat b = load_splat(run.chunk, i + 1u, GROUP != SPL_SUMS_NORMAL && !PAINTS_NORMALS);
     if (is_between(a.position, b.position))
         draw(run, a, b);
 }

@@ -3,6 +3,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/capsule.glsl"
+#include "common/paint.glsl"
 #include "common/sums.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
@@ -12,7 +13,7 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 uvec3 value_of(spl_draw_chunk chunk, splat vertex)
 {
     if (GROUP == SPL_SUMS_COLOR)
-        return load_color(chunk, vertex.index);
+        return shown_color(chunk, vertex);
     if (GROUP == SPL_SUMS_NORMAL)
         return uvec3(vertex.normal * 127.0 + 127.5);
     return uvec3(0u);

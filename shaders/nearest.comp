@@ -8,54 +8,47 @@
 #include "common/octahedral.glsl"
 #include "common/bend.glsl"
 #include "common/clip.glsl"
+#include "common/paint.glsl"
 #include "common/trim.glsl"
 
-layout(local_size_x = SPL_WORKGROUP) in;
+struct work {
+    disc d;
+    clip_line line;
+    trim_rule rule;
+    uint payload;
+};
 
-void draw(splat_run run, splat s)
+bool prepare(splat_run run, splat s, out work w)
 {
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
-        return;
-    uint payload = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
+        return false;
+    w.payload = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
     if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
-        uvec3 c = load_color(run.chunk, s.index);
-        payload = c.x | c.y << 8 | c.z << 16;
+        uvec3 c = shown_color(run.chunk, s);
+        w.payload = c.x | c.y << 8 | c.z << 16;
     } else if (GROUP == SPL_SUMS_NORMAL) {
-        payload = pack_normal(s.normal);
+        w.payload = pack_normal(s.normal);
     }
-    disc d = make_disc(s, run.low, run.high);
-    clip_line line = load_clip(run.chunk, s);
-    trim_rule rule = load_trim(s);
-    ivec2 sample_at = d.first;
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
-        float z;
-        vec3 offset;
-        float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
-        if (distance < 1.0 && sample_at.y <= d.last.y) {
-            precise float bent = z + d.margin * distance + d.behind;
-            uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
-            SPL_WHERE(wins(at, bits))
-                if (!is_trimmed(rule, sample_at, z))
-                    put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
-                                  : GROUP == SPL_SUMS_MAPPED ? payload | bend_code(z, bent) << 24
-                                                             : payload);
-        }
-        next_sample(d, sample_at);
-        if (sample_at.y > d.last.y)
-            break;
+    w.d = make_disc(s, run.low, run.high);
+    w.line = load_clip(run.chunk, s);
+    w.rule = load_trim(s);
+    return true;
+}
+
+void touch(work w, ivec2 sample_at)
+{
+    float z;
+    vec3 offset;
+    float distance = clip(w.line, offset, disc_sample(w.d, sample_at, z, offset));
+    if (distance < 1.0 && sample_at.y <= w.d.last.y) {
+        precise float bent = z + w.d.margin * distance + w.d.behind;
+        uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
+        SPL_WHERE(wins(at, bits))
+            if (!is_trimmed(w.rule, sample_at, z))
+                put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
+                              : GROUP == SPL_SUMS_MAPPED ? w.payload | bend_code(z, bent) << 24
+                                                         : w.payload);
     }
 }
 
-void main()
-{
-    load_frame();
-    splat_run run = load_splat_run();
-    uint i = run.first;
-    for (;;) {
-        if (has_splat(run, i) && is_drawn(run.chunk, i))
-            draw(run, load_splat(run.chunk, i, false));
-        i += SPL_RUN_STEP;
-        if (i >= run.end)
-            break;
-    }
-}
+#include "common/walk.glsl"

@@ -1,6 +1,7 @@
 /* Method nearest, of panels and meshes: their depth is not bent. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#define SPL_SHOWN 1
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
 #include "common/bend.glsl"
@@ -15,7 +16,8 @@ void panel_fragment(panel_draw d, ivec2 at, float z, float distance, float pushe
     if (wins(index, bits) && !is_trimmed(d, at, z)) {
         uint payload = identity(SPL_DRAWN, d.id);
         if (GROUP == SPL_SUMS_COLOR || GROUP == SPL_SUMS_MAPPED) {
-            uvec3 c = uvec3(panel_color(d.own, uvec2(clamp(place, 0.0, float(SPL_PANEL_SIDE) - 0.5))) + 0.5);
+            vec3 own = panel_color(d.own, uvec2(clamp(place, 0.0, float(SPL_PANEL_SIDE) - 0.5)));
+            uvec3 c = shown_on_panel(d, own, at, z);
             payload = c.x | c.y << 8 | c.z << 16;
             if (GROUP == SPL_SUMS_MAPPED)
                 payload |= bend_code(z, bent) << 24;

@@ -2,6 +2,7 @@
  * centre; colours are interpolated between the middles of cells, as discs blend. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#define SPL_SHOWN 1
 #include "common/sums.glsl"
 #ifdef SPL_MESHES
 #include "common/mesh_draw.glsl"
@@ -24,7 +25,7 @@ void panel_fragment(panel_draw d, ivec2 at, float z, float distance, float pushe
     if (there <= first) {
         uvec3 value = uvec3(0u);
         if (GROUP == SPL_SUMS_COLOR)
-            value = uvec3(panel_color_between(d.own, place) + 0.5);
+            value = shown_on_panel(d, panel_color_between(d.own, place), at, z);
         else if (GROUP == SPL_SUMS_NORMAL)
             value = uvec3(d.facing * 127.0 + 127.5);
         shade(index, first, z, distance, pushed, value, identity(SPL_DRAWN, d.id));

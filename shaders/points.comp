@@ -7,6 +7,7 @@
 #include "common/point.glsl"
 #include "common/octahedral.glsl"
 #include "common/marks.glsl"
+#include "common/paint.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 2) const uint FILL = 0;
@@ -14,7 +15,7 @@ layout(constant_id = 2) const uint FILL = 0;
 uint payload(spl_draw_chunk chunk, splat s)
 {
     if (GROUP == SPL_SUMS_COLOR) {
-        uvec3 c = load_color(chunk, s.index);
+        uvec3 c = shown_color(chunk, s);
         return c.x | c.y << 8 | c.z << 16;
     }
     if (GROUP == SPL_SUMS_NORMAL)
@@ -46,7 +47,7 @@ void main()
     uint i = run.first;
     for (;;) {
         if (has_splat(run, i) && !is_soft(run.chunk, mark_byte(i)))
-            draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL));
+            draw(run.chunk, load_splat(run.chunk, i, GROUP != SPL_SUMS_NORMAL && !PAINTS_NORMALS));
         i += SPL_RUN_STEP;
         if (i >= run.end)
             break;

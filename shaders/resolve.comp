@@ -8,7 +8,8 @@
  *   primitive the same; 0 = none
  *   coverage  float, share of the samples that hold something
  * With constant 2 = 1 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both; = 2: the other
- * layers are of the sphere that was found on a sample, where there is one. */
+ * layers are of the sphere that was found on a sample, where there is one. With constant 3 what is solid keeps the share of
+ * its colour that shade.comp says. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -18,11 +19,13 @@ layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;
 layout(constant_id = 1) const uint RESOLVED = SPL_RESOLVED_SUMS;
 layout(constant_id = 2) const uint SOFT = 0;
+layout(constant_id = 3) const uint SHADED = 0;
 
 layout(std430, binding = SPL_STORAGE_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_SOFT) soft_texels;
 SPL_TEXEL_BUFFER(SPL_TEXELS_FOUND) found_texels;
+SPL_TEXEL_BUFFER(SPL_TEXELS_SHADES) shade_texels;
 
 const bool OVER = SOFT == 1u, FOUND = SOFT == 2u;
 
@@ -130,6 +133,15 @@ uint sample_id(pixel_sample s)
     return s.found ? found_word(s.at, LAYER == SPL_RESOLVE_ID ? 1 : 3) : payload(s.at);
 }
 
+/* Of the sample at `place`, for which `at` stands. */
+uvec3 drawn_color(ivec2 place, uint at)
+{
+    uvec3 color = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(place, at) + 0.5) : sample_color(at);
+    if (SHADED != 0u)
+        color = (color * imageLoad(shade_texels, int(at)).x + SPL_SHADE_WHOLE / 2u) / SPL_SHADE_WHOLE;
+    return color;
+}
+
 void main()
 {
     load_frame();
@@ -142,7 +154,7 @@ void main()
     uvec3 color = uvec3(0u);
     vec4 mixed = vec4(0.0); /* with soft spheres: colour times share, share */
     vec3 normal = vec3(0.0);
-    for (uint i = 0u;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (uint i = 0u;;) { /* the end is asked for at the end: see common/walk.glsl */
         pixel_sample s = load_sample(corner, i);
         uint at = s.at, bits = s.bits;
         vec4 soft = vec4(0.0);
@@ -151,13 +163,12 @@ void main()
         mixed += soft;
         if (bits != SPL_NOTHING) {
             if (OVER && LAYER == SPL_RESOLVE_COLOR) {
-                uvec3 own = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
-                mixed.rgb += (1.0 - soft.a) * vec3(own);
+                mixed.rgb += (1.0 - soft.a) * vec3(drawn_color(pixel_place(corner, i), at));
             }
             mixed.a += 1.0 - soft.a;
             covered++;
             if (!OVER && LAYER == SPL_RESOLVE_COLOR)
-                color += RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(pixel_place(corner, i), at) + 0.5) : sample_color(at);
+                color += drawn_color(pixel_place(corner, i), at);
             if (LAYER == SPL_RESOLVE_NORMAL)
                 normal += s.found ? unpack_normal(found_word(at, 2)) : sample_normal(at);
             if ((LAYER == SPL_RESOLVE_ID || LAYER == SPL_RESOLVE_PRIMITIVE) && bits <= nearest)

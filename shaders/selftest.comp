@@ -98,6 +98,7 @@ void put_chunk(spl_draw_chunk c)
     put(c.texture);
     put(c.texture_scale);
     put(c.marks);
+    put(c.paint_word), put(c.paint_bits), put(c.paint_base);
 }
 
 void main()

@@ -26,6 +26,8 @@
 #define SPL_RUN_BITS 2
 #define SPL_LANES 8
 #define SPL_WORKGROUP 64
+/* On hardware a workgroup of its own size draws an entry's discs: shaders/common/walk.glsl. */
+#define SPL_SHARED_LANES 128
 
 /* The self-test's page lies this many times its own size into its buffer. */
 #define SPL_SELFTEST_PAGE 3
@@ -173,6 +175,8 @@
 /* Soft spheres of model concentric have a shell for every so many samples of their radius, at most so many. */
 #define SPL_SOFT_SHELL_SAMPLES 4
 #define SPL_SOFT_SHELLS_MAX 16
+/* A splat on a wire stands for a stretch of it that is so many of its radii long (1 / SPL_RADIUS_SPACING). */
+#define SPL_SOFT_STRETCH 1.3333333f
 /* Models with a kernel of their own, beside express. */
 #define SPL_SOFT_BASE 0
 #define SPL_SOFT_CONCENTRIC 1
@@ -195,8 +199,11 @@ struct spl_draw_chunk {
     SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the tile */
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
-                                             width, metres */
+                                             width, metres; of soft splats that are linear: the square of the radius
+                                             that one of radius 1 has */
     SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
+    SPL_U32 paint_word, paint_bits, paint_base; /* of the attribute that colours show: where its codes begin, their width
+                                             and SPL_PAINT_LAST_NONE, and what they are added to */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -235,7 +242,7 @@ struct spl_draw_chunk {
 #define SPL_CLIP_OFFSET_BITS 3
 #define SPL_CLIP_BITS 8
 
-#define SPL_CHUNK_WORDS 19 /* of a spl_draw_chunk */
+#define SPL_CHUNK_WORDS 22 /* of a spl_draw_chunk */
 
 /* Panels: SPL_PANEL_SIDE x SPL_PANEL_SIDE cells of a plane, block by block of 4 x 4. A chunk of them begins with two
  * words a panel:
@@ -278,6 +285,37 @@ struct spl_draw_chunk {
 /* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of them. */
 #define SPL_MESH_LANES 32
 #define SPL_MESH_WINDOW 112
+
+/* What of its light a sample keeps, of SPL_SHADE_WHOLE (shade.comp); kinds of it, as splatd/color.h has them. */
+#define SPL_SHADE_WHOLE 65536u
+#define SPL_SHADES_EDL 2u
+#define SPL_SHADES_HEADLIGHT 4u
+#define SPL_SHADES_SUN 8u
+/* Eye-dome lighting: half of what can be lost is where the sum over four pairs of samples of how much deeper than their
+ * mean it lies, as a share of its depth, is one over this. */
+#define SPL_SHADE_DEPTH 60.0f
+
+/* What colours show (src/render/paint.h): where a value comes from, and that it is multiplied with a splat's own colour.
+ * The palette is words: SPL_PALETTE_COLORS colours, r | g << 8 | b << 16, that of splats without a value, and what finds
+ * the place of a value among the colours, see src/render/paint.c. */
+#define SPL_PAINT_NONE 0u
+#define SPL_PAINT_NUMBERS 1u  /* base + code of a stream */
+#define SPL_PAINT_OCTAVES 2u  /* half octaves of one */
+#define SPL_PAINT_POSITION 3u /* a distance in view space */
+#define SPL_PAINT_NORMAL 4u
+#define SPL_PAINT_FLAT 5u
+#define SPL_PAINT_KIND 7u
+#define SPL_PAINT_TIMES_RGB 8u
+#define SPL_PAINT_LAST_NONE 64u /* of a chunk's paint_bits, beside the width of its codes: the last one is no value */
+#define SPL_PAINT_EXACT 0xffffffu
+#define SPL_PALETTE_COLORS 256
+#define SPL_PALETTE_UNKNOWN 256
+#define SPL_PALETTE_LOW 257    /* NUMBERS: the first number; the shift of those above it */
+#define SPL_PALETTE_SHIFT 258
+#define SPL_PALETTE_SCALE 259  /* floats: place = value * scale + offset */
+#define SPL_PALETTE_OFFSET 260
+#define SPL_PALETTE_AXIS 261   /* POSITION: three, whose product with the place in view space is the value */
+#define SPL_PALETTE_WORDS 264
 
 /* Marks: a byte a splat, four a word from the low end: SPL_CHUNK_SPLATS of a chunk of discs, SPL_MARKS_PANEL words of
  * each panel or mesh, a byte a cell, row by row. 0 = solid; else soft, 1 + SPL_MARK_MOST times the share W of eq. 22 of
@@ -377,7 +415,8 @@ struct spl_frame_params {
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
-    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide */
+    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide; shade:
+                                             strength; map_sides: samples that are looked away; map_pose: the sun */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };
@@ -446,6 +485,7 @@ struct spl_soft_step {
     SPL_U32 ends;          /* of layer: this is its last window */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */
     SPL_U32 details;       /* word of the items' details */
+    SPL_U32 entries;       /* of all lists */
 };
 
 #ifndef SPL_GLSL
@@ -456,7 +496,7 @@ _Static_assert(SPL_WINDOW / SPL_SOFT_TILE + 1 <= SPL_SOFT_SPAN_MAX && SPL_WINDOW
 _Static_assert(SPL_RUN_PANELS << SPL_RUN_BITS == SPL_PANELS_MAX, "runs of panels");
 _Static_assert(32 * SPL_LINEAR_WORDS == SPL_CHUNK_SPLATS, "a bit a splat");
 _Static_assert(SPL_CLIP_BITS == SPL_CLIP_DIRECTION_BITS + SPL_CLIP_OFFSET_BITS, "a line's code");
-_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 76 bytes on both sides");
+_Static_assert(sizeof(struct spl_draw_chunk) == 4 * SPL_CHUNK_WORDS, "spl_draw_chunk is 88 bytes on both sides");
 _Static_assert(2 * SPL_RUN_SPLATS / SPL_LANES * SPL_WINDOW * SPL_WINDOW < 60000,
                "an invocation ends within its rounds, of which a sample that may be trimmed takes two");
 _Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE * SPL_PANEL_SIDE / SPL_LANES < 60000,

@@ -2,10 +2,11 @@
  * slots (1), or gathered as items where their slot's start (2). A slot is what an invocation walks: neighbours by id,
  * and slots rise with the chunks' first ids (chunk.texture is a chunk's first slot), so that items are in the order of
  * ids. A sphere reaches at least the sample that its centre falls on: it is drawn so wide, and the thinner
- * (soft_share()). */
+ * (soft_share()). One on a wire is as large as its share of the wire, where the chunk says how wide that is. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"
+#include "common/paint.glsl"
 #include "common/octahedral.glsl"
 #include "common/soft.glsl"
 #include "common/soft_step.glsl"
@@ -61,6 +62,13 @@ uint mark_at(spl_draw_chunk chunk, uint i)
 {
     return imageLoad(mark_texels, int(chunk.marks + (i >> 2))).x >> 8u * (i & 3u) & 255u;
 }
+
+/* One on a wire stands for a stretch of it as long as SPL_SOFT_STRETCH radii, and has that stretch's area. */
+float bounded_radius(spl_draw_chunk chunk, uint i, float radius)
+{
+    precise float bound = sqrt(chunk.texture_scale * radius);
+    return is_linear(chunk, i) ? min(radius, bound) : radius;
+}
 #endif
 
 void main()
@@ -93,7 +101,11 @@ void main()
         uint mark = MARKED != 0u ? mark_at(run.chunk, i) : SPL_MARK_WHOLE;
         if (known && has_splat(run, i) && mark != 0u) {
             vec3 p = load_splat(run.chunk, i, true).position;
-            float own_radius = load_radius(run.chunk, i), radius = soft_radius(own_radius, p.z);
+            float own_radius = load_radius(run.chunk, i);
+#ifndef SPL_CELL_LANES
+            own_radius = bounded_radius(run.chunk, i, own_radius);
+#endif
+            float radius = soft_radius(own_radius, p.z);
             vec2 x = sphere_extent(p.x, p.z, radius, frame.fx, frame.cx);
             vec2 y = sphere_extent(p.y, p.z, radius, frame.fy, frame.cy);
             vec2 low = max(vec2(x.x, y.x), run.low), high = min(vec2(x.y, y.y), run.high);
@@ -110,7 +122,7 @@ void main()
                 uint own = (span.x + 1u) * (span.y + 1u);
                 if (PHASE == 2u) {
                     uint at = SPL_SOFT_ITEM_WORDS * next;
-                    uvec3 color = load_color(run.chunk, i);
+                    uvec3 color = shown_color(run.chunk, load_splat(run.chunk, i, !PAINTS_NORMALS));
                     items[at] = floatBitsToUint(p.x);
                     items[at + 1u] = floatBitsToUint(p.y);
                     items[at + 2u] = key;

@@ -22,14 +22,6 @@ uint mark_of(float share)
     return 1u + uint(scaled);
 }
 
-/* Code `index` of those that begin at `word`. */
-uint load_code(uint word, uint width, uint index)
-{
-    uint bit = index * width, at = word + (bit >> 5);
-    uint code = funnel(page_word(at), page_word(at + 1u), bit & 31u);
-    return width == 0u ? 0u : code & (0xffffffffu >> (32u - width));
-}
-
 uint test_numbers(uint at, uint code, uint width, bool last_none)
 {
     uint past = code + test_word(at + 3u), span = test_word(at + 4u), shift = test_word(at + 5u);

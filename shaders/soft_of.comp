@@ -97,7 +97,7 @@ void main()
     bool seen = false;
     int entry = 0;
     uint i = list.begin;
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         entry = load_entry(int(i));
         listed_item listed = load_listed(entry);
         met_item item;

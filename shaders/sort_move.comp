@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common/soft_step.glsl"
 
-layout(local_size_x = SPL_LANES) in;
+layout(local_size_x = SPL_BLOCK_GROUP) in;
 layout(std430, binding = SPL_STORAGE_COUNTS) buffer count_buffer { uint counts[]; };
 layout(std430, binding = SPL_STORAGE_SORT_TO) writeonly buffer to_buffer { uint moved[]; };
 SPL_TEXEL_BUFFER(SPL_TEXELS_SORT_FROM) pair_texels;

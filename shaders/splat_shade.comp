@@ -17,64 +17,65 @@
 #include "common/texture.glsl"
 #else
 #include "common/clip.glsl"
+#include "common/paint.glsl"
 #endif
-
-layout(local_size_x = SPL_WORKGROUP) in;
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
-void draw(splat_run run, splat s)
+struct work {
+    disc d;
+    clip_line line;
+    uvec3 value;
+    uint id;
+#ifdef SPL_TEXTURED
+    splat_texture texture;
+#endif
+};
+
+bool prepare(splat_run run, splat s, out work w)
 {
     if (!(s.position.z >= frame.near && s.position.z <= frame.far))
-        return;
-    uvec3 value = uvec3(0u);
+        return false;
+    w.value = uvec3(0u);
     if (GROUP == SPL_SUMS_COLOR)
-        value = load_color(run.chunk, s.index);
+#ifdef SPL_TEXTURED
+        w.value = load_color(run.chunk, s.index);
+#else
+        w.value = shown_color(run.chunk, s);
+#endif
     else if (GROUP == SPL_SUMS_NORMAL)
-        value = uvec3(s.normal * 127.0 + 127.5);
-    disc d = make_disc(s, run.low, run.high);
-    clip_line line = load_clip(run.chunk, s);
+        w.value = uvec3(s.normal * 127.0 + 127.5);
+    w.id = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
+    w.d = make_disc(s, run.low, run.high);
+    w.line = load_clip(run.chunk, s);
 #ifdef SPL_TEXTURED
-    splat_texture t = load_texture(run.chunk, s, value);
-    lay_texture(t, run.chunk, s, gl_GlobalInvocationID.x / SPL_LANES * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);
+    w.texture = load_texture(run.chunk, s, w.value);
+    lay_texture(w.texture, run.chunk, s, own_entry() * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);
 #endif
-    ivec2 sample_at = d.first;
-    for (;;) {
-        float z;
-        vec3 offset;
-        float distance = clip(line, offset, disc_sample(d, sample_at, z, offset));
-        uint at = image_sample_index(sample_at);
-        if (distance < 1.0 && sample_at.y <= d.last.y) {
-            float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
+    return true;
+}
+
+void touch(work w, ivec2 sample_at)
+{
+    float z;
+    vec3 offset;
+    float distance = clip(w.line, offset, disc_sample(w.d, sample_at, z, offset));
+    uint at = image_sample_index(sample_at);
+    if (distance < 1.0 && sample_at.y <= w.d.last.y) {
+        float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
+        uvec3 value = w.value;
 #ifdef SPL_TEXTURED
-            if (z <= first)
-                value = sample_texture(t, offset);
+        if (z <= first)
+            value = sample_texture(w.texture, offset);
 #endif
-            precise float pushed = z + d.margin + d.behind;
+        precise float pushed = z + w.d.margin + w.d.behind;
 #ifdef SPL_TRIMS
-            z = pushed < first ? 3e38 : z;
+        z = pushed < first ? 3e38 : z;
 #endif
-            precise float there = z + d.behind;
-            if (there <= first)
-                shade(at, first, z, distance, pushed, value,
-                      identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index)));
-        }
-        next_sample(d, sample_at);
-        if (sample_at.y > d.last.y)
-            break;
+        precise float there = z + w.d.behind;
+        if (there <= first)
+            shade(at, first, z, distance, pushed, value, w.id);
     }
 }
 
-void main()
-{
-    load_frame();
-    splat_run run = load_splat_run();
-    uint i = run.first;
-    for (;;) {
-        if (has_splat(run, i) && is_drawn(run.chunk, i))
-            draw(run, load_splat(run.chunk, i, false));
-        i += SPL_RUN_STEP;
-        if (i >= run.end)
-            break;
-    }
-}
+#include "common/walk.glsl"

@@ -41,10 +41,16 @@ class Dataset:
         self.service, self.info, self.id = service, info, info["id"]
         low, high = info["bounds"]["min"], info["bounds"]["max"]
         self.center = [(a + b) / 2 for a, b in zip(low, high)]
+        self.title, self.description = info.get("title"), info.get("description")  # None where nobody has said any
+        self.views = {view["name"]: view for view in info.get("views", [])}
 
     def view(self, **params):
         """One view. Parameters as in api/openapi.yaml; vectors, and several terms of soft and clip, are lists; class as text: "2,6". A `camera` is a dict, in any convention."""
         return View(*self.ask(self.info["view"], params))
+
+    def thumbnail(self, width=320):
+        """The default view, small: a View with a JPEG at 16:9."""
+        return View(*self.ask(f"{self.info['uri']}/thumbnail.jpg", {"width": width}))
 
     def depth(self, layer="depth", **params):
         """(width, height, array of floats row by row): in the dataset's unit, NaN where nothing is."""
@@ -58,6 +64,10 @@ class Dataset:
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
         return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
 
+    def legend(self, color_by, ramp=None, range=None):
+        """What colours of a view with these parameters mean: an SVG, as bytes."""
+        return self.ask(f"{self.info['uri']}/legend.svg", {"color_by": color_by, "ramp": ramp, "range": range})[0]
+
     def place(self, crs, **point):
         """A point both ways: give position=[longitude, latitude, height], in crs ("EPSG:4326"), or world=[x, y, z]."""
         return json.loads(self.ask(f"{self.info['uri']}/place", {"crs": crs, **point})[0])
@@ -65,6 +75,9 @@ class Dataset:
     def ask(self, path, params):
         """(bytes, headers): a `camera` only goes as JSON. What is None is left out."""
         given = {name: value for name, value in params.items() if value is not None}
+        soft = given.get("soft", "")
+        if not isinstance(soft, str) and not (isinstance(soft, (list, tuple)) and all(isinstance(term, str) for term in soft)):
+            raise TypeError(f"soft is a term like 'class:3-5' or a list of them, not {soft!r}")
         if "camera" in given:
             return self.service.ask(path, json.dumps(given).encode())
         return self.service.ask(f"{path}?{query(given)}")

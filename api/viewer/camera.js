@@ -21,6 +21,12 @@ export function axes(camera) {
 /** Focal length for an image of this height, in the height's unit. */
 export const focal = (camera, height) => height / 2 / Math.tan((camera.fov * Math.PI) / 360);
 
+/** The vertical field of view, degrees, of an image of this size that shows at least so many degrees across and upright. */
+export function fitted([across, upright], [width, height]) {
+  const degree = Math.PI / 360;
+  return Math.max(upright, Math.min(179, (2 * Math.atan((Math.tan(across * degree) * height) / width) * 180) / Math.PI));
+}
+
 /** [x, y, depth] of a world point in an image of size [width, height]; null behind the eye. */
 export function project(camera, [width, height], point) {
   const {right, down, forward} = axes(camera);

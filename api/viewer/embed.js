@@ -7,7 +7,7 @@ import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
-import {toWorld} from "./place.js";
+import {named, toWorld} from "./place.js";
 import {askJson, setPass, setToken} from "./service.js";
 import {softOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
@@ -25,12 +25,13 @@ let asked = false;
 async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
-    const {dataset: _, eye, target, up, fov, layer = "color", budget, ...setting} = await toWorld(
-      dataset,
-      parse(location.hash),
-    );
+    const wanted = parse(location.hash);
+    const {dataset: _, view: __, eye, target, up, fov, layer = "color", budget, ...setting} = {
+      ...named(dataset, wanted, stage.size),
+      ...(await toWorld(dataset, wanted)),
+    };
     const given = Object.entries({eye, target, up, fov}).filter(([, value]) => value !== undefined);
-    document.title = id;
+    document.title = dataset.title ?? id;
     stage.element.ariaLabel = `View of ${id}`;
     stage.settings = budget ? {layer, budget, ...softOf(setting)} : {layer, ...setting};
     stage.report(null);

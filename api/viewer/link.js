@@ -3,7 +3,7 @@
 import {findParameter} from "./methods.js";
 
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "layer", "method", "budget", "crs", "soft"],
+  TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade"],
   NUMBERS = ["fov", "lod", "supersample"];
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 

@@ -1,11 +1,12 @@
 // The page: fills the controls from what the service says and ties them to the stage.
 
 import {Chart} from "./chart.js";
+import {Gallery} from "./gallery.js";
 import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {Controls, choose, counts, findMethod, listed, loadTable, offered} from "./methods.js";
 import {notices} from "./notice.js";
-import {toWorld} from "./place.js";
+import {named, toWorld} from "./place.js";
 import {Points, coordinates, lengthText, withUnit} from "./points.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {Soft} from "./soft.js";
@@ -22,6 +23,7 @@ const stage = new Stage($("stage"));
 const points = new Points(stage, document.querySelector(".marks"));
 const chart = new Chart($("chart"));
 const tour = new Tour(stage);
+const gallery = new Gallery($("gallery"));
 attach(stage);
 
 function say(text) {
@@ -38,6 +40,7 @@ const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
 
 let dataset = null; // that the controls are set for
 let parameters = null; // their Controls, once there is a table of them
+let colors = {}; // what the fragment says of colours that has no control
 let soft = null; // the part of the panel for what is soft, as long
 
 /** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
@@ -56,7 +59,8 @@ function readSettings(before) {
   }
   $("method-help").textContent = findMethod(settings.method).description;
   stage.coarse = $("moving").value;
-  return {...settings, ...soft.read()};
+  for (const name of ["color_by", "shade"]) if ($(name).value) settings[name] = $(name).value;
+  return {...settings, ...colors, ...soft.read()};
 }
 
 function writeLink() {
@@ -80,7 +84,20 @@ function writeLink() {
 let opening = 0; // counts calls of open(): the last one wins
 let opened = 0; // the one whose dataset and camera the stage has
 
-/** Opens what the fragment names, else the first dataset that is ready. */
+/** The gallery in place of a view, or the other way round. */
+function showGallery(datasets) {
+  for (const part of [stage.element, $("panel")]) part.hidden = Boolean(datasets);
+  if (!datasets) return gallery.hide();
+  stage.close();
+  stage.report(null);
+  document.title = "Datasets – splatd";
+  gallery.show(datasets);
+  clearTimeout(again);
+  if (datasets.some(({state}) => state === "loading")) again = setTimeout(() => gallery.shown && open(), 3000);
+}
+let again = 0; // the timer of a gallery with datasets that are being loaded
+
+/** Opens what the fragment names, else the one dataset that there is, else shows all. */
 async function open() {
   const turn = ++opening,
     fragment = location.hash;
@@ -92,13 +109,19 @@ async function open() {
     ]);
     const wanted = parse(fragment);
     const ids = datasets.map(({id}) => id);
-    const id = wanted.dataset ?? (datasets.find(({state}) => state === "ready") ?? datasets[0])?.id;
+    if (turn !== opening) return;
+    if (!wanted.dataset && datasets.length > 1) return showGallery(datasets);
+    if (gallery.shown) showGallery(null);
+    const id = wanted.dataset ?? datasets[0]?.id;
     if (!id) throw new Problem("gone", "No dataset is served yet", 5);
     const found = await askJson(`/v1/datasets/${encodeURIComponent(id)}`).catch((problem) => problem);
     if (turn !== opening) return;
     choices($("dataset"), ids.includes(id) ? ids : [...ids, id], id);
+    for (const {id: other, title} of datasets)
+      if (title) [...$("dataset").options].find(({value}) => value === other).textContent = title;
+    $("all").hidden = ids.length < 2;
     if (found instanceof Error) throw found;
-    Object.assign(wanted, await toWorld(found, wanted));
+    Object.assign(wanted, named(found, wanted, stage.size), await toWorld(found, wanted));
     if (turn !== opening) return;
     dataset = found;
     parameters ??= new Controls($("method-help"));
@@ -109,6 +132,11 @@ async function open() {
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
+    const shown = ["height", "normal", ...dataset.attributes.map(({name}) => name)];
+    $("color_by").replaceChildren(new Option("its own", ""), ...shown.map((name) => new Option(name)));
+    choose($("color_by"), wanted.color_by ?? "");
+    choose($("shade"), wanted.shade ?? "");
+    colors = Object.fromEntries(["ramp", "range", "edl_strength", "edl_radius"].filter((name) => name in wanted).map((name) => [name, wanted[name]]));
     choices($("method"), dataset.methods, offered(wanted.method, dataset));
     $("lod").value = wanted.lod ?? 1;
     choose($("supersample"), wanted.supersample ?? 1);
@@ -121,7 +149,13 @@ async function open() {
     $("about").textContent =
       `${describeContents(dataset)}, ${withUnit(size, dataset.unit)}, ` +
       `drawn by ${device.name.replace(/ \(.*/, "")}`;
-    document.title = `${id} – splatd`;
+    $("description").textContent = dataset.description ?? "";
+    $("description").hidden = !dataset.description;
+    choices($("views"), ["", ...dataset.views.map(({name}) => name)], "");
+    $("views").options[0].textContent = "the first";
+    choose($("views"), wanted.view ?? "");
+    $("views-label").hidden = !dataset.views.length;
+    document.title = `${dataset.title ?? id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
     const camera = Object.fromEntries(
@@ -262,6 +296,10 @@ stage.drag = document.querySelector("[name=drag]:checked").value; // browsers ke
 $("dataset").addEventListener("change", () => {
   location.hash = query({dataset: $("dataset").value, layer: $("layer").value});
 });
+$("views").addEventListener("change", () => {
+  const view = $("views").value;
+  if (stage.dataset) stage.setCamera(view ? named(stage.dataset, {view}, stage.size) : stage.home);
+});
 $("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
 $("link").addEventListener("click", () => copied(location.href, "Link"));
 $("curl").addEventListener("click", () => stage.dataset && copied(curl(stage.url(), stage.settings.layer), "Command"));
@@ -280,5 +318,8 @@ $("toggle").addEventListener("click", () => fold($("toggle"), $("panel"), $("pan
 $("accuracy").addEventListener("click", () => fold($("accuracy"), $("chart"), $("chart").hidden));
 addEventListener("keydown", (event) => event.key === "Escape" && points.list.length && points.clear());
 addEventListener("hashchange", open);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.refresh());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  if (gallery.shown) gallery.redraw();
+  else stage.refresh();
+});
 open();

@@ -22,7 +22,7 @@ export const findMethod = (name) => table.methods.find((method) => method.name =
 export const findParameter = (name) => table.parameters.find((parameter) => parameter.name === name);
 
 /** Those that have a control beside their method; what is about soft spheres has its own part of the panel. */
-export const listed = () => table.parameters.filter(({soft}) => !soft);
+export const listed = () => table.parameters.filter(({soft, colors}) => !soft && !colors);
 
 /** Does the parameter change what `method` draws of `dataset`? */
 export const counts = ({name, textures, maps, primitives}, method, dataset) =>
@@ -36,7 +36,7 @@ export const counts = ({name, textures, maps, primitives}, method, dataset) =>
 /** What of a view's setting picks take, so that they find what the picture shows: its method, and what changes what is
  * seen where. */
 export function pickable(setting) {
-  const names = ["method", "soft", ...table.parameters.filter(({textures}) => !textures).map(({name}) => name)];
+  const names = ["method", "soft", ...table.parameters.filter(({textures, colors}) => !textures && !colors).map(({name}) => name)];
   return Object.fromEntries(names.filter((name) => name in setting).map((name) => [name, setting[name]]));
 }
 

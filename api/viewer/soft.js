@@ -208,8 +208,20 @@ export class Soft extends EventTarget {
       $("soft-side").value = ">";
     }
     if (kinds) this.list(attribute);
+    if (kinds && !new RegExp(`^${what}\\b`).test($("soft-terms").value)) this.begin(kinds);
     if (slider && attribute) this.draw(attribute);
     this.label();
+  }
+
+  /** Ticks what the dataset suggests of an attribute's values: class:3-5, number_of_returns>1. */
+  begin(kinds) {
+    const {name} = this.attribute,
+      term = this.dataset.soft.find((text) => text.match(/^\w+/)[0] === name),
+      above = term?.match(/>(\d+)$/),
+      ticked = above
+        ? kinds.map(({value}) => value).filter((value) => value > Number(above[1]))
+        : (term && namedKinds(term.slice(name.length + 1), kinds)) || [];
+    for (const box of $("soft-kinds").querySelectorAll("input")) box.checked = ticked.includes(Number(box.value));
   }
 
   /** A box for each value. */

@@ -5,7 +5,7 @@
 // cancelled, which lets the service drop it. Events: "camera" (it changed), "frame" (detail: what the reply said),
 // "state" (detail: a Problem, or null when all is well).
 
-import {rounded, same, warp} from "./camera.js";
+import {fitted, rounded, same, warp} from "./camera.js";
 import {Problem, ask, query} from "./service.js";
 import {softOf} from "./soft_setting.js";
 
@@ -49,7 +49,7 @@ export class Stage extends EventTarget {
     this.timer = 0;
     this.failures = 0;
     this.blocked = false; // nothing is asked before the timer
-    new ResizeObserver(() => this.refresh()).observe(element);
+    new ResizeObserver(() => this.resize()).observe(element);
     addEventListener("online", () => this.retry());
     document.addEventListener("visibilitychange", () => this.pump());
   }
@@ -59,14 +59,25 @@ export class Stage extends EventTarget {
     return [Math.max(1, this.element.clientWidth), Math.max(1, this.element.clientHeight)];
   }
 
+  /** The default view, which shows as much in an image of any shape. */
+  get home() {
+    const {eye, target, up, fov, fit} = this.dataset.default_view;
+    return rounded({eye, target, up, fov: fit ? fitted(fit, this.size) : fov});
+  }
+
+  /** Who has not moved yet sees the default view of the new size. */
+  resize() {
+    if (this.dataset && same(rounded(this.camera), this.first)) this.camera = this.first = this.home;
+    this.refresh();
+  }
+
   /** Shows another dataset, from `camera` or its default view. */
   open(dataset, camera) {
-    const {eye, target, up, fov} = dataset.default_view;
     if (this.dataset?.id !== dataset.id) this.close();
     this.dataset = dataset;
-    this.home = rounded({eye, target, up, fov});
+    this.first = this.home;
     this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
-    this.camera = {...this.home, ...camera};
+    this.camera = {...this.first, ...camera};
     this.dispatchEvent(new Event("camera"));
     this.refresh();
   }

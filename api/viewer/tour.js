@@ -130,7 +130,9 @@ export class Tour extends EventTarget {
   /** As POST /v1/datasets/{id}/tours takes it for a path. */
   document() {
     const starts = this.keyframes.map((_, i) => this.keyframes.slice(0, i).reduce((sum, key) => sum + key.seconds, 0));
-    const keyframes = this.keyframes.map(({seconds, soft_opacity, ...camera}, i) => ({camera, time: starts[i], soft_opacity}));
+    const {soft} = this.stage.settings; // without it nothing fades, and a tour is refused that says so
+    const keyframes = this.keyframes.map(({seconds, soft_opacity, ...camera}, i) => ({camera, time: starts[i],
+      ...(soft ? {soft_opacity} : {})}));
     return {keyframes, closed: this.closed};
   }
 

@@ -59,6 +59,14 @@ struct spl_stream_values {
     } kinds[SPL_VALUES_KINDS_MAX];
 };
 
+/* A view that somebody has put down under a name: at most 63 letters, digits, '.', '_' and '-', the first no '.'. */
+enum { SPL_VIEW_NAME_BYTES = 64, SPL_SAVED_VIEWS_MAX = 64 };
+struct spl_saved_view {
+    char name[SPL_VIEW_NAME_BYTES];
+    double eye[3], target[3], up[3]; /* world */
+    double fov; /* degrees, vertical; across where an image is narrower than high */
+};
+
 struct spl_dataset_info {
     char id[128];              /* the file's stem */
     uint64_t version;          /* XXH3 over the section table: changes whenever any content does */
@@ -94,6 +102,11 @@ struct spl_dataset_info {
                        eye lie behind those that face it */
     const struct spl_stream_values *stream_values; /* of each stream, borrowed until close; NULL = the file says nothing
                                                       of any */
+    double default_fit[2]; /* degrees across and upright that the default view shows in an image of any shape; 0 = it has
+                              default_fov in all of them */
+    const char *title, *description;    // may be NULL; what its packer called it; borrowed until close
+    uint32_t view_count;                /* at most SPL_SAVED_VIEWS_MAX */
+    const struct spl_saved_view *views; /* by name; borrowed until close */
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */
@@ -155,7 +168,8 @@ SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 /* Borrowed until close. */
 SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
 
-/* The default view as a camera of the given size. */
+/* The default view as a camera of the given size: the narrower the image, the wider its vertical field of view, so that
+ * what the view shows is not cut. */
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include <splatd/api.h>
+#include <splatd/color.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 
@@ -72,6 +73,8 @@ enum spl_param_changes {
     SPL_CHANGES_TEXTURES,   /* colours alone, and those of datasets with textures */
     SPL_CHANGES_MAPS,       /* colours and silhouettes, and those of datasets with maps of stations */
     SPL_CHANGES_PRIMITIVES, /* what is seen where, and that of datasets with lines or panels */
+    SPL_CHANGES_SHADE,      /* colours alone, and those of views that eye-dome lighting shades (splatd/color.h) */
+    SPL_CHANGES_COLORS,     /* the same, and those of views whose colours show something else */
     SPL_CHANGES_SOFT,       /* what is seen where, and that of views with a term of what is soft (splatd/soft.h) */
 };
 
@@ -107,7 +110,12 @@ enum spl_param_changes {
          "how far beyond the ends of a term spheres are still partly solid, in what it measures; 0: a sharp border")  \
     CHOICE(of, soft.of, soft_of, SPL_SOFT_OF_SOLID, SPL_CHANGES_SOFT,                                                  \
            "what layers but color and coverage, and picks, speak of; solid: what is solid alone; first: the nearest, " \
-           "soft or solid; median: the sphere that lets less than half through, else the solid")
+           "soft or solid; median: the sphere that lets less than half through, else the solid")                       \
+    REAL(edl_strength, shade.strength, 0, 1, 0.5, SPL_CHANGES_SHADE,                                                   \
+         "share of its light that the deepest gap loses, with shade edl")                                              \
+    COUNT(edl_radius, shade.radius, 1, 5, 2, SPL_CHANGES_SHADE, "pixels that are looked away for it")                  \
+    CHOICE(ramp, color.ramp, ramp, SPL_RAMP_AUTO, SPL_CHANGES_COLORS,                                                  \
+           "what values become colours by, with color_by; auto: grey of intensity, terrain of height, else viridis")
 
 enum spl_method_param {
 #define SPL_PARAM_VALUE(name, ...) SPL_PARAM_##name,
@@ -119,7 +127,8 @@ enum spl_method_param {
 /* Those that every method takes: its row names them as well. */
 #define SPL_PARAMS_OF_ALL                                                                                              \
     (SPL_PARAM_BIT(soft_model) | SPL_PARAM_BIT(soft_opacity) | SPL_PARAM_BIT(soft_cover) |                             \
-     SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(of))
+     SPL_PARAM_BIT(soft_blend) | SPL_PARAM_BIT(of) | SPL_PARAM_BIT(edl_strength) | SPL_PARAM_BIT(edl_radius) |   \
+     SPL_PARAM_BIT(ramp))
 
 enum spl_param_kind { SPL_PARAM_REAL, SPL_PARAM_WHOLE, SPL_PARAM_CHOICE };
 

@@ -155,6 +155,13 @@ struct spl_pack_options {
     /* Where planes, meshes and lines are written besides, as polygons, triangles and polylines (api/primitives.md): a
      * name that ends in .ply, .obj or .dxf; only with primitives. NULL = nowhere. */
     const char *export_primitives;
+    const char *title;       /* at most 200 bytes of UTF-8 in a line; NULL = none */
+    const char *description; /* at most 4000, in lines; NULL = none */
+    /* Instead of the one that is found; its name does not matter. NULL = found. In this and the next, up 0, 0, 0 is what
+     * is up in the dataset, and fov 0 is 60. */
+    const struct spl_saved_view *default_view;
+    const struct spl_saved_view *views; /* by their names, of any order */
+    size_t view_count;                  /* at most SPL_SAVED_VIEWS_MAX */
 };
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)

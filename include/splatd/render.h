@@ -9,6 +9,7 @@
 #include <splatd/api.h>
 #include <splatd/camera.h>
 #include <splatd/cancel.h>
+#include <splatd/color.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 #include <splatd/image.h>
@@ -38,6 +39,8 @@ struct spl_view {
     enum spl_shapes shapes;     /* the same */
     struct spl_soft_params soft; /* what is soft, of every method */
     struct spl_terms clip;      /* conditions, all of which hold for what is drawn, solid or soft; none: all is drawn */
+    struct spl_shade_params shade; /* of colours: how what is solid is shaded, the same */
+    struct spl_color_params color; /* what they show, the same */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

@@ -1,12 +1,12 @@
 /* What shapes leave of discs, panels, meshes and lines, sample by sample, so that they end at a plane and not by their
- * radius beyond it. For chunks that a shape crosses, in a variant of its own (constant 4: SPL_CUT_*), so that others do
+ * radius beyond it. For chunks that a shape crosses, in a variant of its own (constant 5: SPL_CUT_*), so that others do
  * not pay for it. */
 #ifndef SPL_CUT_GLSL
 #define SPL_CUT_GLSL
 
 #include "common/terms.glsl"
 
-layout(constant_id = 4) const uint CUT = 0;
+layout(constant_id = 5) const uint CUT = 0;
 
 /* Is what lies at p, view space, drawn? `known`: conditions that hold by the splat's attributes, as its mark has them. */
 bool is_kept(vec3 p, uint known)

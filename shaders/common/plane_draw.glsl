@@ -13,6 +13,9 @@
 
 #include "common/marks.glsl"
 #include "common/panel.glsl"
+#ifdef SPL_SHOWN /* kernels of colours define it */
+#include "common/paint.glsl"
+#endif
 
 #define SPL_PANEL_HAIR 0.015625
 #define SPL_PANEL_ROUNDING 0.02 /* samples by which its box may be rounded */
@@ -26,6 +29,7 @@ struct panel_draw {
     vec2 eye;           /* the foot of the eye in cells of the panel */
     float radius;       /* by which it blends */
     uint known;         /* of shapes that cut it: cut.glsl */
+    uint paint;         /* its entry of the palette */
     /* Of the piece: */
     vec3 facing;        /* its normal, view space, unit */
     vec3 normal;        /* product with (ray, 1): n.d */
@@ -71,8 +75,23 @@ panel_draw begin_panel(splat_run run, uint index)
     d.v = along_v;
     d.eye = eye;
     d.radius = run.chunk.radius_min;
+#ifdef SPL_SHOWN
+    d.paint = paint_of_item(run.chunk, index);
+#endif
     return d;
 }
+
+#ifdef SPL_SHOWN
+/* What a fragment shows, whose own colour is `own`. */
+uvec3 shown_on_panel(panel_draw d, vec3 own, ivec2 at, float z)
+{
+    if (!PAINTS)
+        return uvec3(own + 0.5);
+    precise vec2 ray = (vec2(at) + 0.5 - vec2(frame.cx, frame.cy)) * vec2(frame.inverse_fx, frame.inverse_fy);
+    precise vec3 p = vec3(ray, 1.0) * z;
+    return paint_over(uvec3(own + 0.5), paint_color(d.paint, p, d.facing));
+}
+#endif
 
 /* The plane of the piece, of unit normal n through o. */
 void set_plane(inout panel_draw d, vec3 n, vec3 o)
@@ -156,7 +175,7 @@ void draw_samples(panel_draw d, uint lane, uint lanes)
     int rows = int((float(lanes) + 0.5) * inverse_width), row = int((float(lane) + 0.5) * inverse_width);
     ivec2 step = ivec2(int(lanes) - rows * width, rows);
     ivec2 at = d.first + ivec2(int(lane) - row * width, row);
-    for (;;) { /* the end is asked for at the end: see splat_depth.comp */
+    for (;;) { /* the end is asked for at the end: see common/walk.glsl */
         draw_sample(d, at);
         at += step;
         bool wrap = at.x > d.last.x;

@@ -13,6 +13,13 @@ void load_step()
     job = step_in_memory;
 }
 
+/* Invocations of a workgroup that each walk a block: few, or with SPL_MANY as GPUs want them. */
+#ifdef SPL_MANY
+#define SPL_BLOCK_GROUP SPL_WORKGROUP
+#else
+#define SPL_BLOCK_GROUP SPL_LANES
+#endif
+
 #ifndef SPL_TEXEL_BUFFER
 #define SPL_TEXEL_BUFFER(number) layout(binding = number, r32ui) uniform readonly uimageBuffer
 #endif

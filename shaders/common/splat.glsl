@@ -73,6 +73,9 @@ spl_draw_chunk load_chunk(uint index)
     c.texture = chunk_word(index, 16);
     c.texture_scale = uintBitsToFloat(chunk_word(index, 17));
     c.marks = chunk_word(index, 18);
+    c.paint_word = chunk_word(index, 19);
+    c.paint_bits = chunk_word(index, 20);
+    c.paint_base = chunk_word(index, 21);
     return c;
 }
 
@@ -89,6 +92,14 @@ bit_run load_run(uint word, uint bit, int words)
     run.c = funnel(w2, w3, shift);
     run.d = funnel(w3, w4, shift);
     return run;
+}
+
+/* Code `index` of those that begin at `word`. */
+uint load_code(uint word, uint width, uint index)
+{
+    uint bit = index * width, at = word + (bit >> 5);
+    uint code = funnel(page_word(at), page_word(at + 1u), bit & 31u);
+    return width == 0u ? 0u : code & (0xffffffffu >> (32u - width));
 }
 
 /* Takes the next `width` (0..24) bits. */
@@ -163,10 +174,20 @@ splat_run load_run_of(uint entry)
 #define SPL_RUN_STEP SPL_LANES
 #define SPL_DRAWN SPL_DRAWN_SPLAT
 
+/* The invocation's entry of the dispatch. */
+uint own_entry()
+{
+#ifdef SPL_SHARED
+    return gl_WorkGroupID.x;
+#else
+    return gl_GlobalInvocationID.x / SPL_LANES;
+#endif
+}
+
 /* The invocation's run, from its own first splat on. */
 splat_run load_splat_run()
 {
-    splat_run r = load_run_of(gl_GlobalInvocationID.x / SPL_LANES);
+    splat_run r = load_run_of(own_entry());
     r.first += gl_GlobalInvocationID.x % SPL_LANES;
     return r;
 }

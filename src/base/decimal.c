@@ -3,6 +3,8 @@
 #include "base/decimal.h"
 
 #include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,4 +32,54 @@ const char *spl_decimal_parse(const char *text, double *value)
         return NULL;
     *value = number;
     return end;
+}
+
+const char *spl_decimal_print(double value, char text[SPL_DECIMAL_MAX])
+{
+    double back = 0;
+    for (int digits_shown = 15; digits_shown <= 17; digits_shown++) {
+        snprintf(text, SPL_DECIMAL_MAX, "%.*g", digits_shown, value);
+        if (spl_decimal_parse(text, &back) && back == value)
+            break;
+    }
+    return text;
+}
+
+/* A number of JSON from `from` on, which ends at `end`, to `out`, which is not behind it; returns where that ends. What
+ * is short stays as it is written. */
+static char *shorten(const char *from, const char *end, char *out)
+{
+    char text[SPL_DECIMAL_MAX];
+    double value;
+    size_t length = (size_t)(end - from), shorter = length;
+    if (length > 16 && memchr(from, '.', length) && spl_decimal_parse(from, &value) == end)
+        shorter = strlen(spl_decimal_print(value, text));
+    if (shorter >= length) {
+        memmove(out, from, length);
+        return out + length;
+    }
+    memcpy(out, text, shorter);
+    return out + shorter;
+}
+
+char *spl_decimal_shorten(char *json)
+{
+    char *out = json;
+    bool quoted = false;
+    for (const char *at = json; at && *at;) {
+        size_t length = quoted ? 0 : strspn(at, "-+.eE0123456789");
+        if (length && *at != 'e' && *at != 'E') { /* of true and false the e is no number's */
+            out = shorten(at, at + length, out);
+            at += length;
+            continue;
+        }
+        if (quoted && *at == '\\' && at[1])
+            *out++ = *at++;
+        else if (*at == '"')
+            quoted = !quoted;
+        *out++ = *at++;
+    }
+    if (out)
+        *out = '\0';
+    return json;
 }

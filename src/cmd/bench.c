@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "cmd/cmd.h"
+#include "cmd/drawing.h"
 
 static void help(void)
 {
@@ -22,6 +23,22 @@ static void show_progress(void *context, uint32_t frame, uint32_t frames)
     (void)context;
     if (isatty(STDERR_FILENO))
         fprintf(stderr, "\rframe %u of %u%s", frame + 1, frames, frame + 1 < frames ? "" : "\r\033[K");
+}
+
+/* Where rows of what is soft are of nothing. Without a report what the datasets' files say. */
+static void warn(const struct spl_cmd_bench_arguments *a, const struct spl_bench_report *report)
+{
+    struct spl_view view;
+    spl_view_init(&view);
+    view.layers = 1u << SPL_LAYER_COLOR;
+    view.soft = a->soft;
+    for (size_t d = 0; d < a->bench.dataset_count && a->soft.what.count; d++) {
+        struct spl_frame_stats stats = {0};
+        for (size_t i = 0; i < report->row_count; i++)
+            if (report->rows[i].dataset == a->datasets[d])
+                stats.soft_drawn += (uint64_t)report->rows[i].spheres;
+        spl_cmd_warn_soft(&view, a->datasets[d], report->row_count ? &stats : NULL);
+    }
 }
 
 int spl_cmd_bench(int argc, char **argv)
@@ -41,6 +58,7 @@ int spl_cmd_bench(int argc, char **argv)
     if (status)
         goto done;
     if (a.sweep.output) {
+        warn(&a, &report);
         status = spl_cmd_bench_sweep(&a.sweep, a.datasets[0], &err);
         goto done;
     }
@@ -48,6 +66,7 @@ int spl_cmd_bench(int argc, char **argv)
     status = spl_bench(&a.bench, &report, &err);
     if (status)
         goto done;
+    warn(&a, &report);
     if (a.json)
         status = spl_cmd_bench_print_json(&a.bench, &report, &err);
     else

@@ -252,7 +252,7 @@ const struct spl_cmd_table spl_cmd_bench_table = {
         "  splatd bench hall.spld\n"
         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
-        "  splatd bench hall.spld --soft 'uncertainty>q0.9' --soft-model express,base --frames 5\n"
+        "  splatd bench hall.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-model express,base --frames 5\n"
         "  splatd bench hall.spld -o hall-bench\n"
         "  splatd bench hall.spld --soft class:3-5 --soft-model base,express --method splat --lod 1,2 -o hall-soft\n"
         "  splatd bench courtyard.spld --views views.json --reference truth -o courtyard-bench\n"
@@ -314,13 +314,17 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
 /* A row where all is solid, and what it is compared with. */
 static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
 {
+    static const struct spl_soft_params usual = {.opacity = 0.3, .cover = 1};
     if (a->bench.clip.count && a->sweep.output)
         return spl_fail(err, SPL_E_USAGE, "--clip is of frame times: leave -o out");
     int rc = spl_terms_check(&a->bench.clip, "clip", err);
     if (rc)
         return rc;
     if (!a->soft.what.count && a->soft_model_count)
-        return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'uncertainty>q0.9'");
+        return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'class:3-5'");
+    if (!a->soft.what.count && (a->soft.opacity != usual.opacity || a->soft.cover != usual.cover || a->soft.blend != 0))
+        return spl_fail(err, SPL_E_USAGE, "--soft-opacity, --soft-cover and --soft-blend are of what is soft: give them "
+                                          "with --soft 'class:3-5'");
     if (a->soft.what.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
         return spl_fail(err, SPL_E_USAGE,
                         "--reference and --photographs show nothing soft: with --soft the reference is the dataset's "

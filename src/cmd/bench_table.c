@@ -20,7 +20,7 @@ void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct s
     const int soft = o->soft_count > 1 ? 11 : 0; // the column is there where it says something
     printf("\n%-16s %-7s %-7s %*s%4s %8s %8s %8s %6s %6s %7s %7s %6s %6s %6s %8s %9s %10s%s\n", "dataset", "device",
            "method", -soft, soft ? "soft" : "", "lod", "frame", "q1", "q3", "units", "floor", "select", "upload",
-           "clear", "depth", "shade", "resolve", "readback", "splats", soft ? "  spheres" : "");
+           "clear", "depth", "shade", "resolve", "readback", "splats", soft ? " soft ms    spheres" : "");
     for (size_t i = 0; i < r->row_count; i++) {
         const struct spl_bench_row *row = &r->rows[i];
         printf("%-16.16s %-7s %-7s %*s%4g %8.1f %8.1f %8.1f %6.2f %6.2f %7.1f %7.1f %6.1f %6.1f %6.1f %8.1f %9.1f "
@@ -30,7 +30,7 @@ void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct s
                row->units.median, row->floor / r->calibrator.median, row->select, row->upload, row->clear, row->depth,
                row->shade, row->resolve, row->readback, row->splats);
         if (soft)
-            printf(" %8.1f", row->soft);
+            printf(" %7.1f %10.0f", row->soft, row->spheres);
         putchar('\n');
         if (row->panels || row->meshes || row->lines)
             printf("%-16s and %.0f panels, %.0f meshes, %.0f lines\n", "", row->panels, row->meshes, row->lines);

@@ -5,7 +5,10 @@
 #include <string.h>
 
 #include "cmd/options.h"
+#include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "render/soft/share.h"
+#include "render/soft_params.h"
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height)
 {
@@ -62,6 +65,7 @@ static void replace(char *text, char from, char to)
 
 int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err)
 {
+    struct spl_cmd_drawing *d = drawing;
     char name[64];
     snprintf(name, sizeof name, "%s", option + strspn(option, "-"));
     replace(name, '-', '_');
@@ -85,7 +89,9 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
         rc = rc ? rc : spl_method_param_check(info, value, err);
     }
     if (!rc)
-        spl_view_set_param(&((struct spl_cmd_drawing *)drawing)->view, param, value);
+        spl_view_set_param(&d->view, param, value);
+    if (!rc && SPL_PARAMS_OF_ALL >> param & 1)
+        snprintf(d->soft_option, sizeof d->soft_option, "%s", option);
     return rc;
 }
 
@@ -108,6 +114,60 @@ int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl
     struct spl_error why = {0};
     int rc = spl_terms_parse_classes(text, &((struct spl_cmd_drawing *)drawing)->view.clip, &why);
     return rc ? spl_fail_field(err, SPL_E_USAGE, "class", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "color_by", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_color_parse_range(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "range", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_shade_parse(text, &((struct spl_cmd_drawing *)drawing)->view.shade, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "shade", "%s: %s", option, why.message) : SPL_OK;
+}
+
+int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
+{
+    if (!*drawing->soft_option || drawing->view.soft.what.count)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_USAGE, "soft",
+                          "%s is of what is soft, and nothing is: say what with --soft, as in --soft 'class:3-5'; "
+                          "'splatd info' says what the dataset has",
+                          drawing->soft_option);
+}
+
+void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *dataset,
+                       const struct spl_frame_stats *stats)
+{
+    uint32_t told = 0;
+    for (uint32_t i = 0; i < view->soft.what.count; i++) {
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_TERMS_TEXT_MAX];
+        uint32_t next = i + 1;
+        struct spl_terms one = view->soft.what;
+        spl_soft_explain(&one.terms[i], spl_dataset_get_info(dataset), reason);
+        if (!*reason)
+            continue;
+        for (uint32_t t = next; t < one.count; t++) /* a text of its own */
+            one.terms[t].joint = SPL_TERM_AND;
+        spl_terms_print_condition(&one, i, &next, text, sizeof text);
+        fprintf(stderr, "splatd: nothing is soft by '%s': ", text);
+        spl_cmd_put_text(stderr, reason, 0);
+        fputc('\n', stderr);
+        told++;
+    }
+    if (stats && told < view->soft.what.count && spl_view_shows_soft(view) && !stats->soft_drawn)
+        fprintf(stderr, "splatd: nothing of what is in view is soft, or it lies behind what is not\n");
 }
 
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
@@ -174,13 +234,34 @@ void spl_cmd_print_clip(FILE *out, size_t column)
                           "the classes that are drawn: 2,6 or 3-5; '!7': all others");
 }
 
+/* What any method takes. */
+static void print_changing(FILE *out, enum spl_param_changes changes, size_t column)
+{
+    for (int i = 0; i < SPL_PARAM_COUNT; i++)
+        if (spl_method_param_get((enum spl_method_param)i)->changes == changes)
+            print_param(out, (enum spl_method_param)i, column);
+}
+
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
-                          "what is drawn as soft spheres, through which one sees the rest: 'uncertainty>0.4', "
-                          "'uncertainty>q0.9', 'class:3-5', any attribute; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+                          "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
+                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
                           "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
-    for (int i = 0; i < SPL_PARAM_COUNT; i++)
-        if (SPL_PARAMS_OF_ALL >> i & 1)
-            print_param(out, (enum spl_method_param)i, column);
+    print_changing(out, SPL_CHANGES_SOFT, column);
+}
+
+void spl_cmd_print_colors(FILE *out, size_t column)
+{
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --color-by WHAT"), column,
+                          "what colours show: rgb, class, intensity or any attribute, height, normal, "
+                          "plane:x,y,z,nx,ny,nz, flat:COLOUR; rgb+intensity: times the splats' own (rgb)");
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --range LOW..HIGH"), column,
+                          "of values, which a ramp reaches from and to: 0..200, or shares of the splats, q0.02..q0.98 "
+                          "(the latter of attributes; of heights all there are)");
+    print_changing(out, SPL_CHANGES_COLORS, column);
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
+                          "for shape: none, edl (darker where what lies around is nearer), headlight, "
+                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, else none)");
+    print_changing(out, SPL_CHANGES_SHADE, column);
 }

@@ -16,6 +16,7 @@ struct spl_cmd_drawing {
     int format, layer;                   /* enum; format: -1 = not given */
     bool no_verify;
     const char *output;                  /* argument of -o; NULL = not given */
+    char soft_option[24];                /* the last of those that say how what is soft is drawn; "" = none */
     struct spl_view view;                /* all but the camera */
     struct spl_encode_options encode;    /* all but the format */
     struct spl_renderer_options renderer;
@@ -26,6 +27,14 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
 /* What a depth PNG says that its steps are of. */
 void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
 
+/* SPL_E_USAGE where an option says how soft spheres are drawn, and none what is soft. */
+int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err);
+
+/* Says on stderr which terms select nothing of the dataset, or, if `stats` (may be NULL) has it, that no soft sphere of
+ * the view was drawn. */
+void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *dataset,
+                       const struct spl_frame_stats *stats);
+
 /* `take` of rows. */
 int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err);
@@ -34,10 +43,14 @@ int spl_cmd_take_background(void *drawing, const char *option, char *text, struc
 int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_quality(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err);
 void spl_cmd_print_soft(FILE *out, size_t column);
 int spl_cmd_take_clip(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl_error *err);
 void spl_cmd_print_clip(FILE *out, size_t column);
+void spl_cmd_print_colors(FILE *out, size_t column);
 void spl_cmd_print_methods(FILE *out, size_t column);
 
 #define SPL_CMD_PARAM_ROW(param, ...) {.name = #param, .form = "X", .take = spl_cmd_take_param},
@@ -52,9 +65,15 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \
         {"clip", "TERMS", NULL, .take = spl_cmd_take_clip},                                                            \
         {"class", "LIST", NULL, .take = spl_cmd_take_class},                                                           \
+        {.help = "Colours and their shading, with any method:", .print = spl_cmd_print_colors},                        \
+        {"color-by", "WHAT", NULL, .take = spl_cmd_take_color},                                                        \
+        {"range", "LOW..HIGH", NULL, .take = spl_cmd_take_range},                                                      \
+        {"shade", "KINDS", NULL, .take = spl_cmd_take_shade},                                                          \
+        {"edl-strength", "X", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */       \
+        {"edl-radius", "N", NULL, .take = spl_cmd_take_param},                                                         \
         {.help = "Soft transparency, with any method:", .print = spl_cmd_print_soft},                                  \
         {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
-        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */      \
+        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param},                                                      \
         {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
         {"soft-cover", "X", NULL, .take = spl_cmd_take_param},                                                         \
         {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \

@@ -13,12 +13,15 @@
 
 #include <jansson.h>
 
+#include "base/decimal.h"
 #include "cmd/dictionary.h"
 #include "cmd/info_report.h"
 #include "cmd/info_scan.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "dataset/classes.h"
 #include "dataset/dataset.h"
+#include "render/soft/suggest.h"
 
 static const char bar[] = "########################################";
 enum { bar_max = sizeof bar - 1 };
@@ -168,6 +171,40 @@ static void print_stream(const struct spl_stream *stream)
     printf("%s%s%s)", steps, about && (*unit || *steps) ? ", " : "", about ? about : "");
 }
 
+/* "2 ground 67.2 %, 5 high vegetation 8.1 %, …" */
+static void print_classes(const struct spl_dataset_info *info)
+{
+    enum { shown = 20 };
+    char text[32];
+    for (uint32_t s = 0; s < info->stream_count; s++) {
+        const struct spl_stream_values *values = spl_dataset_info_get_values(info, s);
+        if (!values || strcmp(info->streams[s].name, "class"))
+            continue;
+        for (uint32_t i = 0; i < values->kind_count && i < shown; i++) {
+            const struct spl_value_count *kind = &values->kinds[i];
+            const char *name = spl_class_name(kind->value);
+            printf("%s%g%s%s %s (%.1f %%)", i ? ", " : "  classes       ", kind->value, name ? " " : "",
+                   name ? name : "", spl_cmd_group(kind->count, text),
+                   100.0 * (double)kind->count / (double)values->count);
+        }
+        if (values->kind_count > shown)
+            printf(" and %u more", values->kind_count - shown);
+        printf("%s", values->kind_count ? "\n" : "");
+    }
+}
+
+/* A line a term, as options of render take them. */
+static void print_suggestions(const struct spl_dataset_info *info)
+{
+    char terms[SPL_SUGGESTIONS_MAX][SPL_SUGGESTION_MAX];
+    const uint32_t count = spl_soft_suggest(info, terms);
+    for (uint32_t i = 0; i < count; i++) {
+        printf("%s", i ? "                --soft '" : "  soft          --soft '");
+        spl_cmd_put_text(stdout, terms[i], 0);
+        printf("'\n");
+    }
+}
+
 static void print_line(const char *label, const char *text)
 {
     printf("%-16s", label);
@@ -191,6 +228,8 @@ static void print_table(const struct spl_info_report *report)
     size_t i;
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
+    if (info->title)
+        print_line("  title", info->title);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");
@@ -211,6 +250,7 @@ static void print_table(const struct spl_info_report *report)
     for (uint32_t s = 0; s < streams; s++)
         print_stream(&stream[s]);
     printf("\n");
+    print_classes(info);
     print_colors(json_object_get(spl_dataset_get_meta(report->dataset), "color"),
                  pruned ? (uint64_t)json_integer_value(pruned) : info->leaf_splats);
     if (info->maps)
@@ -233,6 +273,9 @@ static void print_table(const struct spl_info_report *report)
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
+    for (uint32_t v = 0; v < info->view_count; v++)
+        printf("  view          --view %s\n", info->views[v].name);
+    print_suggestions(info);
     printf("  splat radius  %.4g %s (median)\n", info->splat_radius, spl_unit_word(info));
     printf("  pages         %s, %.1f MB resident", spl_cmd_group(info->pages, a),
            (double)(info->page_bytes - info->map_bytes) / 1e6);
@@ -281,7 +324,7 @@ static void print_table(const struct spl_info_report *report)
 static int print_json(const struct spl_info_report *report, struct spl_error *err)
 {
     json_t *json = spl_info_to_json(report);
-    char *text = json ? json_dumps(json, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
+    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL);
     json_decref(json);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", report->info->id);

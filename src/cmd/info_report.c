@@ -5,9 +5,13 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "dataset/chunk_clip.h"
+#include "dataset/classes.h"
 #include "dataset/panels.h"
+#include "dataset/saved_views.h"
+#include "render/soft/suggest.h"
 
 const struct spl_info_code spl_info_codes[SPL_INFO_CODES] = {
     {"position_axis",
@@ -215,6 +219,33 @@ static json_t *bytes_to_json(const struct spl_dataset_info *info, double times)
     return bytes;
 }
 
+/* How many points have each; null where the dataset has none, or more than are counted. */
+static json_t *classes_to_json(const struct spl_dataset_info *info)
+{
+    for (uint32_t s = 0; s < info->stream_count; s++) {
+        const struct spl_stream_values *values = spl_dataset_info_get_values(info, s);
+        if (!values || !values->kind_count || strcmp(info->streams[s].name, "class"))
+            continue;
+        json_t *kinds = json_array();
+        for (uint32_t i = 0; i < values->kind_count; i++)
+            json_array_append_new(kinds, json_pack("{s:f, s:I, s:s?}", "value", values->kinds[i].value, "count",
+                                                   (json_int_t)values->kinds[i].count, "name",
+                                                   spl_class_name(values->kinds[i].value)));
+        return kinds;
+    }
+    return json_null();
+}
+
+static json_t *suggestions_to_json(const struct spl_dataset_info *info)
+{
+    char terms[SPL_SUGGESTIONS_MAX][SPL_SUGGESTION_MAX];
+    const uint32_t count = spl_soft_suggest(info, terms);
+    json_t *list = json_array();
+    for (uint32_t i = 0; i < count; i++)
+        json_array_append_new(list, json_string(terms[i]));
+    return list;
+}
+
 /* NULL when memory is refused: json_pack passes it on. */
 json_t *spl_info_to_json(const struct spl_info_report *report)
 {
@@ -244,7 +275,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
         "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, "
-        "s:o}",
+        "s:o, s:s?, s:s?, s:o, s:o, s:o}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -262,5 +293,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
         json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "pruned",
         json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
-        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report));
+        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report), "title", info->title,
+        "description", info->description, "views", spl_saved_views_to_json(info->views, info->view_count),
+        "classes", classes_to_json(info), "soft", suggestions_to_json(info));
 }

@@ -64,6 +64,7 @@ struct arguments {
     int textures;        /* enum spl_texture_coding; -1 = not given */
     const char *quality; // may be NULL
     bool keep_going, skip_broken;
+    struct spl_saved_view default_view, views[SPL_SAVED_VIEWS_MAX];
 };
 
 static const char *const texture_names[SPL_TEXTURES_COUNT + 1] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
@@ -130,6 +131,64 @@ static int take_error(void *arguments, const char *option, char *text, struct sp
     return SPL_OK;
 }
 
+/* "eye=X,Y,Z,target=X,Y,Z,up=X,Y,Z,fov=DEG", in any order. */
+static int parse_view(const char *option, char *text, struct spl_saved_view *view, struct spl_error *err)
+{
+    static const char *const names[] = {"eye", "target", "up", "fov"};
+    bool given[4] = {0};
+    for (char *at = text, *next; at && *at; at = next) {
+        int key = 0;
+        size_t length = strcspn(at, "=");
+        while (key < 4 && (strlen(names[key]) != length || strncmp(at, names[key], length)))
+            key++;
+        if (key == 4 || at[length] != '=' || given[key])
+            return spl_fail_field(err, SPL_E_USAGE, option + 2,
+                                  "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z and fov=DEG, each once, not '%.60s'",
+                                  option, at);
+        given[key] = true;
+        char *value = at + length + 1;
+        for (next = value; *next && !(*next == ',' && isalpha((unsigned char)next[1]));)
+            next++;
+        if (*next)
+            *next++ = 0;
+        double *out[] = {view->eye, view->target, view->up};
+        int rc = key < 3 ? spl_cmd_parse_vector(option, value, out[key], err)
+                         : spl_cmd_parse_real(option, value, 1e-6, 179, &view->fov, err);
+        if (rc)
+            return rc;
+    }
+    return given[0] && given[1] ? SPL_OK
+                                : spl_fail_field(err, SPL_E_USAGE, option + 2, "%s needs eye=X,Y,Z and target=X,Y,Z",
+                                                 option);
+}
+
+static int take_default_view(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    a->default_view = (struct spl_saved_view){0};
+    a->pack.default_view = &a->default_view;
+    return parse_view(option, text, &a->default_view, err);
+}
+
+static int take_view(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    size_t length = strcspn(text, "=");
+    if (a->pack.view_count == SPL_SAVED_VIEWS_MAX)
+        return spl_fail_field(err, SPL_E_USAGE, "view", "%s is given more than %d times", option, SPL_SAVED_VIEWS_MAX);
+    struct spl_saved_view *view = &a->views[a->pack.view_count];
+    *view = (struct spl_saved_view){0};
+    if (text[length] != '=' || !length || length >= sizeof view->name)
+        return spl_fail_field(err, SPL_E_USAGE, "view",
+                              "%s takes NAME=eye=X,Y,Z,target=X,Y,Z, the name of at most 63 letters, digits, '.', '_' and "
+                              "'-', not '%.60s'",
+                              option, text);
+    memcpy(view->name, text, length);
+    a->pack.views = a->views;
+    a->pack.view_count++;
+    return parse_view(option, text + length + 1, view, err);
+}
+
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
      SPL_CMD_TEXT(struct arguments, pack.output)},
@@ -150,6 +209,13 @@ static const struct spl_cmd_option options[] = {
      .otherwise = "what the scans say", SPL_CMD_TEXT(struct arguments, pack.crs)},
     {"up", "AXIS", "what is up: +z, -y and such, or a direction X,Y,Z",
      .otherwise = "z; without a coordinate system, what is up in the photographs", .take = take_up},
+    {"title", "TEXT", "what people call the dataset, a line", SPL_CMD_TEXT(struct arguments, pack.title)},
+    {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct arguments, pack.description)},
+    {"default-view", "VIEW",
+     "eye=X,Y,Z,target=X,Y,Z[,up=X,Y,Z][,fov=DEG]: what is shown where nobody says a camera; fov is vertical, of images "
+     "narrower than high across",
+     .otherwise = "one that shows all of it, or a room from inside", .take = take_default_view},
+    {"view", "NAME=VIEW", "the same under a name, for view=NAME; up to 64 times", .take = take_view},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -223,6 +289,7 @@ static const struct spl_cmd_table table = {
         "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
         "                   [--max-points N] [--threads N]\n"
+        "                   [--title TEXT] [--description TEXT] [--default-view VIEW] [--view NAME=VIEW]...\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
         "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n"
         "                   [--panoramas PATH [--images DIR] [--keep-going] | --no-panoramas] [--prune N]\n"
@@ -242,6 +309,9 @@ static const struct spl_cmd_table table = {
         "  splatd pack tiles --skip-broken -o city.spld\n"
         "The same from a list of their names:\n"
         "  splatd pack @tiles.txt -o city.spld\n"
+        "With a title, another first view than the one that is found, and a second one by name:\n"
+        "  splatd pack hall.ply --title 'The hall' --default-view eye=4,5,1.6,target=0,0,1.2,fov=60 \\\n"
+        "         --view door=eye=1,0,1.6,target=4,0,1.2 -o hall.spld\n"
         "Text whose columns nothing names ('-' skips one):\n"
         "  splatd pack points.txt --columns x,y,z,-,r,g,b -o points.spld\n"
         "Colours and textures from photographs with poses, by COLMAP here:\n"

@@ -15,14 +15,18 @@
 #include "cmd/drawing.h"
 #include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "dataset/saved_views.h"
 #include "geom/camera_json.h"
+#include "geom/fit.h"
 #include "geom/size.h"
+#include "render/soft_params.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
+    const char *view; // may be NULL; the name of one that the dataset was packed with
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
@@ -39,6 +43,8 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
+    {"view", "NAME", "or that view's, which the dataset was packed with ('splatd info' lists them)",
+     SPL_CMD_TEXT(struct arguments, view)},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
     {"crs", "EPSG:N", "what --eye, --target and shapes of --soft and --clip are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
@@ -77,10 +83,11 @@ static const struct spl_cmd_table table = {
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
         "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
-        "Through the crown of a tree, whose uncertain points fade where the solid ones stay:\n"
-        "  splatd render courtyard.spld --soft 'uncertainty>q0.9' --soft-opacity 0.2 -o through.jpg\n"
+        "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
+        "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
+        "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
-        "  splatd render courtyard.spld --soft 'plane:0,0,2.5,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
+        "  splatd render courtyard.spld --soft 'plane:0,0,3,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
         "What lies above 2.5 cut away; a slice of 10 cm; what lies in one building's plot, but for vegetation:\n"
         "  splatd render courtyard.spld --clip 'z<2.5' -o cut.jpg\n"
         "  splatd render courtyard.spld --clip 'z:1.2..1.3' -o slice.jpg\n"
@@ -134,11 +141,34 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
     return rc;
 }
 
-static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+/* The default view, or --view: its eye, target and up, and its field of view in *camera. */
+static int start_camera(const struct arguments *a, const struct spl_dataset *dataset, struct spl_saved_view *from,
+                        struct spl_camera *camera, struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    const uint32_t *size = a->drawing.size;
+    int rc = spl_dataset_get_default_camera(dataset, size[0], size[1], camera, err);
+    memcpy(from->eye, info->default_eye, sizeof from->eye);
+    memcpy(from->target, info->default_target, sizeof from->target);
+    memcpy(from->up, info->default_up, sizeof from->up);
+    if (rc || !a->view)
+        return rc;
+    const struct spl_saved_view *view = spl_saved_views_find(info->views, info->view_count, a->view);
+    if (!view)
+        return spl_fail_field(err, SPL_E_USAGE, "view", "--view: '%s' has no view '%.64s'; 'splatd info' lists them",
+                              info->id, a->view);
+    *from = *view;
+    if ((rc = spl_camera_set_fov(camera, spl_fit_fov((double[]){view->fov, view->fov}, size[0], size[1]), size[0], size[1],
+                                 err)))
+        return rc;
+    return spl_camera_look_at(camera, view->eye, view->target, view->up, err);
+}
+
+static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
+{
     struct spl_camera *camera = &a->drawing.view.camera;
-    int rc = spl_dataset_get_default_camera(dataset, a->drawing.size[0], a->drawing.size[1], camera, err);
+    struct spl_saved_view from = {0};
+    int rc = start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
     if (!isnan(a->fov) && !isnan(a->fx))
@@ -153,9 +183,9 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     camera->cx = isnan(a->cx) ? camera->cx : a->cx;
     camera->cy = isnan(a->cy) ? camera->cy : a->cy;
     if (!isnan(a->eye[0]) || !isnan(a->target[0]) || !isnan(a->up[0]))
-        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? info->default_eye : a->eye,
-                                isnan(a->target[0]) ? info->default_target : a->target,
-                                isnan(a->up[0]) ? info->default_up : a->up, err);
+        rc = spl_camera_look_at(camera, isnan(a->eye[0]) ? from.eye : a->eye,
+                                isnan(a->target[0]) ? from.target : a->target,
+                                isnan(a->up[0]) ? from.up : a->up, err);
     if (rc)
         return rc;
     camera->near = isnan(a->near) ? camera->near : a->near;
@@ -166,15 +196,16 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     return spl_view_check(&a->drawing.view, err);
 }
 
-static void report(const struct spl_device_info *device, const struct spl_dataset_info *info,
+static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const double *low = info->bounds_min, *high = info->bounds_max;
     const struct {
         uint64_t count;
         const char *what;
     } others[] = {{stats->panels_drawn, "panels"}, {stats->meshes_drawn, "meshes"}, {stats->lines_drawn, "lines"}};
-    uint64_t drawn = stats->splats_drawn;
+    uint64_t drawn = stats->splats_drawn + stats->soft_drawn;
     fprintf(stderr, "splatd: %s %s%s: %llu splats", device->backend, device->name,
             device->software ? " (software)" : "", (unsigned long long)stats->splats_drawn);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
@@ -182,6 +213,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         if (others[i].count)
             fprintf(stderr, ", %llu %s", (unsigned long long)others[i].count, others[i].what);
     }
+    if (spl_view_shows_soft(&a->drawing.view))
+        fprintf(stderr, ", %llu soft spheres", (unsigned long long)stats->soft_drawn);
     fprintf(stderr, " in %.1f ms", stats->total_ms);
     if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
@@ -190,6 +223,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     if (!drawn)
         fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
                 low[0], low[1], low[2], high[0], high[1], high[2]);
+    else
+        spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
                 (unsigned long long)encoded->saturated);
@@ -220,7 +255,7 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
     if (!rc)
-        report(spl_renderer_get_device(renderer), spl_dataset_get_info(dataset), &frame.stats, a, &encoded);
+        report(spl_renderer_get_device(renderer), dataset, &frame.stats, a, &encoded);
     spl_encoded_finish(&encoded);
     spl_frame_finish(&frame);
     if (renderer && dataset)
@@ -247,7 +282,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

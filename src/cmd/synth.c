@@ -65,7 +65,7 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, scan.formats)},
     {"classes", NULL,
      "each point's class: 2 ground, 5 vegetation, 6 building, 10 rails, 11 road, 13 and 14 wires, 15 pylons, 16 what "
-     "wires hang on, 17 bridge, 64 ceiling, 65 furniture, else 1; PLY and LAS alone",
+     "wires hang on, 17 bridge, 64 ceiling, 65 furniture, else 1; in PLY and LAS, never in PTX",
      SPL_CMD_FLAG(struct arguments, scan.classes)},
     {.help = "Exact pictures:"},
     {"views", "FILE",
@@ -111,6 +111,8 @@ static const struct spl_cmd_table table = {
         "give equal files on any number of threads.\n\n"
         "A scan to play with, packed:\n"
         "  splatd synth courtyard -o scan && splatd pack scan/courtyard.ptx -o courtyard.spld\n"
+        "The same with classes, which PTX does not have, for 'splatd render --soft class:5':\n"
+        "  splatd synth courtyard --classes --format ply -o scan && splatd pack scan/courtyard.ply -o classes.spld\n"
         "Five million points, another noise pattern, PTX only:\n"
         "  splatd synth courtyard --points 5e6 --seed 7 --format ptx -o scan\n"
         "Points exactly on the surfaces, for comparing against the truth:\n"

@@ -132,6 +132,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
     memcpy(defaults.target, info->default_target, sizeof defaults.target);
     memcpy(defaults.up, info->default_up, sizeof defaults.up);
+    memcpy(defaults.fit, info->default_fit, sizeof defaults.fit);
     int rc = spl_dataset_get_default_camera(dataset, 16, 9, &camera, err);
     defaults.near = camera.near;
     defaults.far = camera.far;
@@ -152,6 +153,10 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) &&
              !(rc = spl_fade_sample(&path, &motion, a->count, &a->fades, err)) && a->video)
         rc = spl_video_check(a->cameras->width, a->cameras->height, err);
+    if (!rc && a->fades && !a->drawing.view.soft.what.count)
+        rc = spl_fail_field(err, SPL_E_USAGE, "soft",
+                            "the path changes soft_opacity, soft_cover or soft_blend, and nothing is soft: say what "
+                            "with --soft, as in --soft 'class:3-5'");
     if (!rc) {
         a->drawing.view.camera = a->cameras[0];
         rc = spl_view_check(&a->drawing.view, err);
@@ -233,8 +238,10 @@ static int run(struct arguments *a, struct spl_error *err)
     int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_cameras(a, dataset, err);
-    if (!rc)
+    if (!rc) {
         spl_cmd_drawing_set_unit(&a->drawing, dataset);
+        spl_cmd_warn_soft(&a->drawing.view, dataset, NULL);
+    }
     if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
         rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->drawing.output);
     if (!rc)
@@ -266,7 +273,7 @@ int spl_cmd_tour(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (resolve_output(&a, &err) || run(&a, &err))
+    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_output(&a, &err) || run(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

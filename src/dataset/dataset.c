@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/sized.h"
 #include "dataset/open.h"
+#include "geom/fit.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
 
@@ -293,7 +294,9 @@ int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t w
     double square = 0;
     for (int a = 0; a < 3; a++)
         square += (info->bounds_max[a] - info->bounds_min[a]) * (info->bounds_max[a] - info->bounds_min[a]);
-    int rc = spl_camera_set_fov(camera, info->default_fov, width, height, err);
+    double fov = info->default_fit[0] > 0 && width && height ? spl_fit_fov(info->default_fit, width, height)
+                                                             : info->default_fov;
+    int rc = spl_camera_set_fov(camera, fov, width, height, err);
     if (!rc)
         rc = spl_camera_look_at(camera, info->default_eye, info->default_target, info->default_up, err);
     camera->near = fmax(1e-4 * sqrt(square), info->splat_radius);

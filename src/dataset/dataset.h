@@ -125,7 +125,9 @@ uint32_t spl_dataset_get_stream_words(const struct spl_dataset *dataset, uint32_
 /* META's keys, written by pack and read by open (all required unless said):
  *   "points" int, "part_of" int (optional, at least "points": of how many points those are an even part),
  *   "leaf_splats" int, "levels" int, "splat_radius" real, "bounds" {"min": [3], "max": [3]},
- *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real}, "attributes" {"color": bool, "surface":
+ *   "default_view" {"eye": [3], "target": [3], "up": [3], "fov": real, "fit": [2] (optional)},
+ *   "title", "description" strings, "views" [{"name": string, "eye": [3], "target": [3], "up": [3], "fov": real}]
+ *   (optional), "attributes" {"color": bool, "surface":
  *   bool (optional, true)}, "counts" {…} (the writer's, see counts.h),
  *   "streams" [{"name": string, "type": string, "unit": string, of type "steps" too "first": whole number,
  *   "steps_a_unit": real}] (optional; the writer's), "pruned" {"of": int} (optional: leaf splats before nodes were

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "dataset/open.h"
+#include "dataset/saved_views.h"
 #include "geom/unit.h"
 
 /* Of what is no number and no text the shape alone. */
@@ -112,6 +113,43 @@ static int get_view(struct spl_dataset *dataset, struct spl_error *err)
         return spl_fail_field(err, SPL_E_CORRUPT, key,
                               "%s: section META: \"%s\" is no view: %s; pack the dataset again", dataset->name, key,
                               why.message);
+    return SPL_OK;
+}
+
+/* Optional: what an image of another shape than 16:9 shows. */
+static int get_fit(struct spl_dataset *dataset, struct spl_error *err)
+{
+    const char *path = "default_view.fit";
+    const json_t *fit = json_object_get(json_object_get(dataset->meta, "default_view"), "fit");
+    if (!fit)
+        return SPL_OK;
+    bool good = json_is_array(fit) && json_array_size(fit) == 2;
+    for (size_t i = 0; good && i < 2; i++) {
+        double angle = json_number_value(json_array_get(fit, i));
+        good = json_is_number(json_array_get(fit, i)) && angle > 0 && angle <= 179;
+        dataset->info.default_fit[i] = angle;
+    }
+    return good ? SPL_OK : wrong(dataset, err, path, fit, "two numbers of degrees above 0, up to 179");
+}
+
+/* Optional: what its packer has said of it. */
+static int get_said(struct spl_dataset *dataset, struct spl_error *err)
+{
+    struct spl_dataset_info *info = &dataset->info;
+    const json_t *title = json_object_get(dataset->meta, "title");
+    const json_t *description = json_object_get(dataset->meta, "description");
+    const json_t *views = json_object_get(dataset->meta, "views");
+    struct spl_error why = {0};
+    if (title && (!json_is_string(title) || json_string_length(title) > SPL_TITLE_BYTES_MAX))
+        return wrong(dataset, err, "title", title, "a text of at most 200 bytes");
+    if (description && (!json_is_string(description) || json_string_length(description) > SPL_DESCRIPTION_BYTES_MAX))
+        return wrong(dataset, err, "description", description, "a text of at most 4000 bytes");
+    info->title = json_string_value(title);
+    info->description = json_string_value(description);
+    if (views && spl_saved_views_from_json(views, info->default_up, false, dataset->views, &info->view_count, &why))
+        return spl_fail_field(err, SPL_E_CORRUPT, why.field, "%s: section META: %s; pack the dataset again",
+                              dataset->name, why.message);
+    info->views = dataset->views;
     return SPL_OK;
 }
 
@@ -274,6 +312,10 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = get_bounds(dataset, err);
     if (!rc)
         rc = get_view(dataset, err);
+    if (!rc)
+        rc = get_fit(dataset, err);
+    if (!rc)
+        rc = get_said(dataset, err);
     if (!rc)
         rc = get_attributes(dataset, err);
     if (!rc)

@@ -67,6 +67,7 @@ struct spl_dataset {
     struct spl_stream_values stream_values[SPL_STREAMS_MAX];
     struct spl_dictionary dictionary; /* count 0 = no textures */
     json_t *meta;
+    struct spl_saved_view views[SPL_SAVED_VIEWS_MAX]; /* info.view_count of them */
 };
 
 /* What errors call it: its id once it is open, for they reach clients, whom the path is no business of. */

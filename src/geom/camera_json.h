@@ -26,7 +26,15 @@ enum spl_value_kind {
     SPL_KIND_END,  /* the service's own kinds go on from here */
 };
 
-enum spl_value_place { SPL_QUERY = 1, SPL_BODY = 2, SPL_CAMERA = 4, SPL_PICK = 8, SPL_PICK_BODY = 16, SPL_PLACE = 32 };
+enum spl_value_place {
+    SPL_QUERY = 1,
+    SPL_BODY = 2,
+    SPL_CAMERA = 4,
+    SPL_PICK = 8,
+    SPL_PICK_BODY = 16,
+    SPL_PLACE = 32,
+    SPL_THUMBNAIL = 64
+};
 
 enum spl_camera_param {
 #define PARAM(name, alias, kind, places, help) SPL_CAMERA_##name,
@@ -35,13 +43,14 @@ enum spl_camera_param {
     SPL_CAMERA_PARAMS
 };
 
-enum { SPL_VALUE_NUMBERS = 16 };
+enum { SPL_VALUE_NUMBERS = 16, SPL_VALUE_WORD = 64 };
 
 struct spl_value {
     bool given;
     unsigned count;
     double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov: glTF's aspect ratio in n[1] */
     const char *source;          /* the member of a form that said it, a literal; NULL: the parameter itself */
+    char word[SPL_VALUE_WORD];   /* of a name */
 };
 
 /* Who knows where other coordinates lie in a dataset's world. */
@@ -52,10 +61,20 @@ struct spl_camera_places {
                     double out[3], struct spl_error *err);
 };
 
+/* Who knows a dataset's views by name. */
+struct spl_camera_defaults;
+struct spl_camera_names {
+    /* Puts the view into eye, target, up, fov and fit of `out`. SPL_E_INPUT, field "view", where there is none. */
+    int (*find)(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
+                struct spl_error *err);
+};
+
 /* What stands in for parameters that were left out: the default view of a dataset. */
 struct spl_camera_defaults {
     double eye[3], target[3], up[3], fov, near, far;
+    double fit[2]; /* degrees across and upright that an image of any shape shows; 0 = fov in all of them */
     const struct spl_camera_places *places; // may be NULL: nothing is known but the world
+    const struct spl_camera_names *names;   // may be NULL: there are none
 };
 
 /* Caps on an image's size; no camera can lift them. What more there is to an image than its camera is judged by those

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/fit.h"
 #include "geom/size.h"
 
 static const char *const names[SPL_CAMERA_PARAMS] = {
@@ -92,7 +93,8 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
                               struct spl_camera *camera, struct spl_error *err)
 {
     static const enum spl_camera_param pinhole[] = {SPL_CAMERA_fx, SPL_CAMERA_fy, SPL_CAMERA_cx, SPL_CAMERA_cy};
-    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, defaults->fov), camera->width, camera->height, err);
+    double fov = defaults->fit[0] > 0 ? spl_fit_fov(defaults->fit, camera->width, camera->height) : defaults->fov;
+    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, fov), camera->width, camera->height, err);
     if (rc)
         return rc;
     if (given(v, SPL_CAMERA_params) && !given(v, SPL_CAMERA_model))

@@ -34,6 +34,8 @@ enum spl_resource {
     SPL_RESOURCE_SOFT,      /* uint[], SPL_SOFT_STATE_WORDS a sample */
     SPL_RESOURCE_WALKS,     /* uint[], SPL_SOFT_WALK_WORDS a sample */
     SPL_RESOURCE_FOUND,     /* uint[], SPL_SOFT_FOUND_WORDS a sample */
+    SPL_RESOURCE_SHADES,    /* uint[], the share of SPL_SHADE_WHOLE that a sample keeps of its light */
+    SPL_RESOURCE_PALETTE,   /* uint[], SPL_PALETTE_WORDS: what values become */
     SPL_RESOURCE_OUTPUT,    /* uint[], requested layers one after the other, one word a pixel */
     SPL_RESOURCE_COUNT
 };

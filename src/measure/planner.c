@@ -42,6 +42,23 @@ static size_t add_guesses(struct spl_candidate *candidates, bool (*usable)(const
     return count;
 }
 
+/* How slow the profile's machine is to the one of the guesses: the mean over the settings that both have. */
+static double compare_devices(const struct spl_planner *planner)
+{
+    double sum = 0, count = 0;
+    for (size_t i = 0; i < planner->count; i++) {
+        const struct spl_candidate *c = &planner->candidates[i];
+        const struct spl_method_guess *guess = spl_method_row(c->setting.method)->guesses;
+        for (int k = 0; k < SPL_METHOD_GUESSES_MAX && guess[k].lod > 0; k++)
+            if (guess[k].lod == c->setting.lod && guess[k].supersample == c->setting.supersample &&
+                c->fixed_ms + c->ms_per_mpx > 0) {
+                sum += log((c->fixed_ms + c->ms_per_mpx) / (guess[k].fixed_ms + guess[k].ms_per_mpx));
+                count++;
+            }
+    }
+    return count ? sum / count : 0;
+}
+
 /* One-sided 95 % point of Student's t, by Cornish and Fisher's expansion, which is within 1 % from 4 degrees of freedom
  * on, and up to 27 % too little below. */
 static double student(double freedom)
@@ -100,6 +117,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
     }
     /* From the 90 % quantile of a normal distribution to its 97 %: 1.88 / 1.28. */
     planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
+    planner->device = compare_devices(planner);
     if (!planner->count)
         planner->count = add_guesses(planner->candidates, usable);
     add_soft(planner, profile);
@@ -207,7 +225,7 @@ static struct spl_soft_work work_of(const struct spl_setting *setting, uint32_t 
                                     enum spl_layer layer)
 {
     double samples = setting->supersample * setting->supersample * width * height;
-    return (struct spl_soft_work){1e-6 * samples, setting->lod, layer, setting->method};
+    return (struct spl_soft_work){1e-6 * samples, setting->lod, layer, setting->method, 0, 1};
 }
 
 /* How one candidate stands to the demand. */
@@ -223,10 +241,13 @@ static struct standing assess(const struct spl_planner *planner, size_t index, c
     struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
     double spread = planner->spread;
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
-    if (demand->soft && demand->soft->what.count)
-        s.ms = spl_soft_costs_estimate(&planner->soft, demand->soft,
-                                       work_of(&c->setting, demand->width, demand->height, demand->layer), s.ms,
-                                       &spread);
+    if (demand->soft && demand->soft->what.count) {
+        struct spl_soft_work work = work_of(&c->setting, demand->width, demand->height, demand->layer);
+        work.spheres = spl_soft_guess_spheres(demand->soft_splats, demand->soft_splats > 0 ? demand->soft_share : NAN,
+                                              work.megasamples, work.lod);
+        work.slowness = exp(planner->device + planner->shared);
+        s.ms = spl_soft_costs_estimate(&planner->soft, demand->soft, work, s.ms, &spread);
+    }
     s.tail_ms = s.ms * exp(spread);
     if (!isnan(demand->budget_ms))
         s.in_time = s.ms + demand->extra_ms <= demand->budget_ms &&

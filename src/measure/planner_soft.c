@@ -15,11 +15,15 @@ static const double spread_quantile = 0.97, spread_step = 0.08, spread_least = 0
 static const double first_spread = 0.35, samples_first = 0.8, samples_most = 1.5, lod_first = 1, lod_most = 2.5;
 enum { first_frames = 6 };
 
-/* Of a solid frame's time: what the stage adds where nothing is known. */
-static const double guesses[SPL_SOFT_MODEL_COUNT] = {[SPL_SOFT_MODEL_EXPRESS] = 0.5,
-                                                     [SPL_SOFT_MODEL_CONCENTRIC] = 4,
-                                                     [SPL_SOFT_MODEL_BASE] = 6,
-                                                     [SPL_SOFT_MODEL_LAYER] = 0.5};
+/* What the stage takes where nothing is known, in milliseconds of the machine that the methods' guesses are of: the
+ * upper end of what scans took (tests/bench/RESULTS.md, "What a first guess promises"). */
+static const struct guess {
+    double fixed, a_megasample, a_million_spheres;
+} guesses[SPL_SOFT_MODEL_COUNT] = {[SPL_SOFT_MODEL_EXPRESS] = {5, 60, 400},
+                                   [SPL_SOFT_MODEL_CONCENTRIC] = {10, 1000, 6000},
+                                   [SPL_SOFT_MODEL_BASE] = {10, 1000, 6000},
+                                   [SPL_SOFT_MODEL_LAYER] = {5, 60, 400}};
+static const double guessed_spread = 0.7, unknown_share = 0.5, deep = 5; /* spheres a sample, where splats are one */
 
 static double clamp(double x, double least, double most)
 {
@@ -73,6 +77,30 @@ static void measure(struct spl_soft_work work, double x[2])
     x[1] = log(fmax(work.lod, 0.25));
 }
 
+double spl_soft_guess_spheres(double splats, double share, double megasamples, double lod)
+{
+    const double fine = fmax(lod, 0.25), shown = deep * 1e6 * megasamples / (fine * fine);
+    const double all = !(splats > 0) ? shown : lod > 0 ? fmin(splats, shown) : splats;
+    return (isnan(share) ? unknown_share : clamp(share, 0, 1)) * all;
+}
+
+static double guess_ms(enum spl_soft_model model, struct spl_soft_work work)
+{
+    const struct guess *guess = &guesses[model];
+    return work.slowness * (guess->fixed + guess->a_megasample * work.megasamples * (work.spheres > 0) +
+                            1e-6 * guess->a_million_spheres * work.spheres);
+}
+
+/* The last of another model that was drawn, of the same layer: it says how fast this device is; NULL = none. */
+static const struct spl_soft_cost *find_other(const struct spl_soft_costs *costs, enum spl_layer layer)
+{
+    const struct spl_soft_cost *found = NULL;
+    for (const struct spl_soft_cost *row = costs->rows; row < costs->rows + SPL_SOFT_COSTS_MAX; row++)
+        if (row->key && row->drawn && row->layer == layer && (!found || row->used > found->used))
+            found = row;
+    return found;
+}
+
 double spl_soft_costs_estimate(const struct spl_soft_costs *costs, const struct spl_soft_params *soft,
                                struct spl_soft_work work, double solid_ms, double *spread)
 {
@@ -80,9 +108,14 @@ double spl_soft_costs_estimate(const struct spl_soft_costs *costs, const struct 
     double x[2];
     measure(work, x);
     if (spread)
-        *spread = fmax(*spread, row ? row->spread : first_spread);
-    if (!row)
-        return solid_ms * (1 + (is_drawn(soft) ? guesses[soft->model] : 0));
+        *spread = fmax(*spread, row ? row->spread : guessed_spread);
+    if (!row && !is_drawn(soft))
+        return solid_ms;
+    if (!row) {
+        const struct spl_soft_cost *other = find_other(costs, work.layer);
+        const double guess = guess_ms(soft->model, work);
+        return solid_ms + (other ? exp(stage_ln(other, x)) * guess / guess_ms(other->model, work) : guess);
+    }
     return solid_ms * exp(row->rest) + (row->drawn ? exp(stage_ln(row, x)) : 0);
 }
 

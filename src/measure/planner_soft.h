@@ -1,12 +1,14 @@
 /* What soft transparency adds to a frame's time, learned by what is soft: its terms, its model, the layer, the solid
  * method (behind whose holes more spheres are seen), and whether anything of it is drawn at all.
  *
- * Nothing of a profile says how many spheres a view's terms make, so a soft view is estimated as
+ * Nothing of a profile says how many spheres a view's terms make and how they overlap, so a soft view is estimated as
  *     ms = solid · exp(rest) + exp(cost + by_samples · ln samples - by_lod · ln lod)
  * where `solid` is the estimate of the same view with nothing soft, and the other four are learned from frames: how
  * much of the solid work is left, what the stage takes, and how that follows size and level. Before the first frame of
  * its terms and method a view is taken to cost what its terms did with another method, or else the last other terms of
- * its model; before any, a guess by model. Pure; owned by the planner's thread. */
+ * its model, or of another model as much more as that takes. Before any it is a guess that is rather too much than too
+ * little, so that no first frame takes twenty times what it was promised: by model, from how many spheres there may be,
+ * times what this device takes of what the table of guesses was made on. Pure; owned by the planner's thread. */
 #ifndef SPL_MEASURE_PLANNER_SOFT_H
 #define SPL_MEASURE_PLANNER_SOFT_H
 
@@ -39,12 +41,18 @@ struct spl_soft_costs {
     uint64_t frames;
 };
 
-/* A frame's size as the stage sees it: `megasamples` > 0 of all its pixels, lod >= 0. */
+/* A frame's size as the stage sees it: `megasamples` > 0 of all its pixels, lod >= 0. For guesses: how many spheres it
+ * may have, and the device's times as multiples of those of the table (> 0). */
 struct spl_soft_work {
     double megasamples, lod;
     enum spl_layer layer;
     enum spl_method method;
+    double spheres, slowness;
 };
+
+/* How many spheres a view may have of a dataset of `splats` (0 = unknown), of which terms take `share` (NAN =
+ * unknown). */
+double spl_soft_guess_spheres(double splats, double share, double megasamples, double lod);
 
 /* The expected time of a soft frame whose solid estimate is solid_ms, of which nothing has to be known. *spread, if not
  * NULL, is raised to that of such frames. */

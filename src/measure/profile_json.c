@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/decimal.h"
 #include "base/file.h"
 #include "base/memory.h"
 #include "shared.h"
@@ -428,7 +429,7 @@ int spl_profile_save(const char *path, const struct spl_profile *profile, struct
             copy.points[i].psnr_q05 = NAN;
     }
     json = spl_profile_to_json(&copy);
-    text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
     if (!text)
         spl_fail(err, SPL_E_NOMEM, "out of memory for the profile '%s'", path);
     else if (!(rc = check(&copy, path, err)) && !(rc = spl_profile_parse(text, strlen(text), path, &again, err)))

@@ -23,6 +23,7 @@
 #include "pack/eyes.h"
 #include "pack/linear.h"
 #include "pack/median.h"
+#include "pack/said.h"
 #include "pack/texture/pass.h"
 #include "pack/up.h"
 
@@ -43,7 +44,10 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
 {
     struct spl_default_view view;
     double radius;
-    int rc = spl_default_view_find(&p->points, &view, err);
+    int rc = p->options->default_view ? SPL_OK
+                                      : spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, &view, err);
+    if (p->options->default_view)
+        spl_said_view(p->options->default_view, p->points.up, &view);
     if (!rc)
         rc = median_radius(&p->points, &radius, err);
     if (!rc)
@@ -56,7 +60,9 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
     spl_stage_begin(p->stage, "writing", NULL, 0);
-    rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
+    rc = spl_said_add(p->options, p->points.up, meta, err);
+    if (!rc)
+        rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);
     json_decref(meta);
     spl_stage_end(p->stage);
@@ -212,6 +218,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = spl_pack_check(options, &p.neighbours, &p.chunk, err);
+    if (!rc)
+        rc = spl_said_check(options, err);
     if (!rc && options->export_primitives)
         rc = spl_export_check(options->export_primitives, (const char *const *)inputs->paths, inputs->count, err);
     if (!rc)

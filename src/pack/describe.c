@@ -35,12 +35,12 @@ json_t *spl_build_describe(const struct spl_build *p, double radius, const struc
         json_array_append_new(stations, pose);
     }
     json_t *meta = json_pack(
-        "{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:{s:b, s:b}, s:o, s:s, s:s?, s:o, s:o,"
+        "{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f, s:[f, f]}, s:{s:b, s:b}, s:o, s:s, s:s?, s:o, s:o,"
         " s:o, s:{s:i, s:f, s:f, s:I, s:I, s:f, s:f}}",
         "points", (json_int_t)points->points_read, "leaf_splats", (json_int_t)points->count, "levels",
         (int)p->tree.levels, "splat_radius", radius, "bounds", "min", json_vector(points->bounds_min), "max",
         json_vector(points->bounds_max), "default_view", "eye", json_vector(view->eye), "target",
-        json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "attributes", "color",
+        json_vector(view->target), "up", json_vector(view->up), "fov", view->fov, "fit", view->fit[0], view->fit[1], "attributes", "color",
         (int)points->has_color, "surface", !points->no_surface, "bits", bits, "unit",
         spl_unit_print(p->system.unit_m, unit), "crs", p->system.crs, "sources", sources, "stations", stations, "color",
         spl_scans_describe(&p->scans), "pack", "neighbours", (int)p->neighbours, "position_error_bound",

@@ -196,6 +196,58 @@ static float median_with_panels(struct spl_node_encoder *w, uint32_t sample, uin
     return w->weighted[at - 1][0];
 }
 
+/* Where lines stand for linear splats, these have chunks of their own: a view that asks which of the node's splats are
+ * soft sees by the headers of these alone whether lines may still be drawn. Returns how many they are. */
+static uint32_t put_linear_first(struct spl_node_encoder *w, const struct spl_tree_node *node, uint32_t count)
+{
+    const struct spl_points *p = w->points;
+    uint32_t linear = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct spl_cut item = w->items[i];
+        if (node->child_count ? !node->splats[item.index].linear : !p->linear || !p->linear[node->begin + item.index])
+            continue;
+        w->items[i] = w->items[linear];
+        w->items[linear++] = item;
+    }
+    return linear;
+}
+
+static size_t chunks_of(uint32_t count)
+{
+    return (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
+}
+
+/* Adds items [begin, end) to the node's chunks. */
+static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node *node, uint32_t begin, uint32_t end,
+                         struct spl_node *header, struct spl_encoded_node *out)
+{
+    spl_chunks_cut(w->items + begin, end - begin);
+    for (uint32_t first = begin; first < end; first += SPL_CHUNK_SPLATS) {
+        struct spl_splat splats[SPL_CHUNK_SPLATS];
+        double position[SPL_CHUNK_SPLATS][3];
+        const uint32_t used = end - first < SPL_CHUNK_SPLATS ? end - first : SPL_CHUNK_SPLATS, c = out->chunk_count++;
+        for (uint32_t i = 0; i < used; i++) {
+            uint32_t at = w->items[first + i].index;
+            if (node->child_count)
+                load_inner(node, at, &splats[i], position[i]);
+            else
+                load_leaf(w->points, node, at, &splats[i], position[i]);
+        }
+        if (w->points->no_surface)
+            level_radii(splats, used);
+        struct spl_chunk_error error;
+        uint32_t words = spl_chunk_encode(splats, (const double(*)[3])position, used, w->options, &out->chunks[c],
+                                          w->words + out->word_count, &error);
+        grow_box(header, splats, position, &out->chunks[c]);
+        out->chunks[c].geometry_word = (uint32_t)out->word_count;
+        out->word_count += words;
+        out->word_count += spl_emitted_streams_encode(w->streams, w->points, node, w->items + first, used,
+                                                      out->codes[c], w->words + out->word_count);
+        out->error.position_over_radius += error.position_over_radius;
+        out->error.normal_radians += error.normal_radians;
+    }
+}
+
 bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *node, struct spl_node *header,
                      struct spl_encoded_node *out)
 {
@@ -224,36 +276,14 @@ bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *nod
         (node->panels ? median_with_panels(w, sample, count, node->panels) : spl_median(w->radii, sample)) /
         SPL_RADIUS_SPACING;
 
-    spl_chunks_cut(w->items, count);
-    out->chunk_count = (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
+    const uint32_t linear = w->wires->with_widths ? put_linear_first(w, node, count) : 0;
+    const size_t chunks = chunks_of(linear) + chunks_of(count - linear);
     if (!spl_wires_get_node(w->wires, node->begin, node->end, leaf ? 0 : header->spacing, &w->lines) ||
-        !reserve_chunks(w, out->chunk_count, w->lines.count, node->panels ? node->panels->chunk_count : 0, out))
+        !reserve_chunks(w, chunks, w->lines.count, node->panels ? node->panels->chunk_count : 0, out))
         return false;
-    for (uint32_t c = 0; c < out->chunk_count; c++) {
-        struct spl_splat splats[SPL_CHUNK_SPLATS];
-        double position[SPL_CHUNK_SPLATS][3];
-        uint32_t first = c * SPL_CHUNK_SPLATS;
-        uint32_t used = count - first < SPL_CHUNK_SPLATS ? count - first : SPL_CHUNK_SPLATS;
-        for (uint32_t i = 0; i < used; i++) {
-            uint32_t at = w->items[first + i].index;
-            if (leaf)
-                load_leaf(p, node, at, &splats[i], position[i]);
-            else
-                load_inner(node, at, &splats[i], position[i]);
-        }
-        if (p->no_surface)
-            level_radii(splats, used);
-        struct spl_chunk_error error;
-        uint32_t words = spl_chunk_encode(splats, (const double(*)[3])position, used, w->options, &out->chunks[c],
-                                          w->words + out->word_count, &error);
-        grow_box(header, splats, position, &out->chunks[c]);
-        out->chunks[c].geometry_word = (uint32_t)out->word_count;
-        out->word_count += words;
-        out->word_count += spl_emitted_streams_encode(w->streams, p, node, w->items + first, used, out->codes[c],
-                                                      w->words + out->word_count);
-        out->error.position_over_radius += error.position_over_radius;
-        out->error.normal_radians += error.normal_radians;
-    }
+    out->chunk_count = 0;
+    encode_discs(w, node, 0, linear, header, out);
+    encode_discs(w, node, linear, count, header, out);
     encode_lines(w, node, header, out);
     if (node->panels)
         add_panels(w, node->panels, header, out);

@@ -5,6 +5,10 @@
  * surface means and keeps all levels together at a third of the leaves. A cluster's disc has the area of its parts,
  * reaches over them (which matters along wires), and is no larger than its cell calls for unless one of its parts was.
  *
+ * What panels leave may be a few splats, far from each other. A quarter of them would be discs from one to the next,
+ * across what lies between, so there cells stay near what their splats are large, or as large as the node's panels ask
+ * for, and discs near the area of their parts; the node holds more of them instead.
+ *
  * Where inner nodes are drawn for good, a mean of two surfaces is drawn for good too, and maps put the wrong texels on
  * it. There a cell gives a splat for each surface in it, told apart by their normals and by how far off one another's
  * plane they lie. On an exact courtyard with exact maps 1/100 of the splats gains 0.5 dB by it at the same number.
@@ -28,6 +32,10 @@
  */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
 enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
+
+/* Beside panels: how many times as wide as its splats lie apart a cell becomes, if not for the panels' sake; along a
+ * wire a quarter of the splats asks for 4. And how much farther a disc reaches than its area. */
+static const double beside_panels = 4, reach_most = 1.5;
 
 /* Surfaces of a cell: their normals differ by more than so much (cosine), or their planes by such a share of the
  * cell. The fourth takes what faces its way at all. */
@@ -238,7 +246,8 @@ static size_t cluster_surfaces(void *context, double cell)
     return cluster(c->scratch, c->count, cell, c->count, true);
 }
 
-static void finish_cluster(const struct cluster *k, double cell, struct spl_inner_splat *out)
+/* `farthest`: it reaches over its parts up to so many times the radius of their area. */
+static void finish_cluster(const struct cluster *k, double cell, double farthest, struct spl_inner_splat *out)
 {
     double mean2 = 0, length = 0, weight = k->weight;
     for (int c = 0; c < 3; c++) {
@@ -250,7 +259,7 @@ static void finish_cluster(const struct cluster *k, double cell, struct spl_inne
     length = sqrt(length);
     for (int c = 0; c < 3; c++)
         out->normal[c] = length > 0 ? (float)(k->normal[c] / length) : c == 2;
-    double reach = sqrt(3 * fmax(0, k->squared / weight - mean2));
+    double reach = fmin(sqrt(3 * fmax(0, k->squared / weight - mean2)), farthest * sqrt(weight));
     double radius = fmin(fmax(sqrt(weight), reach), 1.1284 * 1.4142 * cell);
     out->radius = fmaxf((float)radius, k->largest);
     out->uncertainty = (float)(k->uncertainty / weight);
@@ -311,7 +320,7 @@ static bool make_left(struct levels *l, struct scratch *w, const struct spl_tree
     if (!w->left_splats)
         return false;
     for (size_t k = 0; k < clusters; k++)
-        finish_cluster(&w->clusters[k + 1], left->cell, &w->left_splats[k]);
+        finish_cluster(&w->clusters[k + 1], left->cell, reach_most, &w->left_splats[k]);
     w->left_count = (uint32_t)clusters;
     return spl_scalars_mix(&w->mixer, l->points, w->numbers, w->of, w->input, left->count, clusters, &w->left_numbers);
 }
@@ -332,7 +341,12 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
         return true; /* of panels alone */
     /* Nothing is coarser than the root: where it alone is to be left, it has just as many as are wanted. */
     bool last = node == l->tree->nodes && l->tree->pruned_to && l->tree->pruned_to < count && !l->tree->panels;
-    if (!reserve(w, count, last ? count + 2 : count / 3 + 8, l->scalars))
+    const bool panels = l->tree->panels, surfaces = l->tree->pruned_to > 0;
+    const size_t room = surfaces ? pruned_inner_most : inner_most;
+    size_t clusters_most = last ? count : count / 3;
+    if (panels && clusters_most < room)
+        clusters_most = count < room ? count : room;
+    if (!reserve(w, count, clusters_most + 8, l->scalars))
         return false;
     for (uint32_t c = 0; c < node->child_count; c++)
         at = take_child(l, w, node, &children[c], at);
@@ -342,21 +356,24 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
             w->numbers[at * l->scalars + k] = w->left_numbers[k];
     }
 
-    bool surfaces = l->tree->pruned_to > 0;
-    double base = fmin((double)count, (surfaces ? pruned_inner_most : inner_most) / most);
+    double base = fmin((double)count, (double)room / most);
     size_t limit = base * most > 2 ? (size_t)(base * most) : 2; /* two opposed splats never become one */
     double cell = 2 * median_radius(w->input, count, radii) / 1.128379, too_fine = 0;
+    const double widest = panels ? fmax(beside_panels * cell, 2 * w->left.cell) : INFINITY;
     if (last) {
         cell = spl_prune_find_cell(cluster_surfaces, &(struct clustering){w, count}, l->tree->pruned_to, cell);
         clusters = cluster(w, count, cell, count, true);
     }
     for (int attempt = 0; !last; attempt++) {
         /* In a large enough cell there are two sides, but as many surfaces as there are normals. */
+        if (cell >= widest && limit < room)
+            limit = count < room ? count : room;
         clusters = cluster(w, count, cell, limit, surfaces && attempt <= attempts);
         double share = (double)clusters / base;
         if (clusters > limit) {
+            const double wider = cell * (attempt < attempts ? 1.25 : 2);
             too_fine = cell;
-            cell *= attempt < attempts ? 1.25 : 2;
+            cell = cell < widest ? fmin(wider, widest) : wider;
         } else if (share < least && attempt < attempts && cell * sqrt(share / wanted) > too_fine * 1.1) {
             cell *= sqrt(share / wanted);
         } else {
@@ -367,7 +384,7 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
     if (!node->splats)
         return false;
     for (size_t k = 0; k < clusters; k++)
-        finish_cluster(&w->clusters[k + 1], cell, &node->splats[k]);
+        finish_cluster(&w->clusters[k + 1], cell, panels ? reach_most : INFINITY, &node->splats[k]);
     node->splat_count = (uint32_t)clusters;
     return spl_scalars_mix(&w->mixer, l->points, w->numbers, w->of, w->input, count, clusters, &node->numbers);
 }

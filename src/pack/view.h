@@ -5,11 +5,16 @@
 #include "pack/points.h"
 
 struct spl_default_view {
-    double eye[3], target[3], up[3], fov; /* vertical, degrees */
+    double eye[3], target[3], up[3];
+    double fov;    /* vertical, degrees, of an image of 16:9 */
+    double fit[2]; /* degrees across and upright that an image of any shape shows at least */
 };
 
-/* From the first station where one is known, towards the most points around it; otherwise from above and outside,
- * fitted to the bulk of the points, so that strays do not matter. `points` are sorted. */
-int spl_default_view_find(const struct spl_points *points, struct spl_default_view *view, struct spl_error *err);
+/* Through the first station that is a camera; else from inside, where the scene lies around stations, cameras or places to
+ * stand; else from outside, from where most is to be seen, fitted to the bulk of the points, so that strays do not
+ * matter. `points` are sorted; `unit_m` is metres a unit, 0 = not known; `sides`: normals show to where the scan was
+ * taken from. */
+int spl_default_view_find(const struct spl_points *points, double unit_m, bool sides, struct spl_default_view *view,
+                          struct spl_error *err);
 
 #endif

@@ -91,6 +91,20 @@ static int check_entries(const struct spl_draw_list *list, uint32_t more, struct
     return SPL_OK;
 }
 
+static int reserve_chunks(struct spl_draw_list *list, size_t wanted, struct spl_error *err)
+{
+    size_t a = list->chunk_capacity, b = a, c = a, d = a;
+    if (wanted <= list->chunk_capacity)
+        return SPL_OK;
+    if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
+        grow((void **)&list->bounds, &b, wanted, sizeof *list->bounds, err) ||
+        grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err) ||
+        grow((void **)&list->work_of_chunk, &d, wanted, sizeof *list->work_of_chunk, err))
+        return SPL_E_NOMEM;
+    list->chunk_capacity = d;
+    return SPL_OK;
+}
+
 int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
                       const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds, uint64_t looks,
                       struct spl_error *err)
@@ -99,15 +113,9 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
     int rc = check_entries(list, entries, err);
     if (rc)
         return rc;
-    if (list->chunk_count == list->chunk_capacity) {
-        size_t wanted = list->chunk_count + 1, a = list->chunk_capacity, b = a, c = a, d = a;
-        if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
-            grow((void **)&list->bounds, &b, wanted, sizeof *list->bounds, err) ||
-            grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err) ||
-            grow((void **)&list->work_of_chunk, &d, wanted, sizeof *list->work_of_chunk, err))
-            return SPL_E_NOMEM;
-        list->chunk_capacity = d;
-    }
+    rc = reserve_chunks(list, list->chunk_count + 1, err);
+    if (rc)
+        return rc;
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
     list->work_of_chunk[list->chunk_count] = splats(chunk) * (base_work + (looks < UINT32_MAX ? looks : UINT32_MAX));
@@ -115,6 +123,30 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
     list->entry_count += entries;
     if (origin->role == SPL_ROLE_SOLID)
         list->listed_splats += worth(origin->kind, chunk);
+    return SPL_OK;
+}
+
+int spl_draw_list_append(struct spl_draw_list *list, const struct spl_draw_list *more, struct spl_error *err)
+{
+    const size_t at = list->chunk_count, count = more->chunk_count;
+    spl_assert(!more->map_count && !more->test_count && !more->batch_count && more->entry_count <= ENTRIES_MAX);
+    int rc = check_entries(list, (uint32_t)more->entry_count, err);
+    rc = rc ? rc : reserve_chunks(list, at + count, err);
+    if (rc)
+        return rc;
+    if (count) {
+        memcpy(list->chunks + at, more->chunks, count * sizeof *list->chunks);
+        memcpy(list->bounds + at, more->bounds, count * sizeof *list->bounds);
+        memcpy(list->key_of_chunk + at, more->key_of_chunk, count * sizeof *list->key_of_chunk);
+        memcpy(list->work_of_chunk + at, more->work_of_chunk, count * sizeof *list->work_of_chunk);
+    }
+    list->chunk_count += count;
+    list->entry_count += more->entry_count;
+    list->listed_splats += more->listed_splats;
+    for (size_t i = 0; i < SPL_CHUNK_KINDS; i++)
+        list->drawn[i] += more->drawn[i];
+    list->nodes += more->nodes;
+    list->complete &= more->complete;
     return SPL_OK;
 }
 

@@ -108,6 +108,8 @@ struct spl_draw_origin {
 int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *origin,
                       const struct spl_draw_chunk *chunk, const struct spl_chunk_bounds *bounds, uint64_t looks,
                       struct spl_error *err);
+/* Appends the chunks of a list that has neither maps nor tests and was not laid out, with what it counted. */
+int spl_draw_list_append(struct spl_draw_list *list, const struct spl_draw_list *more, struct spl_error *err);
 
 /* Appends `count` words to the tests; *first is where they begin. SPL_E_NOMEM. */
 int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, uint32_t count, uint32_t *first,

@@ -84,7 +84,10 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
 {
     const struct spl_method_row *method = spl_method_row(job->view->method);
     uint32_t maps = spl_dataset_get_info(job->resident->dataset)->maps ? spl_view_get_maps(job->view) : 0;
-    bool textured = spl_view_is_textured(job->view) && !maps;
+    const bool painted = job->paint.kind && job->view->layers >> SPL_LAYER_COLOR & 1;
+    bool textured = spl_view_is_textured(job->view) && !maps && !painted;
+    maps &= ~(painted ? SPL_MAP_COLORS : 0u);
+    const bool lines = method->lines || spl_view_draws_lines(job->view);
     return (struct spl_select_params){
         .dataset = job->resident->dataset,
         .camera = camera,
@@ -93,7 +96,8 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .discs = method->discs,
         .panels = spl_view_draws_panels(job->view),
         .meshes = spl_view_draws_meshes(job->view),
-        .lines = method->lines || spl_view_draws_lines(job->view),
+        .lines = lines && !(painted && job->paint.stream >= 0), // they have no attributes, the splats they stand for do
+        .paint = painted ? &job->paint : NULL,
         .tables = ask_tables,
         .resident = ask_page,
         .atoms = textured ? job->view->disc.atoms : 0,
@@ -195,7 +199,8 @@ static uint64_t count_work(const struct spl_tile *tile)
     uint32_t groups = 0;
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
         groups |= tile->view->layers >> layer & 1 ? 1u << group_of_layer[layer] : 0;
-    return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups));
+    const bool lit = spl_tile_get_shades(tile) & (SPL_SHADE_HEADLIGHT | SPL_SHADE_SUN);
+    return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups) + lit);
 }
 
 /* Too much for a step */
@@ -225,12 +230,15 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
         struct spl_error why = {0};
         rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
         rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+        const uint64_t shaded = spl_tile_get_shades(tile) ? tile->samples : 0;
+        rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
             rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
             rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
+            rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);
         if (rc || !again)
@@ -261,7 +269,7 @@ static int record(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
     uint32_t pixels = tile->width * tile->height, wanted = tile->view->layers;
-    bool first = true;
+    bool first = true, soft = true;
     spl_tile_stamp(tile, SPL_STAGE_BEGIN);
     int rc = spl_tile_take_rounds(tile, err);
     rc = rc ? rc : spl_tile_dispatch_marks(tile, err);
@@ -272,10 +280,14 @@ static int record(struct spl_tile *tile, struct spl_error *err)
                 layers |= 1u << layer & wanted;
         if (!layers)
             continue;
-        rc = spl_method_row(tile->view->method)->record(tile, group, first, err);
-        if (!rc && first && spl_soft_is_drawn(tile))
+        if (group == SPL_SUMS_COLOR)
+            rc = spl_tile_light(tile, &first, err);
+        rc = rc ? rc : spl_method_row(tile->view->method)->record(tile, group, first, err);
+        if (!rc && group == SPL_SUMS_COLOR)
+            rc = spl_tile_deepen(tile, err);
+        if (!rc && soft && spl_soft_is_drawn(tile))
             rc = spl_soft_record(tile, group, err);
-        first = false;
+        first = soft = false;
         for (uint32_t layer = 0; layer < SPL_LAYER_COUNT && !rc; layer++)
             if (layers >> layer & 1)
                 rc = spl_tile_dispatch_resolve(tile, layer, pixels * spl_readback_rank(wanted, layer), err);
@@ -317,6 +329,8 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     int rc = spl_gpu_begin(gpu, err);
     if (rc)
         return rc;
+    if (tile->paint)
+        spl_paint_see(tile->paint, &tile->camera, spl_gpu_buffer_map(tile->renderer->scratch.palette));
     rc = record(tile, err);
     struct spl_error why = {0};
     int ended = spl_gpu_submit(gpu, &ticket, &why);

@@ -17,7 +17,7 @@ enum { made_at_start = 32 };
 
 static bool is_same(const struct spl_kernel_key *a, const struct spl_kernel_key *b)
 {
-    return a->wide == b->wide && a->trims == b->trims && !strcmp(a->name, b->name) &&
+    return a->wide == b->wide && a->trims == b->trims && a->shared == b->shared && !strcmp(a->name, b->name) &&
            !memcmp(a->constants, b->constants, sizeof a->constants);
 }
 
@@ -26,7 +26,8 @@ static int make(struct spl_gpu *gpu, const struct spl_kernel_key *key, struct sp
 {
     char name[64];
     bool wide = key->wide && spl_gpu_get_limits(gpu)->atomics_64;
-    snprintf(name, sizeof name, "%s%s%s", key->name, key->trims ? "_trim" : "", wide ? "64" : "");
+    snprintf(name, sizeof name, "%s%s%s%s", key->name, key->trims ? "_trim" : "", key->shared ? "_shared" : "",
+             wide ? "64" : "");
     return spl_gpu_kernel_create(gpu, name, key->constants, SPL_KERNEL_CONSTANTS, out, err);
 }
 

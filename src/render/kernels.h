@@ -16,6 +16,7 @@ struct spl_kernel_key {
     bool wide;                                /* its variant with 64 bit atomics where the device has them */
     uint32_t constants[SPL_KERNEL_CONSTANTS]; /* as the shader numbers them; those that it does not declare are 0 */
     bool trims;                               /* its variant NAME_trim, for chunks that a map trims */
+    bool shared;                              /* its variant NAME_shared, for hardware (shaders/common/walk.glsl) */
 };
 
 struct spl_kernels {

@@ -44,6 +44,13 @@ struct spl_marks {
     const struct spl_stream *streams; /* the dataset's */
 };
 
+/* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `left` is
+ * what works without any, `hint` what may be meant, or NULL. */
+int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name);
+int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *left,
+                          const char *hint, struct spl_error *err);
+double spl_marks_value_at(const struct spl_stream_values *values, double q); /* that a share q of the splats are below */
+
 /* Ends of a view's terms as values of a dataset: quantiles, and shares of the 99th percentile, are looked up. SPL_E_INPUT
  * (field "soft") where the dataset has no such attribute, or was packed before quantiles were kept. `ends` has room for
  * SPL_TERMS_MAX; may be NULL, to check only. */

@@ -8,13 +8,14 @@
 #include <splatd/render.h>
 
 #include "render/marks.h"
+#include "render/soft/hints.h"
 
 static bool is_shape(const struct spl_term *term)
 {
     return term->measure != SPL_TERM_ATTRIBUTE && term->measure != SPL_TERM_QUANTILE;
 }
 
-static int find_stream(const struct spl_dataset_info *info, const char *name)
+int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name)
 {
     for (uint32_t s = 0; s < info->stream_count; s++)
         if (!strcmp(info->streams[s].name, name) &&
@@ -23,7 +24,8 @@ static int find_stream(const struct spl_dataset_info *info, const char *name)
     return -1;
 }
 
-static int refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, struct spl_error *err)
+int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *left,
+                          const char *hint, struct spl_error *err)
 {
     char known[SPL_STREAMS_MAX * (SPL_STREAM_TEXT_MAX + 2)] = "";
     size_t used = 0;
@@ -31,8 +33,9 @@ static int refuse_name(const struct spl_dataset_info *info, const char *name, co
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s", info->id, name,
-                          used ? known : "none, so that only shapes are left: axis, plane, box, polygon, x, y and z");
+    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s%s%s%s%s", info->id,
+                          name, used ? known : "none, so that only ", used ? "" : left, used ? "" : " are left",
+                          hint ? "; " : "", hint ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_term *term, const char *field,
@@ -48,7 +51,7 @@ static int refuse_values(const struct spl_dataset_info *info, const struct spl_t
 
 /* The value that a share `q` of the splats have less than: between the nearest two of those that are kept, of which the
  * 99th percentile is one more. */
-static double value_at(const struct spl_stream_values *values, double q)
+double spl_marks_value_at(const struct spl_stream_values *values, double q)
 {
     const double last = (SPL_VALUES_QUANTILES - 1) / (double)SPL_VALUES_QUANTILES;
     const double *kept = values->quantiles;
@@ -85,9 +88,12 @@ static int resolve(const struct spl_term *term, double blend, const struct spl_d
     memcpy(out->shape, term->shape, sizeof out->shape);
     if (is_shape(term))
         return SPL_OK;
-    out->stream = find_stream(info, term->name);
-    if (out->stream < 0)
-        return refuse_name(info, term->name, field, err);
+    out->stream = spl_marks_find_stream(info, term->name);
+    if (out->stream < 0) {
+        char hint[SPL_SOFT_HINT_MAX];
+        const bool hinted = spl_soft_hint_name(term, info, hint);
+        return spl_marks_refuse_name(info, term->name, field, "shapes are left: axis, plane, box, polygon, x, y and z", hinted ? hint : NULL, err);
+    }
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
     out->complete = values && values->count == info->leaf_splats;
     const bool share = term->measure == SPL_TERM_ATTRIBUTE && !strcmp(term->name, "uncertainty");
@@ -98,10 +104,10 @@ static int resolve(const struct spl_term *term, double blend, const struct spl_d
         out->most = isfinite(term->most) ? term->most * values->p99 : term->most;
         out->blend_least = out->blend_most = blend * values->p99;
     } else if (term->measure == SPL_TERM_QUANTILE) {
-        out->least = isfinite(term->least) ? value_at(values, term->least) : term->least;
-        out->most = isfinite(term->most) ? value_at(values, term->most) : term->most;
-        out->blend_least = isfinite(term->least) ? value_at(values, term->least + blend) - out->least : 0;
-        out->blend_most = isfinite(term->most) ? out->most - value_at(values, term->most - blend) : 0;
+        out->least = isfinite(term->least) ? spl_marks_value_at(values, term->least) : term->least;
+        out->most = isfinite(term->most) ? spl_marks_value_at(values, term->most) : term->most;
+        out->blend_least = isfinite(term->least) ? spl_marks_value_at(values, term->least + blend) - out->least : 0;
+        out->blend_most = isfinite(term->most) ? out->most - spl_marks_value_at(values, term->most - blend) : 0;
     }
     if (!strcmp(term->name, "class"))
         out->blend_least = out->blend_most = 0;

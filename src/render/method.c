@@ -89,6 +89,7 @@ SPL_METHOD_PARAMS(NOTHING, NOTHING, CHOICE_NAME)
 #define CHOICE_MOST_visibility (SPL_VISIBILITY_COUNT - 1)
 #define CHOICE_MOST_maps (SPL_MAPS_COUNT - 1)
 #define CHOICE_MOST_shapes (SPL_SHAPES_COUNT - 1)
+#define CHOICE_MOST_ramp (SPL_RAMP_COUNT - 1)
 #define CHOICE_MOST_soft_model (SPL_SOFT_MODEL_COUNT - 1)
 #define CHOICE_MOST_soft_of (SPL_SOFT_OF_COUNT - 1)
 static const struct spl_method_param_info params[SPL_PARAM_COUNT] = {

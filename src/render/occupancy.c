@@ -46,6 +46,15 @@ void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t spla
     occupancy->everywhere += splats;
 }
 
+void spl_occupancy_join(struct spl_occupancy *to, const struct spl_occupancy *from)
+{
+    const size_t cells = (size_t)to->columns * to->rows;
+    spl_assert(from->columns == to->columns && from->rows == to->rows);
+    for (size_t i = 0; i < cells; i++)
+        to->cells[i] += from->cells[i];
+    to->everywhere += from->everywhere;
+}
+
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy)
 {
     uint64_t most = 0, *cells = occupancy->cells;

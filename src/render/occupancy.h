@@ -20,6 +20,8 @@ void spl_occupancy_finish(struct spl_occupancy *occupancy);
 void spl_occupancy_add(struct spl_occupancy *occupancy, const double low[2], const double high[2], uint32_t splats);
 void spl_occupancy_add_everywhere(struct spl_occupancy *occupancy, uint32_t splats);
 
+/* Adds what another of the same size counted, before its bound is asked for. */
+void spl_occupancy_join(struct spl_occupancy *to, const struct spl_occupancy *from);
 /* The largest cell. Call once, after the last add. */
 uint64_t spl_occupancy_bound(struct spl_occupancy *occupancy);
 

@@ -18,11 +18,13 @@ static int dispatch(struct spl_tile *tile, uint32_t kind, bool whole, bool by_ce
                     enum spl_phase phases, struct spl_error *err)
 {
     struct spl_disc_kernels kernels = {0};
+    const bool discs = spl_method_row(tile->view->method)->discs;
     const struct spl_dispatch what = {.phases = phases,
                                       .kind = kind,
-                                      .lanes = lanes_of(kind, whole, spl_method_row(tile->view->method)->discs),
+                                      .lanes = lanes_of(kind, whole, discs),
                                       .by_cells = by_cells,
                                       .cells = !whole};
+    key.shared = tile->renderer->shares && discs && !whole;
     int rc = spl_tile_get_plain_kernels(tile, key, &what, &kernels, err);
     return rc ? rc : spl_tile_dispatch_splats(tile, &kernels, &what, err);
 }

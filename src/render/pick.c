@@ -13,6 +13,8 @@ void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_v
 {
     *out = *view;
     out->layers = ((1u << SPL_LAYER_COUNT) - 1) & ~(1u << SPL_LAYER_PRIMITIVE);
+    out->shade.kinds = SPL_SHADE_NONE;
+    out->color = (struct spl_color_params){0};
     out->disc.atoms = 0; // its colour is the splat's
     out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
     out->camera.cx += 0.5 - x;

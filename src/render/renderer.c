@@ -35,7 +35,8 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
     };
     rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {
-        renderer->work_at_once = spl_gpu_get_device(renderer->gpu)->software ? software_work : gpu_work;
+        renderer->shares = !spl_gpu_get_device(renderer->gpu)->software;
+        renderer->work_at_once = renderer->shares ? gpu_work : software_work;
         renderer->work_a_step = renderer->work_at_once;
         renderer->least_piece = least_piece;
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
@@ -190,6 +191,11 @@ void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
 {
     renderer->work_a_step = work;
     renderer->least_piece = 1;
+}
+
+void spl_renderer_set_shares(struct spl_renderer *renderer, bool shares)
+{
+    renderer->shares = shares;
 }
 
 const struct spl_dataset *spl_renderer_get_lost_dataset(const struct spl_renderer *renderer)

@@ -10,6 +10,7 @@
 #include "gpu/gpu.h"
 #include "render/fill.h"
 #include "render/kernels.h"
+#include "render/paint.h"
 #include "render/residency.h"
 #include "render/select.h"
 #include "render/soft/order.h"
@@ -30,6 +31,8 @@ struct spl_scratch {
     struct spl_gpu_buffer *entries;  /* uint[], grown on demand */
     struct spl_gpu_buffer *tests;    /* uint[], grown on demand */
     struct spl_gpu_buffer *marks;    /* bytes, grown on demand; what is in use is written in every tile */
+    struct spl_gpu_buffer *palette;  /* SPL_PALETTE_WORDS, written in every tile whose colours show something else */
+    struct spl_gpu_buffer *shades;   /* 4 bytes a sample, made with the first tile that is shaded; may be NULL */
     struct spl_soft_memory soft;     /* of soft spheres, from when there are any: soft/pass.h */
     uint64_t soft_bytes;             /* that it takes */
 };
@@ -57,6 +60,7 @@ struct spl_renderer {
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
     uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
     uint64_t work_a_step;      /* that a step of a frame has, unless its piece is small; see work.c */
+    bool shares;               /* discs are drawn by the kernels for hardware: shaders/common/walk.glsl */
     uint64_t least_piece;      /* samples of a piece, at least */
 };
 
@@ -71,6 +75,7 @@ struct spl_tile {
     uint64_t samples;
     struct spl_frame_params params;              /* common to all dispatches of the tile, but for map_* */
     struct spl_gpu_buffer *map;                  /* that map_* are of; NULL = none so far */
+    const struct spl_paint *paint;               /* what colours show; may be NULL: the splats' own */
     const atomic_bool *cancelled;                // may be NULL; borrowed
     uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
@@ -96,6 +101,9 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
  * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err);
+/* Makes room for the factors of a shaded tile of so many samples; 0 needs none. Errors as of upload. */
+int spl_scratch_make_shades(struct spl_scratch *scratch, struct spl_residency *residency, uint64_t samples,
+                            struct spl_error *err);
 
 /* Begins an area and returns its memory, for who clears it. What holds between dispatches is ended by who began it. */
 bool spl_tile_may_begin(const struct spl_tile *tile, enum spl_area area); /* is its block free? */
@@ -130,10 +138,11 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
  * are soft (common/marks.glsl), that shapes cut (common/cut.glsl), or several of these; NULL = as those that have none,
  * but for marks and cuts. */
 enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_CUT = 8, SPL_ENDS_COUNT = 16 };
-/* The constants that say whether a kernel looks at marks, and at shapes of which kinds. */
-enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_CUT = 4 };
+/* The constants that say whether a kernel looks at marks, what colours show (SPL_PAINT_*), and at shapes of which kinds. */
+enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4, SPL_CONSTANT_CUT = 5 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
+    uint32_t lanes; /* of SPL_WORKGROUP invocations, that share an entry; 0 = as the dispatch has it */
 };
 
 /* Those of `key` that the tile's chunks need, and the first. */
@@ -194,6 +203,18 @@ void spl_tile_set_map(struct spl_tile *tile, uint32_t station);
 bool spl_tile_has_map_colors(const struct spl_tile *tile, uint32_t group);
 /* Records them, and a barrier: the group's sums (of method nearest payloads) become sums of floats. */
 int spl_tile_dispatch_maps(struct spl_tile *tile, struct spl_error *err);
+/* What colours show where they are of `group`; 0 = the splats' own, SPL_PAINT_NONE. */
+static inline uint32_t spl_tile_get_paint(const struct spl_tile *tile, uint32_t group)
+{
+    return group == SPL_SUMS_COLOR && tile->paint ? tile->paint->kind : SPL_PAINT_NONE;
+}
+/* tile_shade.c: the kinds that colours of the tile are shaded by (SPL_SHADE_*), 0 where it has none; samples that
+ * shading looks away. light() records what of it comes from normals, which it draws for it, before the group of colours
+ * (`first` as of a method's record()); deepen() what comes from depths, behind it. */
+uint32_t spl_tile_get_shades(const struct spl_tile *tile);
+uint32_t spl_shade_get_reach(const struct spl_view *view, const struct spl_dataset_info *info);
+int spl_tile_light(struct spl_tile *tile, bool *first, struct spl_error *err);
+int spl_tile_deepen(struct spl_tile *tile, struct spl_error *err);
 /* Records the resolve pass of `layer`, whose pixels start at `output_word`. */
 int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint32_t output_word, struct spl_error *err);
 /* Marks the end of `stage` on the device's clock. */

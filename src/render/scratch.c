@@ -60,6 +60,8 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
     bindings[SPL_RESOURCE_MARKS].buffer = scratch->marks;
     bindings[SPL_RESOURCE_SOFT].buffer = scratch->soft.buffers[SPL_SOFT_STATE];
     bindings[SPL_RESOURCE_FOUND].buffer = scratch->soft.buffers[SPL_SOFT_FOUND];
+    bindings[SPL_RESOURCE_PALETTE].buffer = scratch->palette;
+    bindings[SPL_RESOURCE_SHADES].buffer = scratch->shades;
     bindings[SPL_RESOURCE_DEPTH].buffer = scratch->depth;
     bindings[SPL_RESOURCE_MAP].buffer = tile->map;
     bindings[SPL_RESOURCE_OUTPUT].buffer = scratch->output ? scratch->output : scratch->readback;
@@ -115,6 +117,7 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         {&scratch->entries, SPL_GPU_UPLOAD, chunks * chunk_entries_at_start * sizeof(uint32_t)},
         {&scratch->tests, SPL_GPU_UPLOAD, tests_at_start},
         {&scratch->marks, SPL_GPU_DEVICE, marks_at_start},
+        {&scratch->palette, SPL_GPU_UPLOAD, SPL_PALETTE_WORDS * sizeof(uint32_t)},
     };
     uint64_t working = 0, mib = 1 << 20;
     uint64_t page = taken(options->first_page_bytes) * (software ? 1 : 2); // a GPU's goes through as much of staging
@@ -142,7 +145,8 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
 {
     struct spl_gpu_buffer *all[] = {scratch->depth,    scratch->large,  scratch->small,  scratch->output,
                                     scratch->readback, scratch->params, scratch->chunks, scratch->bounds,
-                                    scratch->entries,  scratch->tests,  scratch->marks};
+                                    scratch->entries,  scratch->tests,  scratch->marks,  scratch->palette,
+                                    scratch->shades};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         spl_gpu_buffer_destroy(gpu, all[i]);
     spl_soft_memory_finish(&scratch->soft, gpu);
@@ -157,13 +161,14 @@ static uint64_t room(const struct spl_scratch *scratch, const struct spl_residen
     return limit > kept ? limit - kept : 0;
 }
 
-/* Has a buffer hold so many bytes; what it held is lost where it grows. */
+/* Has a buffer, which may be NULL, hold so many bytes; what it held is lost where it grows. */
 static int make_room(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
                      enum spl_gpu_buffer_kind kind, uint64_t bytes, struct spl_error *err)
 {
     struct spl_gpu *gpu = residency->gpu;
-    if (spl_gpu_buffer_get_bytes(*buffer) < bytes) {
-        uint64_t have = spl_gpu_buffer_get_bytes(*buffer), larger = have, left = room(scratch, residency);
+    const uint64_t have = *buffer ? spl_gpu_buffer_get_bytes(*buffer) : 0;
+    if (have < bytes) {
+        uint64_t larger = have ? have : bytes, left = room(scratch, residency);
         uint64_t most = spl_gpu_get_limits(gpu)->binding_bytes;
         if (bytes > most)
             return spl_fail_field(err, SPL_E_LIMIT, "lod",
@@ -188,6 +193,12 @@ static int make_room(struct spl_scratch *scratch, struct spl_residency *residenc
         scratch->taken_bytes += larger - taken(have);
     }
     return SPL_OK;
+}
+
+int spl_scratch_make_shades(struct spl_scratch *scratch, struct spl_residency *residency, uint64_t samples,
+                            struct spl_error *err)
+{
+    return make_room(scratch, residency, &scratch->shades, SPL_GPU_DEVICE, samples * sizeof(uint32_t), err);
 }
 
 static int upload(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,

@@ -3,6 +3,7 @@
 #include "render/select.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "render/select_parts.h"
@@ -119,7 +120,7 @@ static int walk_tree(struct spl_walk *w, struct spl_error *err)
             w->list->complete &= pushed;
         }
         if (!rc && !pushed)
-            rc = spl_walk_draw(w, &found, err);
+            rc = w->found ? spl_walk_find(w, &found, err) : spl_walk_draw(w, &found, err);
         if (rc)
             return rc;
     }
@@ -157,14 +158,18 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
 {
     spl_draw_list_clear(list);
     struct spl_walk w = {.params = params, .list = list, .focal = focal_of(params)};
+    struct spl_walk_found found = {0};
     int rc = spl_occupancy_init(&w.splats, params->camera->width, params->camera->height, err);
     if (rc)
         return rc;
     rc = spl_map_cells_init(&w.cells, params, err);
     if (!rc)
         rc = spl_walk_begin_marks(&w, err);
+    w.found = spl_walk_may_share(&w) ? &found : NULL;
     if (!rc)
         rc = walk_tree(&w, err);
+    if (!rc && w.found)
+        rc = spl_walk_draw_found(&w, err);
     if (!rc)
         rc = spl_draw_list_lay_out(list, err);
     if (!rc)
@@ -174,5 +179,6 @@ int spl_select(const struct spl_select_params *params, struct spl_draw_list *lis
     spl_occupancy_finish(&w.splats);
     spl_occupancy_finish(&w.panels);
     spl_map_cells_finish(&w.cells);
+    free(found.nodes);
     return rc;
 }

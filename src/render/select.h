@@ -18,6 +18,7 @@
 #include "dataset/dataset.h"
 #include "render/draw_list.h"
 #include "render/marks.h"
+#include "render/paint.h"
 
 /* Whether a page can be drawn. LATER: not yet, so a coarser node stands in, and what else the finer ones need is asked
  * for. */
@@ -47,6 +48,8 @@ struct spl_select_params {
     const struct spl_marks *marks; /* what is soft; NULL = nothing */
     bool draws_soft;               /* it is listed, too */
     const struct spl_marks *clip;  /* what is drawn; NULL = all */
+    const struct spl_paint *paint; /* what colours show; NULL = the splats' own */
+    uint32_t share_from;           /* drawn chunks from which on several cores list them; 0 = as pays */
     void *context;
 };
 enum { SPL_MAP_TRIMS = 1, SPL_MAP_COLORS = 2 };

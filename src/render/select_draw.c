@@ -115,6 +115,7 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     w->list->drawn[SPL_CHUNK_DISCS] += count;
     int rc = spl_walk_list_marks(w, &(struct spl_draw_origin){.page = page, .kind = SPL_CHUNK_DISCS}, &out, err);
     struct spl_draw_chunk soft = out; // a cluster hides as much as its parts: it has their area
+    soft.geometry_bits = chunk->geometry_bits;
     soft.radius_min = (float)(chunk->radius_min * scale / radius_share);
     soft.radius_step = (float)(chunk->radius_step * scale / radius_share);
     if (!rc)
@@ -303,6 +304,7 @@ int spl_walk_draw(struct spl_walk *w, const struct spl_found_node *found, struct
     struct spl_view_box whole = w->cells.count ? spl_walk_drawn_box(w, found) : (struct spl_view_box){0};
     w->list->nodes++;
     w->lined = w->unlined = false;
+    w->line_width = spl_walk_line_width(w, node);
     bool lines = false;
     for (uint32_t i = 0; i < node->chunk_count && !w->lined; i++) {
         lines |= spl_chunk_kind(&chunks[i]) == SPL_CHUNK_LINES;

@@ -83,6 +83,13 @@ struct spl_draw_chunk spl_walk_begin(const struct spl_walk *w, const struct spl_
         .count = chunk->count,
         .texture_scale = 1,
     };
+    const struct spl_paint *paint = w->params->paint;
+    if (paint && paint->stream >= 0) {
+        const uint32_t s = (uint32_t)paint->stream, c = (uint32_t)(chunk - w->tables->chunks);
+        out.paint_word = chunk->geometry_word + spl_chunk_words(chunk) + spl_tables_get_stream_words(w->tables, s, c);
+        out.paint_bits = w->tables->width[s][c] | (paint->steps ? SPL_PAINT_LAST_NONE : 0);
+        out.paint_base = w->tables->base[s][c];
+    }
     float *view[3] = {&out.origin_x, &out.origin_y, &out.origin_z};
     for (int i = 0; i < 3; i++) {
         const double *r = w->params->camera->rotation + 3 * i;

@@ -22,7 +22,15 @@ struct spl_walk {
     uint32_t soft_marks; /* where its marks as soft are, if they are not those as solid */
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
     bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft, or dropped by values */
+    double line_width; /* of its lines, the largest; 0 = not known, or nothing is soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
+    struct spl_walk_found *found; /* nodes that are drawn once all are known (select_share.c); NULL = at once */
+};
+
+/* Nodes that are drawn, in the order of the walk. */
+struct spl_walk_found {
+    struct spl_found_node *nodes;
+    size_t count, capacity, chunks;
 };
 
 /* Spacings from 2^(i / 4) samples on. */
@@ -60,6 +68,12 @@ static inline double spl_walk_typical(const struct spl_node *node)
 struct spl_view_box spl_walk_node_box(const struct spl_walk *w, const struct spl_node *node);
 struct spl_view_box spl_walk_drawn_box(const struct spl_walk *w, const struct spl_found_node *found);
 
+/* Listing of many nodes by several cores (select_share.c), where nothing of it asks for residency: the list is the same
+ * as in turn. */
+bool spl_walk_may_share(const struct spl_walk *w);
+int spl_walk_find(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err);
+int spl_walk_draw_found(struct spl_walk *w, struct spl_error *err);
+
 /* What is soft, and what is drawn (select_soft.c). Shapes become tests, before anything is listed. */
 int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);
 /* Fills in `judged`: of a chunk whose positions lie in `box`, view space. */
@@ -73,6 +87,8 @@ bool spl_walk_drops_node(const struct spl_walk *w, const struct spl_node *node, 
 int spl_walk_get_cut(struct spl_walk *w, struct spl_error *err);
 /* May any linear splat of the node be soft, or dropped by its values? */
 bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3]);
+/* How wide the node's lines are, at most, where anything may be soft. */
+double spl_walk_line_width(const struct spl_walk *w, const struct spl_node *node);
 /* Where `judged` or `clipped` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is
  * listed otherwise. */
 int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,

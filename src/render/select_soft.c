@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "dataset/chunk.h"
 #include "render/select_parts.h"
 
 /* A face of a node cuts a plane where the plane's normal has less than this along the face's. */
@@ -65,6 +66,16 @@ bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, co
         soft = (w->params->marks && w->judged.soft) || (w->params->clip && !w->clipped.of_lines);
     }
     return soft;
+}
+
+/* A wire's splat is as wide as splats lie apart along it; its sphere has the area of its stretch of the wire. */
+double spl_walk_line_width(const struct spl_walk *w, const struct spl_node *node)
+{
+    const struct spl_chunk *chunks = w->tables->chunks + (node->first_chunk - w->tables->first_chunk);
+    double width = 0;
+    for (uint32_t i = 0; i < node->chunk_count && w->params->marks; i++)
+        width = fmax(width, spl_chunk_line_width(&chunks[i]));
+    return width;
 }
 
 static int begin_shapes(struct spl_walk *w, const struct spl_marks *marks, struct spl_marks_view *view,
@@ -175,7 +186,9 @@ int spl_walk_list_soft(struct spl_walk *w, const struct spl_draw_origin *from, c
     soft.texture = 0;
     soft.marks = w->soft_marks;
     if (!panels) {
-        soft.geometry_bits &= ~(3u << SPL_GEOMETRY_LINEAR);
+        if (!(w->line_width > 0))
+            soft.geometry_bits &= ~(3u << SPL_GEOMETRY_LINEAR);
+        soft.texture_scale *= (float)(w->line_width * (double)SPL_SOFT_STRETCH / M_PI);
         soft.color_bits &= (1u << SPL_COLOR_CLIP) - 1;
     } else {
         soft.radius_min = (float)radius;

@@ -97,6 +97,7 @@ static void make_coarse(struct spl_view *view)
 {
     double scale = view->supersample;
     view->supersample = 1;
+    view->shade.radius = (uint32_t)fmax(rint(view->shade.radius * scale), 1);
     view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
     view->camera.width = (uint32_t)ceil(view->camera.width * scale);
     view->camera.height = (uint32_t)ceil(view->camera.height * scale);
@@ -118,10 +119,13 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     bool mapped = spl_dataset_get_info(steps->dataset)->maps && spl_view_get_maps(view) & SPL_MAP_COLORS;
     uint64_t samples = job->renderer->scratch.samples;
     uint32_t apron = method->apron + (mapped ? 1 : 0); // normals look so far
-    job->tiling.reach = (struct spl_reach){.align = 1, .apron = apron};
+    struct spl_reach *reach = &job->tiling.reach;
+    *reach = (struct spl_reach){.align = 1, .apron = apron};
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
+    reach->apron += spl_shade_get_reach(view, spl_dataset_get_info(steps->dataset)) + reach->align - 1;
+    reach->apron -= reach->apron % reach->align;
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, mapped && samples > mapped_samples ? mapped_samples : samples, err);
     steps->prepared = !rc;
@@ -167,6 +171,10 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc)
         rc = spl_marks_init_clip(&steps->job.clip, &view->clip, dataset, err);
     if (!rc)
+        rc = spl_paint_init(&steps->job.paint, &view->color, info, err);
+    if (!rc)
+        spl_paint_set_stream(&steps->job.paint, spl_dataset_get_streams(dataset, &(uint32_t){0}));
+    if (!rc)
         rc = spl_residency_upload(&renderer->residency, err);
     if (rc || (rc = prepare(steps, err)) < 0) {
         spl_frame_end(steps, NULL);
@@ -196,6 +204,7 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
         struct spl_tile tile = {.renderer = job->renderer,
                                 .resident = job->resident,
                                 .view = &steps->view,
+                                .paint = job->paint.kind ? &job->paint : NULL,
                                 .cancelled = job->cancelled};
         spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
         int rc = spl_frame_render_tile(job, &tile, err);

@@ -12,6 +12,7 @@
 
 #include "base/decimal.h"
 #include "base/error.h"
+#include "render/soft/hints.h"
 #include "render/terms.h"
 
 static const char write_attribute[] = "uncertainty>0.4, uncertainty>q0.9 or class:3-5,9",
@@ -234,7 +235,10 @@ static int read_list(struct reader *r, const struct spl_term *term, struct spl_t
         return add(r, out, term);
     do {
         struct spl_term item = *term;
+        char hint[SPL_SOFT_HINT_MAX];
         item.joint = joint;
+        if (spl_soft_hint_list(term->name, r->at, hint))
+            return fail(r, "%s", hint);
         if ((rc = read_end(r, &low)))
             return rc;
         high = low;
@@ -311,6 +315,9 @@ static int read_term(struct reader *r, enum spl_term_joint joint, struct spl_ter
     } else if (term.measure == SPL_TERM_BOX || term.measure == SPL_TERM_POLYGON) {
         set_end(&term, true, 0, true);
     } else {
+        char hint[SPL_SOFT_HINT_MAX];
+        if (term.measure < SPL_TERM_AXIS && spl_soft_hint_sign(term.name, r->at, hint))
+            return fail(r, "%s", hint);
         return fail(r, "no <, >, <=, >= or : where one is needed; write %s",
                     term.measure < SPL_TERM_AXIS ? write_attribute : shapes[term.measure].example);
     }
@@ -409,17 +416,10 @@ __attribute__((format(printf, 2, 3))) static void put(struct writer *w, const ch
     w->used += length > 0 ? (size_t)length : 0;
 }
 
-/* In as few digits as read as the same number. */
 static void put_number(struct writer *w, double value)
 {
-    char text[40];
-    double back = 0;
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        if (spl_decimal_parse(text, &back) && back == value)
-            break;
-    }
-    put(w, "%s", text);
+    char text[SPL_DECIMAL_MAX];
+    put(w, "%s", spl_decimal_print(value, text));
 }
 
 static void put_numbers(struct writer *w, const double *numbers, uint32_t count, char before)

@@ -32,7 +32,8 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
     for (size_t i = 0; i < r->list.batch_count; i++)
         if (r->list.batches[i].key.role == SPL_ROLE_SOLID)
             needed |= 1u << ends_of(&r->list.batches[i].key);
-    *out = (struct spl_disc_kernels){0};
+    *out = (struct spl_disc_kernels){.lanes = r->shares ? SPL_WORKGROUP : 0};
+    key.shared = r->shares;
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
         key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
@@ -132,11 +133,12 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err)
     uint64_t invocations = workgroups * SPL_WORKGROUP, summed = invocations / (SPL_RUN_SPLATS * SPL_LANES);
     if (size && summed > words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size)))
         summed = words / (SPL_RUN_SPLATS * SPL_SUMMED_WORDS(size));
-    uint64_t rounds = spl_draw_list_count_rounds(
-        &tile->renderer->list, &(struct spl_draw_rounds){.splats = invocations / SPL_LANES,
-                                                         .summed = summed,
-                                                         .lines = invocations / SPL_RUN_SPLATS,
-                                                         .panels = invocations / SPL_CELL_DISC_LANES});
+    uint64_t splats = tile->renderer->shares ? workgroups : invocations / SPL_LANES;
+    const struct spl_draw_rounds most = {.splats = splats,
+                                         .summed = summed,
+                                         .lines = invocations / SPL_RUN_SPLATS,
+                                         .panels = invocations / SPL_CELL_DISC_LANES};
+    uint64_t rounds = spl_draw_list_count_rounds(&tile->renderer->list, &most);
     if (rounds > SPL_PARAMS_MAX)
         return too_many(err);
     tile->params_used = (uint32_t)rounds;
@@ -158,7 +160,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
 {
     const struct spl_draw_list *list = &tile->renderer->list;
     const struct spl_resident_dataset *resident = tile->resident;
-    const uint32_t lanes = lanes_of(what);
+    const uint32_t lanes = kernels->lanes ? kernels->lanes : lanes_of(what);
     struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
     int rc = SPL_OK;
     spl_tile_bind(tile, bindings);
@@ -293,7 +295,8 @@ int spl_tile_dispatch_resolve(struct spl_tile *tile, enum spl_layer layer, uint3
     uint32_t resolved = !mapped ? method->resolve : method->sums ? SPL_RESOLVED_MAPPED : SPL_RESOLVED_MAPPED_BENT;
     bool blended = layer == SPL_LAYER_COLOR || layer == SPL_LAYER_COVERAGE;
     uint32_t soft = !spl_soft_is_drawn(tile) ? 0 : blended ? 1 : spl_soft_is_found(tile->view) ? 2 : 0;
-    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft}};
+    const uint32_t shaded = layer == SPL_LAYER_COLOR && spl_tile_get_shades(tile);
+    struct spl_kernel_key key = {"resolve", !method->sums, {layer, resolved, soft, shaded}};
     struct spl_frame_params params = tile->params;
     params.output_word = output_word;
     params.map_near = (float)tile->view->soft.cover; /* no other word of its slot is free */

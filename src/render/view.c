@@ -8,6 +8,7 @@
 #include "base/sized.h"
 #include "geom/size.h"
 #include "render/marks.h"
+#include "render/paint.h"
 #include "shared.h"
 
 enum { side_max = 32768 };
@@ -68,17 +69,19 @@ static int check(const struct spl_view *view, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
+    rc = rc ? rc : spl_shade_check(&view->shade, err);
+    rc = rc ? rc : spl_color_check(&view->color, err);
     rc = rc ? rc : spl_soft_check(&view->soft, err);
     return rc ? rc : spl_terms_check(&view->clip, "clip", err);
 }
 
-static int refuse_normals(const struct spl_dataset_info *info, struct spl_error *err)
+static int refuse_normals(const struct spl_dataset_info *info, const char *field, struct spl_error *err)
 {
     const char *finds = "that finds them";
     for (int i = SPL_METHOD_COUNT; i-- > 0;)
         if (spl_method_get(i)->finds_normals)
             finds = spl_method_name(i);
-    return spl_fail_field(err, SPL_E_INPUT, "layer",
+    return spl_fail_field(err, SPL_E_INPUT, field,
                           "dataset '%s' has no normals, as it was packed with --points-only: ask for method %s, which "
                           "takes them from depth, or pack it without", info->id, finds);
 }
@@ -86,13 +89,23 @@ static int refuse_normals(const struct spl_dataset_info *info, struct spl_error 
 int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
     if (view->layers >> SPL_LAYER_NORMAL & 1 && !spl_method_has_normals(view->method, info))
-        return refuse_normals(info, err);
+        return refuse_normals(info, "layer", err);
     if (info->ids > SPL_NOTHING && view->layers >> SPL_LAYER_ID & 1)
         return spl_fail_field(err, SPL_E_INPUT, "layer",
                               "dataset '%s' has %llu splats and vertices of lines, more than the 32 bits of layer "
                               "id number (%u): ask for other layers, or pack the scans as several datasets",
                               info->id, (unsigned long long)info->ids, SPL_NOTHING);
-    return spl_marks_check_view(view, info, err);
+    return spl_view_check_colors(view, info, err);
+}
+
+int spl_view_check_colors(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    struct spl_paint paint;
+    const uint32_t lit = spl_shade_for(&view->shade, info) & (SPL_SHADE_HEADLIGHT | SPL_SHADE_SUN);
+    if (lit && view->layers >> SPL_LAYER_COLOR & 1 && !spl_method_has_normals(view->method, info))
+        return refuse_normals(info, "shade", err);
+    int rc = spl_paint_init(&paint, &view->color, info, err);
+    return rc ? rc : spl_marks_check_view(view, info, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)
@@ -106,6 +119,13 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
 {
     struct spl_view known;
     return spl_view_read(view, &known, err);
+}
+
+bool spl_view_shows_soft(const struct spl_view *view)
+{
+    const uint32_t blended = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE;
+    return view->soft.what.count && view->soft.opacity > 0 &&
+           (view->layers & blended || view->soft.of != SPL_SOFT_OF_SOLID);
 }
 
 void spl_frame_finish(struct spl_frame *frame)

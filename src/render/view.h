@@ -10,4 +10,8 @@
  * thread. */
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err);
 
+/* Can a dataset show what the view's colours and its soft terms ask for? SPL_E_INPUT with the field; part of
+ * spl_view_check_layers(). */
+int spl_view_check_colors(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
+
 #endif

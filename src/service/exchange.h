@@ -38,6 +38,8 @@ struct request {
     struct batch *batch;           // may be NULL; the views that it waits for
     struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
     struct spl_place_wish *place;  // may be NULL; the coordinate system that it waits for
+    struct spl_saving *saving;     // may be NULL; the view being saved that it waits for
+    bool wants_body;               /* a PUT that is routed again once its body is there */
     unsigned places;               /* such that it has waited for */
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */

@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 
+#include "base/decimal.h"
 #include "service/view/bundle.h"
 
 void spl_headers_open(struct spl_headers *headers)
@@ -52,7 +53,8 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
     spl_headers_add(headers, "Splatd-Depth-Unit", "%s", request->encode.unit);
     switch (format) {
     case SPL_FORMAT_PNG:
-        spl_headers_add(headers, "Splatd-Depth-Scale", "%.17g", request->encode.depth_scale);
+        spl_headers_add(headers, "Splatd-Depth-Scale", "%s",
+                        spl_decimal_print(request->encode.depth_scale, (char[SPL_DECIMAL_MAX]){0}));
         spl_headers_add(headers, "Splatd-Depth-Invalid", "0");
         if (encoded)
             spl_headers_add(headers, "Splatd-Depth-Saturated", "%llu", (unsigned long long)encoded->saturated);
@@ -73,15 +75,16 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
 void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
-    char far[32] = "null"; // JSON has no infinity
+    char far[32] = "null", text[640]; // JSON has no infinity
     if (isfinite(camera->far))
         snprintf(far, sizeof far, "%.9g", camera->far);
-    spl_headers_add(
-        headers, "Splatd-Camera",
+    snprintf(
+        text, sizeof text,
         "{\"eye\":[%.17g,%.17g,%.17g],\"rotation\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g],"
         "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s}",
         eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
         camera->cx, camera->cy, camera->width, camera->height, camera->near, far);
+    spl_headers_add(headers, "Splatd-Camera", "%s", spl_decimal_shorten(text));
 }
 
 /* Terms as an array, condition by condition or term by term; their texts have nothing that JSON would escape. */
@@ -111,11 +114,13 @@ static void add_clip(struct spl_headers *headers, const struct spl_terms *clip)
 static void add_soft(struct spl_headers *headers, const struct spl_soft_params *soft)
 {
     char terms[SPL_TERMS_TEXT_MAX + 3 * SPL_TERMS_MAX] = "";
+    char opacity[SPL_DECIMAL_MAX], cover[SPL_DECIMAL_MAX], blend[SPL_DECIMAL_MAX];
     write_terms(&soft->what, false, terms, sizeof terms);
     spl_headers_add(headers, "Splatd-Soft",
-                    "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%.17g,\"soft_cover\":%.17g,"
-                    "\"soft_blend\":%.17g,\"of\":\"%s\"}",
-                    terms, spl_soft_model_name(soft->model), soft->opacity, soft->cover, soft->blend,
+                    "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%s,\"soft_cover\":%s,"
+                    "\"soft_blend\":%s,\"of\":\"%s\"}",
+                    terms, spl_soft_model_name(soft->model), spl_decimal_print(soft->opacity, opacity),
+                    spl_decimal_print(soft->cover, cover), spl_decimal_print(soft->blend, blend),
                     spl_soft_of_name(soft->of));
 }
 

@@ -2,7 +2,8 @@
  * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
  * Bodies past body_max are read and dropped up to drain_max, because a client that is cut off while sending seldom
- * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size. Invariants: a
+ * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size; one that
+ * wants a body like others (wants_body) is routed again behind it. Invariants: a
  * suspended request is in `waiting`, or has a change; libmicrohttpd 0.9.75 goes on with what lies in its buffer (the
  * next chunk, the end of the body) though the request was suspended a moment ago, and nothing is taken then: it asks
  * again once it is resumed. Owned by the loop's thread. */
@@ -158,7 +159,8 @@ static bool answer_headers(struct request *request)
     if (!strcmp(request->method, MHD_HTTP_METHOD_PUT)) {
         spl_connection_enter(request->connection, PHASE_UPLOADING);
         spl_route(request, request->method);
-        return !request->change && announces_more(request, 0);
+        if (!request->wants_body)
+            return !request->change && announces_more(request, 0);
     }
     if (!announces_more(request, body_max))
         return false;

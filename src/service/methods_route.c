@@ -55,6 +55,7 @@ static json_t *describe_param(const struct spl_method_param_info *param)
     set(json, "textures", json_boolean(param->changes == SPL_CHANGES_TEXTURES));
     set(json, "maps", json_boolean(param->changes == SPL_CHANGES_MAPS));
     set(json, "primitives", json_boolean(param->changes == SPL_CHANGES_PRIMITIVES));
+    set(json, "colors", json_boolean(param->changes == SPL_CHANGES_SHADE || param->changes == SPL_CHANGES_COLORS));
     set(json, "soft", json_boolean(param->changes == SPL_CHANGES_SOFT));
     return json;
 }

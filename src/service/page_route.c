@@ -25,6 +25,8 @@ struct asset {
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "              \
     "base-uri 'none'; form-action 'none'; frame-ancestors "
 
+const char spl_page_policy[] = POLICY "'none'";
+
 static const struct asset *find(const char *folder, const char *name)
 {
     size_t length = strlen(folder);

@@ -9,6 +9,10 @@ struct request;
 struct spl_call;
 
 bool spl_wants_page(struct request *request); /* its Accept names text/html, and nothing of JSON before that */
+/* problem_page.c: is it somebody who reads? And what that one gets to read: malloc'd, NULL without memory. */
+bool spl_problem_wants_page(struct request *request);
+char *spl_problem_print_page(const struct request *request, unsigned status, const char *detail);
+extern const char spl_page_policy[]; /* Content-Security-Policy of pages that nobody frames */
 void spl_show_page(struct request *request);
 void spl_show_viewer_file(struct request *request, const struct spl_call *call);
 void spl_show_embed(struct request *request, const struct spl_call *call);

@@ -6,9 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "base/log.h"
 #include "service/exchange.h"
 #include "service/ops/access_log.h"
+#include "service/pages.h"
 #include "service/state.h"
 #include "service/view/views.h"
 
@@ -49,7 +51,7 @@ void spl_reply_text(struct request *request, const char *type, char *body)
 
 void spl_reply_json(struct request *request, json_t *json)
 {
-    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
     json_decref(json);
     set_text(request, MHD_HTTP_OK, "application/json", text);
 }
@@ -122,7 +124,15 @@ char *spl_problem_text(const struct request *request, const struct spl_error *er
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail)
 {
-    set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
+    if (!spl_problem_wants_page(request)) {
+        set_text(request, status, "application/problem+json", spl_problem_print(request, status, type, field, detail));
+        return;
+    }
+    set_text(request, status, "text/html; charset=utf-8", spl_problem_print_page(request, status, detail));
+    if (!request->response)
+        return;
+    spl_reply_add_header(request, "Content-Security-Policy", "%s", spl_page_policy);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_VARY, "%s", MHD_HTTP_HEADER_ACCEPT);
 }
 
 void spl_reply_error(struct request *request, const struct spl_error *err)

@@ -90,8 +90,12 @@ static const struct route {
     {"/v1/datasets/{id}", PUT, SPL_SCOPE_ADMIN, false, spl_put_dataset}, // called before the body
     {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
+    {"/v1/datasets/{id}/legend.svg", GET, SPL_SCOPE_VIEW, true, spl_show_legend},
     {"/v1/datasets/{id}/place", GET, SPL_SCOPE_VIEW, true, spl_show_place},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
+    {"/v1/datasets/{id}/thumbnail.jpg", GET, SPL_SCOPE_VIEW, true, spl_make_thumbnail},
+    {"/v1/datasets/{id}/views/{name}", PUT, SPL_SCOPE_ADMIN, false, spl_put_saved_view}, // before the body, and behind it
+    {"/v1/datasets/{id}/views/{name}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_saved_view},
     {"/v1/datasets/{id}/tours", POST, SPL_SCOPE_TOUR, false, spl_create_tour},
     {"/v1/tours", GET, SPL_SCOPE_TOUR, false, spl_list_tours},
     {"/v1/tours/{name}", GET, SPL_SCOPE_TOUR, false, spl_show_tour},

@@ -7,6 +7,7 @@
 #include <poll.h>
 
 #include "base/clock.h"
+#include "service/datasets/library.h"
 #include "service/exchange.h"
 #include "service/http.h"
 #include "service/ops/counters.h"
@@ -24,6 +25,7 @@ static void let_go(struct request *request)
     spl_batch_abandon(request->batch);
     spl_tour_wish_abandon(request->wish);
     spl_place_abandon(request->place);
+    spl_saving_abandon(request->saving);
     spl_waiting_resume(request);
 }
 

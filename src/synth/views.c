@@ -5,17 +5,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/decimal.h"
 #include "synth/scene.h"
 
 static void print_number(FILE *out, double value)
 {
-    char text[32];
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        if (strtod(text, NULL) == value)
-            break;
-    }
-    fputs(text, out);
+    char text[SPL_DECIMAL_MAX];
+    fputs(spl_decimal_print(value, text), out);
 }
 
 static void print_vector(FILE *out, const char *key, const double value[3])

@@ -132,37 +132,31 @@ paging() {
     bench "$file" --method splat --lod 1 --frames 10 --memory-limit $(($(stat -c %s "$file") / 4 / 1048576 + 256))
 }
 
-# clients, query…: views a second that no cache holds.
+curl() { LD_LIBRARY_PATH=$root/lib "$root/bin/curl" "$@"; }
+
+# clients, query…: views a second, each a little other than all before, so that no cache has it.
 load() {
-    local clients=$1 i count=0 pids=() begin=$EPOCHREALTIME
+    local clients=$1
     shift
-    for ((i = 0; i < clients; i++)); do
-        (
-            n=0 end=$(($(date +%s) + seconds))
-            while [ "$(date +%s)" -lt $end ]; do
-                # A connection that stays for 64 views, each a little elsewhere.
-                args=()
-                for ((k = 0; k < 64; k++)); do
-                    args+=(-o /dev/null "http://127.0.0.1:$port/v1/datasets/courtyard/view?$*&margin=$((1 + i % 3)).$((1000000 + (i * 100000 + n * 64 + k)))")
-                done
-                n=$((n + 1))
-                curl -s -f -w '%{http_code}\n' "${args[@]}"
-            done
-        ) >"$out/logs/load-$clients-$i" 2>&1 &
-        pids+=($!)
-    done
-    wait "${pids[@]}"
-    count=$(cat "$out"/logs/load-$clients-* | grep -c 200)
-    awk -v n="$count" -v b="$begin" -v e="$EPOCHREALTIME" -v c="$clients" -v q="$*" \
-        'BEGIN { printf "%3d clients  %7.1f views/s  %s\n", c, n / (e - b), q }'
-    rm -f "$out"/logs/load-$clients-*
+    cat >"$out/load.lua" <<LUA
+local thread, views = 0, 0
+function setup(t) thread = thread + 1; t:set("own", thread) end
+function request()
+    views = views + 1
+    return wrk.format("GET", string.format("/v1/datasets/courtyard/view?$*&margin=1.%07d", own * 100000 + views))
+end
+LUA
+    LD_LIBRARY_PATH=$root/lib "$root/bin/wrk" -t "$((clients < 8 ? clients : 8))" -c "$clients" -d "${seconds}s" --latency \
+        -s "$out/load.lua" "http://127.0.0.1:$port" 2>&1 |
+        awk -v c="$clients" -v q="$*" '$1 == "50%" { half = $2 } $1 == "99%" { most = $2 } $1 == "Requests/sec:" { rate = $2 }
+            /Non-2xx/ { bad = ", of them failed: " $NF }
+            END { printf "%3d clients  %8.1f views/s  median %9s  99 %% %9s  %s%s\n", c, rate, half, most, q, bad }'
 }
 
 http() {
     say "## Over HTTP" ""
     [ -f "$out/courtyard.spld" ] || dataset "$points" courtyard || return
-    command -v curl >/dev/null || { say "no curl here: not measured"; return; }
-    port=18080
+    port=18080 # of the daemon alone
     "$splatd" serve --listen 127.0.0.1:$port --quiet "$out/courtyard.spld" >"$out/logs/serve.txt" 2>&1 &
     local daemon=$! clients
     for ((i = 0; i < 300; i++)); do curl -s -o /dev/null "http://127.0.0.1:$port/v1/status" && break; sleep 0.1; done

@@ -42,6 +42,9 @@ def test_python_views():
         service = Splatd(url(d) + "/")
         assert service.datasets() == ["wall"]
         wall = service.dataset("wall")
+        assert wall.title is None and wall.description is None and wall.views == {}
+        thumbnail = wall.thumbnail(width=64)
+        assert thumbnail.bytes.startswith(JPEG) and thumbnail.camera["width"] == 64 and thumbnail.camera["height"] == 36
         view = wall.view(**POSE, **SMALL, transparent=False)
         assert view.bytes.startswith(JPEG) and view.type == "image/jpeg"
         assert view.camera["eye"] == [3, 0, 1] and view.camera["width"] == 65
@@ -88,6 +91,12 @@ def test_python_refusals():
                 raise RuntimeError("nothing was refused")
             except SplatdError as error:
                 assert (error.status, error.field) == (status, field) and str(error).startswith(f"{status}: "), error
+        for soft in {"class": 5}, ["class:5", 5], 5:
+            try:
+                service.dataset("wall").view(soft=soft)
+                raise RuntimeError("nothing was refused")
+            except TypeError as error:
+                assert "'class:3-5'" in str(error) and repr(soft) in str(error), error
 
 
 def test_a_busy_service_is_asked_again():

@@ -68,6 +68,7 @@ def test_requests():
         datasets.append(str(pathlib.Path(folder, "town.spld")))  # where the examples by longitude and latitude are
         subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--unit=ft", "--crs=EPSG:2994", datasets[-1]], check=True)
         pathlib.Path(folder, "camera_path.json").write_text(PATH)
+        pathlib.Path(folder, "hall.views.json").write_text('{"views": [{"name": "door", "eye": [3, 0, 1], "target": [0, 0, 1]}]}')
         with Daemon(REAL, "--tours", tours, datasets=datasets) as d:
             here = f"http://127.0.0.1:{d.port}"
             asked = 0

@@ -323,6 +323,23 @@ def test_layers_methods_and_budgets():
         assert link(tab)["lod"] == "1"
 
 
+def test_colours_and_shading():
+    with page() as tab:
+        digest = settled(tab)
+        tab.choose("#color_by", "height")
+        digest = settled(tab, digest)
+        tab.choose("#shade", "edl+headlight")
+        digest = settled(tab, digest)
+        assert link(tab)["color_by"] == "height" and link(tab)["shade"] == "edl+headlight", link(tab)
+        url = tab.run("location.href") + "&range=-5..5&ramp=turbo"
+    with page(url) as tab:
+        settled(tab)
+        assert {"color_by": "height", "shade": "edl+headlight", "range": "-5..5", "ramp": "turbo"}.items() <= link(tab).items(), link(tab)
+        tab.choose("#budget", "500ms")
+        tab.until("document.querySelector('#chosen').textContent.startsWith('Chosen: ')")
+        assert link(tab)["color_by"] == "height" and link(tab)["ramp"] == "turbo", link(tab)
+
+
 def test_the_address_restores_the_picture():
     with page() as tab:
         x, y = middle(tab)
@@ -551,6 +568,75 @@ def test_the_chart_has_the_frame_on_it():
             ), "less accurate is lower"
 
 
+CARDS = "[...document.querySelectorAll('#gallery a')]"
+PICTURES = "[...document.querySelectorAll('#gallery img')].every(i => i.complete && i.naturalWidth > 0)"
+
+
+def test_several_datasets_are_a_gallery():
+    with tempfile.TemporaryDirectory() as folder:
+        scan = pathlib.Path(folder, "scan.xyz")
+        scan.write_text("".join(f"{x / 4} {y / 4} 0\n" for x in range(81) for y in range(41)))
+        subprocess.run([REAL, "pack", scan, "-o", f"{folder}/site.spld", "--title", "The <i>site</i>", "--description", "Flat.",
+                        "--view", "low=eye=10,-9,2,target=10,5,0,fov=70"], check=True, capture_output=True)
+        with Daemon(REAL, datasets=[WALL, f"{folder}/site.spld"]) as other:
+            site = f"http://127.0.0.1:{other.port}"
+            for size, phone, dark in (((1280, 800), False, False), ((390, 844), True, True)):
+                with page(f"{site}/", ready=f"{CARDS}.length === 2 && {PICTURES}", size=size, phone=phone, dark=dark) as tab:
+                    assert tab.run(f"{CARDS}.map(a => a.querySelector('strong').textContent)") == ["The <i>site</i>", "wall"]
+                    assert tab.text("title").startswith("Datasets")
+                    assert tab.run("document.querySelector('#gallery').scrollWidth <= innerWidth && document.querySelector('#panel').hidden")
+                    boxes = tab.run(f"{CARDS}.map(a => (b => [b.x, b.y, b.width, b.height])(a.getBoundingClientRect()))")
+                    assert all(w > 250 and h > 140 for _, _, w, h in boxes), boxes
+                    assert (boxes[0][1] == boxes[1][1]) != phone, "side by side, or one below the other"
+                    assert [(role, bool(name)) for role, name in tab.names()] == [("link", True)] * 2
+            with page(f"{site}/", ready=f"{CARDS}.length === 2", size=(1280, 800)) as tab:
+                tab.run(f"{CARDS}[0].focus()")
+                tab.key("Enter")
+                tab.until(f"{REST} && document.title.startsWith('The <i>site')")
+                assert tab.text("#description") == "Flat." and link(tab)["dataset"] == "site"
+                before = tab.run(DIGEST)
+                tab.choose("#views", "low")
+                settled(tab, before)
+                assert far(link(tab)["eye"], [10, -9, 2]) < 1e-3
+                tab.run("history.back()")
+                tab.until(f"{CARDS}.length === 2 && document.querySelector('#stage').hidden")
+                tab.run("location.hash = '#dataset=wall'")
+                tab.until(f"{REST} && document.title.startsWith('wall')")
+                tab.press_on("#all")
+                tab.until(f"{CARDS}.length === 2")
+                tab.go(f"{site}/#dataset=site&view=low")
+                tab.until(f"{REST} && document.title.startsWith('The <i>site')")
+                assert far(link(tab)["eye"], [10, -9, 2]) < 1e-3 and abs(float(link(tab)["fov"]) - 70) < 0.01
+
+
+def test_the_first_view_fits_the_window():
+    with tempfile.TemporaryDirectory() as folder:
+        scan = pathlib.Path(folder, "scan.xyz")
+        scan.write_text("".join(f"{x / 4} {y / 4} 0\n" for x in range(81) for y in range(41)))
+        subprocess.run([REAL, "pack", scan, "-o", f"{folder}/site.spld"], check=True, capture_output=True)
+        with Daemon(REAL, datasets=[f"{folder}/site.spld"]) as other:
+            fit = other.ask("/v1/datasets/site").json()["default_view"]["fit"]
+
+            def across(tab):
+                width, height = tab.run("(s => [s.clientWidth, s.clientHeight])(document.querySelector('#stage'))")
+                return 2 * math.degrees(math.atan(math.tan(math.radians(float(link(tab)["fov"]) / 2)) * width / height))
+            with page(f"http://127.0.0.1:{other.port}/", size=(390, 844), phone=True) as tab:
+                assert across(tab) > fit[0] - 0.1, (across(tab), fit)
+                tall = link(tab)["fov"]
+                tab.resize((1280, 500))
+                next_link(tab, lambda now: now["fov"] != tall)
+                assert across(tab) > fit[0] - 0.1, (across(tab), fit)
+
+
+def test_wrong_links_say_so():
+    with page(f"{SITE}/?dataset=wall", ready="document.querySelector('.problem') !== null", complaints="400") as tab:
+        assert "dataset" in tab.text(".problem p")
+        tab.press_on(".problem a")
+        tab.until(REST)
+    with page(f"{SITE}/nowhere", ready="document.querySelector('.problem') !== null", complaints="404", dark=True) as tab:
+        assert tab.text("h1") == "Not Found" and all(name for _, name in tab.names())
+
+
 def test_atoms_are_offered_where_there_are_textures():
     hidden = "document.querySelector('#parameter-atoms').hidden"
     with page() as tab:
@@ -750,6 +836,7 @@ def test_what_is_soft():
     dataset = daemon.ask("/v1/datasets/wall").json()
     dataset["attributes"] = [{"name": "uncertainty", "unit": "", "values": SPREAD}, {"name": "class", "unit": "", "values": CLASSES},
                              {"name": "odd", "unit": "", "values": None}]
+    dataset["soft"] = ["class:5", "plane:0,0,1,0,0,1>0"]
     script = f"""(usual => {{ const told = {json.dumps({"/v1/datasets/wall": dataset})}; window.asked = [];
         window.fetch = (path, how) => {{
             asked.push(path);
@@ -794,11 +881,18 @@ def test_what_is_soft():
         tab.choose("#budget", "")
         tab.until(REST)
         tab.choose("#soft-what", "class")
-        next_link(tab, lambda now: "soft" not in now)  # none is chosen yet
+        next_link(tab, lambda now: now.get("soft") == "class:5")  # what the dataset suggests
         assert tab.run("[...document.querySelectorAll('#soft-kinds label')].map(e => e.textContent.trim())") == ["2 ground 75 %", "5 high vegetation 25 %"]
         tab.run("document.querySelector('#soft-kinds input[value=\"5\"]').focus()")
         tab.key(" ")
+        next_link(tab, lambda now: "soft" not in now)
+        tab.key(" ")
         next_link(tab, lambda now: now.get("soft") == "class:5")
+        select = "document.querySelector('#soft-what')"
+        tab.run(f"window.fits = (select => {{ const text = document.createElement('span'); text.textContent = 'above a height';"
+                f" select.parentNode.append(text); text.style.font = getComputedStyle(select).font; text.style.position = 'fixed';"
+                f" const room = select.clientWidth - text.offsetWidth; text.remove(); return room; }})({select})")
+        assert tab.run("fits") > 36, "paddings and arrow"
         for written, checked in ("class:3-5", [False, True]), ("class:2..5", [True, True]), ("class:2,5", [True, True]):
             tab.choose("#soft-terms", written)
             next_link(tab, lambda now: now.get("soft") == written)  # as it was written, and the boxes as it says

@@ -147,6 +147,10 @@ static struct spl_view make_view(const struct golden *golden)
         abort();
     if (golden->clip && spl_terms_parse(golden->clip, "clip", &view.clip, NULL))
         abort();
+    if (golden->shade && spl_shade_parse(golden->shade, &view.shade, NULL))
+        abort();
+    if (golden->color_by && spl_color_parse(golden->color_by, &view.color, NULL))
+        abort();
     view.soft.model = golden->model;
     view.soft.opacity = golden->opacity;
     view.soft.blend = golden->blend;

@@ -28,6 +28,7 @@ struct golden {
     enum spl_soft_model model;
     double opacity, blend;
     const char *clip;         /* conditions of what is drawn; NULL = all */
+    const char *shade, *color_by; /* NULL: none, rgb */
 };
 
 static const struct golden goldens[] = {
@@ -90,6 +91,13 @@ static const struct golden goldens[] = {
     /* panels and triangles cut at a plane, method nearest */
     {"clip-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
      {1, 0.002}, .relief = true, .clip = "plane:0,0,0,1,0.5,0.2<=0 or axis:0.3,0.2,0,0,0,1<0.15"},
+    /* eye-dome lighting, whose factor rounds by a level, and light from normals, at four samples a pixel under a
+     * transparent sky: edges, specks, and what lies outside the image */
+    {"shade-edl", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 2, {0, 0, 0, 0}, 0,
+     {2, 0.004}, .shade = "edl+headlight"},
+    /* heights over a terrain's ramp by the nearest disc: an entry of the palette more or less is a level or two */
+    {"color-height", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {2, 0.004}, .color_by = "height"},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

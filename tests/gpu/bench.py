@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -27,7 +28,7 @@ if not backends:
 
 with tempfile.TemporaryDirectory() as folder:
     folder = pathlib.Path(folder)
-    must("synth", "courtyard", "--points", 5000, "--format", "ply", "-o", folder)
+    must("synth", "courtyard", "--points", 5000, "--classes", "--format", "ply", "-o", folder)
     for name in "ab":
         must("pack", folder / "courtyard.ply", "-o", folder / f"{name}.spld")
     view = {"eye": [9, 7, 5], "target": [0, 0, 2], "up": [0, 0, 1], "vfov_deg": 50, "near": 0.1, "far": 100}
@@ -55,7 +56,21 @@ with tempfile.TemporaryDirectory() as folder:
     assert [(r["lod"], r["soft"]) for r in rows] == [(l, s) for l in (2, 1) for s in ("solid", "layer", "express")], rows
     assert all((r["spheres_drawn"] > 0) == (r["soft"] != "solid") and r["processor_ms"] > 0 for r in rows), rows
     table = must("bench", folder / "a.spld", *common, *soft)
-    assert "spheres" in table and "spheres" not in must("bench", folder / "a.spld", *common)
+    assert "soft ms    spheres" in table and "spheres" not in must("bench", folder / "a.spld", *common)
+    for terms, says in (["class:77"], "'class:77': class in 'a' is 1, 2,"), (["plane:0,0,90,0,0,1>0"], "lies beside it: its bounds are"), \
+            (["class:2"], None), (["box:-8,-8,0,8,8,0.5 or class:77"], "'class:77'"):
+        done = run("render", folder / "a.spld", "--size", "64x48", "--soft", *terms, "-o", folder / "warned.png")
+        assert done.returncode == 0 and (says in done.stderr if says else "nothing" not in done.stderr), (terms, done.stderr)
+        assert int(re.search(r"(\d+) soft spheres in ", done.stderr)[1]) > 0 or terms[0] in ("class:77", "plane:0,0,90,0,0,1>0"), done.stderr
+    done = run("bench", folder / "a.spld", *common, "--soft", "class:77")
+    assert done.returncode == 0 and "nothing is soft by 'class:77'" in done.stderr, done.stderr
+    told = json.loads(must("info", folder / "a.spld", "--json"))
+    assert {"value": 2.0, "name": "ground"}.items() <= told["classes"][1].items() and sum(c["count"] for c in told["classes"]) > 4000, told
+    assert re.search(r"^  classes .*2 ground [\d,]+ \(\d", must("info", folder / "a.spld"), re.MULTILINE)
+    key = {"camera": {"eye": [9, 7, 5], "target": [0, 0, 2]}}
+    (folder / "keys.json").write_text(json.dumps({"keyframes": [{**key, "soft_opacity": 1}, {**key, "soft_opacity": 0}]}))
+    done = run("tour", folder / "a.spld", "--path", folder / "keys.json", "--frames", 2, "--size", "16x16", "-o", folder / "tour")
+    assert done.returncode == 2 and "--soft" in done.stderr and not (folder / "tour").exists(), done
     assert [line.split()[3] for line in table.splitlines() if line.startswith("a ")] == ["solid", "layer", "express"], table
 
     compared = ["bench", folder / "a.spld", *soft[:4], "--soft-model", "base,express", "--method", "splat", "--lod", 2,

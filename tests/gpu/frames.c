@@ -36,8 +36,16 @@ double uniform(void)
     return (double)(random_state >> 11) / 9007199254740992.0;
 }
 
+/* GPUs round quotients and roots to within 2.5 units of the last place, where processors and software drivers round
+ * exactly: depths differ by as much (times the slant, along an edge), and more fragments lie on a border. */
+static bool rounds_exactly(void)
+{
+    return spl_renderer_get_device(renderer)->software;
+}
+
 struct tally compare(const struct spl_frame *a, const struct spl_frame *b)
 {
+    const double close = rounds_exactly() ? 1e-6 : 2e-5;
     struct tally t = {0};
     const float *da = a->images[SPL_LAYER_DEPTH].pixels, *db = b->images[SPL_LAYER_DEPTH].pixels;
     const float *ca = a->images[SPL_LAYER_COVERAGE].pixels, *cb = b->images[SPL_LAYER_COVERAGE].pixels;
@@ -55,7 +63,7 @@ struct tally compare(const struct spl_frame *a, const struct spl_frame *b)
         } else if (!isnan(da[i])) {
             double relative = fabs((double)da[i] - db[i]) / db[i];
             t.depth_worst = fmax(t.depth_worst, relative);
-            t.depth_differs += relative > 1e-6;
+            t.depth_differs += relative > close;
         }
         int worst = 0;
         for (int c = 0; c < 4; c++)
@@ -82,8 +90,9 @@ void same_images(const struct spl_dataset *dataset, const struct spl_view *view,
         fail_msg("%s: %s", what, err.message);
     assert_int_equal(reference_render(dataset, view, &cpu, &err), SPL_OK);
     struct tally t = compare(&gpu, &cpu);
-    size_t few = t.pixels / 10000 + 1;
-    if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > few ||
+    size_t few = t.pixels / (rounds_exactly() ? 10000 : 400) + 1;
+    size_t tied = rounds_exactly() ? few : t.pixels / 20 + 1; // ids where surfaces lie in one plane
+    if (t.covered_differs > few || t.depth_differs > few || t.color_differs > few || t.id_differs > tied ||
         t.normal_differs > few || t.primitive_differs > few)
         fail_msg(
             "%s: of %zu pixels differ: coverage %zu, depth %zu (worst %g), colour %zu (worst %d), id %zu, normal %zu, "

@@ -86,13 +86,14 @@ static void lines_around_the_eye_match(void **state)
     done(dataset);
 }
 
-/* Two discs far below, which are linear or not, and a line from (-1, 0, 0) to (1, 0, 0.2) in `pieces`. */
-static struct spl_dataset *one_line(int pieces, float width, bool linear)
+/* Two discs far below, of which none (0), both (1) or the first (2) are linear, and a line from (-1, 0, 0) to
+ * (1, 0, 0.2) in `pieces`. */
+static struct spl_dataset *one_line(int pieces, float width, int linear)
 {
     struct make_splat all[vertices + 2] = {0};
     for (int i = 0; i < 2; i++)
         all[i] = (struct make_splat){
-            .position = {0.1 * i, 0, -0.5}, .normal = {0, -1, 0}, .radius = 0.05f, .linear = linear};
+            .position = {0.1 * i, 0, -0.5}, .normal = {0, -1, 0}, .radius = 0.05f, .linear = linear == 1 || linear > 1 + i};
     for (int i = 0; i <= pieces; i++)
         all[2 + i] = (struct make_splat){.position = {2.0 * i / pieces - 1, 0, 0.2 * i / pieces},
                                          .normal = {0, -1, 0},
@@ -240,6 +241,49 @@ static void lines_stand_for_linear_splats(void **state)
             }
 }
 
+/* Pixels that show any of the two discs as soft spheres. */
+static double count_soft(const struct spl_dataset *dataset, enum spl_method method)
+{
+    enum { width = 800, height = 600 };
+    struct spl_view view = in_front(1.5, width, height);
+    struct spl_frame frame;
+    double covered = 0;
+    view.method = method;
+    view.soft.what.count = 1; /* whatever lies above -100 */
+    view.soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = -100, .most = INFINITY,
+                                                .shape = {0, 0, 0, 0, 0, 1}};
+    view.soft.opacity = 1;
+    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+    const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
+    for (size_t i = width * height * 2 / 3; i < width * height; i++)
+        covered += coverage[i] > 0.01f;
+    spl_frame_finish(&frame);
+    return covered;
+}
+
+/* A sphere on a wire of known width has the area of its stretch of the wire, which is 4/3 of its radius long: that of
+ * 0.05 on one of 0.01 has a radius of 0.0146. Others stay as they are: of a chunk of both, every one for itself. */
+static void soft_wires_have_the_area_of_their_stretch(void **state)
+{
+    (void)state;
+    for (int m = 0; m < 2; m++) {
+        double covered[3][2];
+        for (int linear = 0; linear < 3; linear++)
+            for (int width = 0; width < 2; width++) {
+                struct spl_dataset *dataset = one_line(4, width ? 0.01f : 0, linear);
+                covered[linear][width] = count_soft(dataset, methods[m]);
+                done(dataset);
+            }
+        const double whole = covered[0][0], share = 0.01 * 4 / 3 / (M_PI * 0.05);
+        assert_true(whole > 1000);
+        for (int linear = 0; linear < 3; linear++)
+            assert_float_equal(covered[linear][0], whole, 0);
+        assert_float_equal(covered[0][1], whole, 0);
+        assert_float_equal(covered[1][1], share * whole, 0.02 * whole);
+        assert_float_equal(covered[2][1], (1 + share) / 2 * whole, 0.02 * whole);
+    }
+}
+
 /* A pixel is the same in whatever tile it lies; of splat, whose largest weight is each tile's, what has no sums. */
 static void tiles_leave_no_seams_in_lines(void **state)
 {
@@ -297,6 +341,7 @@ int main(int argc, char **argv)
         frames_test(lines_are_as_wide_as_they_are_and_whole),
         frames_test(a_line_that_fills_the_image_is_whole),
         frames_test(lines_stand_for_linear_splats),
+        frames_test(soft_wires_have_the_area_of_their_stretch),
         frames_test(tiles_leave_no_seams_in_lines),
         frames_test(the_widest_line_matches),
     };

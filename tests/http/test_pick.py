@@ -144,12 +144,23 @@ def test_picks_say_which_primitive_and_plane():
             assert alone == posted and alone["primitive"] != "panel" and alone["plane"] is None, (alone, posted)
 
 
+def test_a_views_url_is_one_of_a_pick():
+    with Daemon(FAKE) as d:
+        sent = {"background": "white", "transparent": False, "format": "png", "quality": 80, "chroma": 444, "depth_scale": 100}
+        plain = d.ask(f"{PICK}?x=1&y=1")
+        same = d.ask(f"{PICK}?x=1&y=1&" + "&".join(f"{name}={value}".lower() for name, value in sent.items()))
+        assert same.status == 200 and same.body == plain.body and same.headers["ETag"] == plain.headers["ETag"], same.body
+        assert d.ask(f"{PICK}?x=1&y=1&BackgroundColor=red&TransparentBackground=true").body == plain.body
+        assert d.post({"x": 1, "y": 1, **sent}, PICK).json() == plain.json()
+        assert d.post({"x": 1, "y": 1, "quality": 0}, PICK).json()["field"] == "quality"
+
+
 def test_bad_picks_are_refused_by_name():
     with Daemon(FAKE) as d:
         for query, field in [("", "x"), ("x=1", "y"), ("y=1", "x"), ("x=-0.1&y=1", "x"), ("x=1&y=721", "y"),
                              ("x=nan&y=1", "x"),
                              ("x=1&y=inf", "y"), ("x=1,2&y=1", "x"), ("x=&y=1", "x"), ("x=1&x=1&y=1", "x"),
-                             ("x=1&y=1&width=0", "width"), ("x=65&y=1&width=64", "x"), ("x=1&y=1&format=png", "format"),
+                             ("x=1&y=1&width=0", "width"), ("x=65&y=1&width=64", "x"), ("x=1&y=1&format=gif", "format"), ("x=1&y=1&quality=0", "quality"),
                              ("x=1&y=1&layer=depth", "layer"), ("x=1&y=1&supersample=2", "supersample"),
                              ("x=1&y=1&budget=5ms", "budget"), ("x=1&y=1&colour=5", "colour"), ("x=1&y=1&v=1", "v"),
                              ("x=1&y=1&margin=-1", "margin"), ("x=1&y=1&lod=nan", "lod"),

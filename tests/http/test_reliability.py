@@ -132,7 +132,8 @@ def test_a_dataset_that_is_cut_or_overwritten_while_served():
                 assert view("b").status == 503  # the device is lost, so that pages must be read anew
                 eventually(lambda: d.ops("/readyz").status == 200)
                 assert view("b").status == 200
-                for reply in (view("a"), d.ask("/v1/datasets/a/view", "POST", "{}", {"Content-Type": "application/json"})):
+                for reply in (view("a"), d.ask("/v1/datasets/a/view", "POST", "{}", {"Content-Type": "application/json"}),
+                              d.ask("/v1/datasets/a/thumbnail.jpg")):
                     assert reply.status == 500 and "rename" in reply.json()["detail"], reply.body
                     assert folder not in reply.json()["detail"], "a client is told where the file lies"
                 assert view("b").status == 200 and d.ops("/healthz").status == 200

@@ -70,6 +70,7 @@ def test_datasets_are_described():
 
 
 SOFT = ["soft_model", "soft_opacity", "soft_cover", "soft_blend", "of"]
+COLORS = ["edl_strength", "edl_radius", "ramp"]
 
 
 def test_methods_are_those_of_the_document():
@@ -84,8 +85,8 @@ def test_methods_are_those_of_the_document():
         methods = {method["name"]: method for method in table["methods"]}
         assert methods["splat"]["textures"] and not methods["points"]["textures"]
         assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
-        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"] + SOFT
-        assert methods["points"]["parameters"] == SOFT
+        assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"] + SOFT + COLORS
+        assert methods["points"]["parameters"] == SOFT + COLORS
         for parameter in table["parameters"]:
             name, schema = parameter["name"], document[parameter["name"]]
             assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \
@@ -103,6 +104,7 @@ def test_methods_are_those_of_the_document():
         assert [p["name"] for p in table["parameters"] if p["maps"]] == ["maps"]
         assert [p["name"] for p in table["parameters"] if p["primitives"]] == ["primitives"]
         assert [p["name"] for p in table["parameters"] if p["soft"]] == SOFT
+        assert [p["name"] for p in table["parameters"] if p["colors"]] == COLORS
         assert d.ask("/v1/datasets/wall").json()["primitives"] is None
 
 

@@ -2,6 +2,7 @@
 something soft, and is refused where the dataset has nothing of it."""
 import json
 import math
+import re
 import struct
 
 from harness import FAKE, REAL, VIEW, Daemon, run
@@ -92,10 +93,12 @@ def test_a_device_that_is_lost_among_soft_spheres():
 def test_a_dataset_says_what_may_be_soft():
     with Daemon(REAL) as d:
         info = d.ask("/v1/datasets/wall").json()
-        shapes = {term.partition(":")[0] for term in info["soft"]}
-        assert {"axis", "plane", "box"} <= shapes and len(info["soft"]) >= 3 + sum(a["values"] is not None for a in info["attributes"])
+        kinds = {a["name"]: a["values"] and a["values"]["kinds"] for a in info["attributes"]}
+        assert {"axis", "plane", "box"} <= {term.partition(":")[0] for term in info["soft"]}, info["soft"]
+        assert not any(term.startswith(f"{name}>q") for term in info["soft"] for name in kinds if kinds[name]), "names are no numbers"
         for term in info["soft"]:
-            assert d.view(width=8, height=8, soft=term).status == 200, term
+            reply = d.view(width=64, height=48, soft=term)
+            assert reply.status == 200 and int(reply.headers["Splatd-Soft-Drawn"]) >= 0, term
         for attribute in info["attributes"]:
             values, name = attribute["values"], attribute["name"]
             if values:
@@ -118,8 +121,32 @@ def test_it_counts_where_something_is_soft():
         assert tag("soft=class>0.50") == tags[-1] and tag("soft=.5<class") == tags[-1]
 
 
+def test_how_much_is_soft_is_said():
+    with Daemon(REAL) as d:
+        def drawn(**query):
+            reply = d.view(width=64, height=48, **query)
+            assert reply.status == 200, reply.body
+            return reply.headers["Splatd-Soft-Drawn"]
+        plane = "plane:0,0,1,0,0,1>0"
+        assert int(drawn(soft=plane)) > 100 > 0 == int(drawn(soft="class:77")) == int(drawn(soft="plane:0,0,1e6,0,0,1>0"))
+        assert int(drawn(soft=plane, layer="coverage")) == int(drawn(soft=plane)) == int(drawn(soft=plane, layer="depth", of="first"))
+        assert drawn() is drawn(soft=plane, soft_opacity=0) is drawn(soft=plane, layer="depth") is None, "none could be"
+        assert d.view(width=64, height=48, soft=plane).headers["Splatd-Soft-Drawn"] == drawn(soft=plane)  # of the cache, too
+
+
+def test_numbers_are_as_they_were_asked_for():
+    with Daemon(FAKE) as d:
+        reply = d.view(width=8, height=8, soft="class:3", soft_opacity=0.2, soft_cover=0.7, soft_blend=0.1, eye="0.1,0.2,0.3")
+        assert '"soft_opacity":0.2,"soft_cover":0.7,"soft_blend":0.1,' in reply.headers["Splatd-Soft"], reply.headers["Splatd-Soft"]
+        assert '"eye":[0.1,0.2,0.3]' in reply.headers["Splatd-Camera"], reply.headers["Splatd-Camera"]
+        assert re.search(r'"default": 0\.3\b', d.ask("/v1/methods").body.decode())
+
+
 def test_a_dataset_is_asked_for_what_it_has():
     with Daemon(FAKE) as d:
+        for term, hint in [("clas:5", "'class'"), ("z>20", "plane:0,0,20,0,0,1>0"), ("class:vegetation", "3-5"), ("class=5", "class:5")]:
+            reply = d.view(soft=term)
+            assert reply.status == 400 and hint in reply.json()["detail"], reply.body
         had = [a["name"] for a in d.ask("/v1/datasets/wall").json()["attributes"]]
         for query in ["soft=smell>1", "soft=class>1+or+smell>1", "soft=smell>1&budget=500ms"]:
             reply = d.ask(f"{VIEW}?{query}")

@@ -2,6 +2,7 @@
 a message on stderr, README.md names the command.
 
 usage: commands.py SPLATD README.md"""
+import json
 import pathlib
 import re
 import subprocess
@@ -64,6 +65,9 @@ for words, wanted in {
     "tour a.spld --path b --ease up -o c": "--ease takes none, in, out or in-out, not 'up'",
     "render a.spld --eye 1,2 -o b.png": "--eye takes three numbers X,Y,Z, not '1,2'",
     "tour a.spld --require-gpu=no --path b -o c": "--require-gpu takes no argument",
+    "render a.spld --soft-opacity 0.2 -o b.png": "--soft-opacity is of what is soft.*--soft 'class:3-5'",
+    "render a.spld --of first -o b.png": "--of is of what is soft", "tour a.spld --path b --soft-cover 0 -o c": "--soft-cover is of",
+    "bench a.spld --soft-opacity 0.2": "--soft 'class:3-5'", "render a.spld --soft class=5 -o b.png": "write 'class:5'",
     "serve nosuch": r"nosuch: there is no such file or directory of datasets.*splatd pack",
     "sign /v1/datasets/a/view --key nosuch": "nosuch.*openssl rand -hex 32",
 }.items():
@@ -94,8 +98,13 @@ with tempfile.TemporaryDirectory() as folder:
     said = subprocess.run([SPLATD, "pack", scan, "-o", packed], stderr=subprocess.PIPE, text=True, timeout=60).stderr
     if "looking at colours: 1 scan in" not in said or re.search(r"^[a-z ,]*: \d+ in ", said, re.MULTILINE):
         wrong.append(f"pack's stages: {said!r}")
-    if "derived" not in check(["info", packed], 0, "stdout"):
+    text, told = (check(["info", *json_too, packed], 0, "stdout") for json_too in ([], ["--json"]))
+    if "derived" not in text:
         wrong.append("info does not say that uncertainty is derived")
+    told = json.loads(told)
+    if told["classes"] is not None or "  classes " in text or not any(term.startswith("plane:") for term in told["soft"]) or \
+            [line.split("'")[1] for line in text.splitlines() if "--soft '" in line] != told["soft"]:
+        wrong.append(f"info's terms of what is soft: {told['classes']}, {told['soft']}, {text!r}")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")

@@ -2,6 +2,8 @@
  * recorded, in order, and submit puts a fence behind them. Owned by the device's thread. */
 #include "gpu/egl/gl.h"
 
+#include <stdlib.h>
+
 void gl_frames_init(struct gl_gpu *gpu)
 {
     if (gpu->base.limits.timestamps)
@@ -12,6 +14,8 @@ void gl_frames_finish(struct gl_gpu *gpu)
 {
     gpu->gl.DeleteQueries(SPL_GPU_TIMESTAMPS_MAX, gpu->list.queries);
     gpu->gl.DeleteSync(gpu->list.sync);
+    for (int i = 0; i < GL_PATTERNS; i++)
+        gpu->gl.DeleteBuffers(1, &gpu->patterns[i].name);
 }
 
 static int check(struct gl_gpu *gpu, struct spl_error *err)
@@ -75,10 +79,41 @@ void gl_copy(struct spl_gpu *base, struct spl_gpu_buffer *from, uint64_t from_of
                                    (GLintptr)from_offset, (GLintptr)to_offset, (GLsizeiptr)bytes);
 }
 
+/* The buffer that is full of `word`; 0 where there is none. */
+static GLuint get_pattern(struct gl_gpu *gpu, uint32_t word)
+{
+    for (int i = 0; i < GL_PATTERNS; i++) {
+        struct gl_pattern *pattern = &gpu->patterns[i];
+        if (!pattern->name) {
+            uint32_t *words = malloc(GL_PATTERN_BYTES);
+            for (size_t k = 0; words && k < GL_PATTERN_BYTES / sizeof *words; k++)
+                words[k] = word;
+            if (!words)
+                return 0;
+            gpu->gl.CreateBuffers(1, &pattern->name);
+            gpu->gl.NamedBufferStorage(pattern->name, GL_PATTERN_BYTES, words, 0);
+            pattern->word = word;
+            free(words);
+        }
+        if (pattern->word == word)
+            return pattern->name;
+    }
+    return 0;
+}
+
+/* A GPU's driver may clear on the processor (2.9 ms for the sums of 1280x720, where a copy takes microseconds). */
 void gl_fill(struct spl_gpu *base, struct spl_gpu_buffer *buffer, uint64_t offset, uint64_t bytes, uint32_t word)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_use(gpu);
+    const GLuint pattern = gpu->base.info.software || bytes < GL_PATTERN_BYTES / 16 ? 0 : get_pattern(gpu, word);
+    for (uint64_t done = 0; pattern && done < bytes; done += GL_PATTERN_BYTES) {
+        const uint64_t part = bytes - done < GL_PATTERN_BYTES ? bytes - done : GL_PATTERN_BYTES;
+        gpu->gl.CopyNamedBufferSubData(pattern, ((struct gl_buffer *)buffer)->name, 0, (GLintptr)(offset + done),
+                                       (GLsizeiptr)part);
+    }
+    if (pattern)
+        return;
     gpu->gl.ClearNamedBufferSubData(((struct gl_buffer *)buffer)->name, GL_R32UI, (GLintptr)offset,
                                     (GLsizeiptr)bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, &word);
 }

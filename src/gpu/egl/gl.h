@@ -71,12 +71,20 @@ struct gl_list {
     uint32_t written;             /* bit per timestamp slot */
 };
 
+/* A buffer full of one word, from which GPUs fill others. */
+enum { GL_PATTERNS = 2, GL_PATTERN_BYTES = 4 << 20 };
+struct gl_pattern {
+    GLuint name;                  /* 0 = not made yet */
+    uint32_t word;
+};
+
 struct gl_gpu {
     struct spl_gpu base;          /* first */
     struct gl_functions gl;
     EGLDisplay display;           /* lives as long as the process: EGL hands out one per device */
     EGLContext context;
     struct gl_list list;          /* being recorded, or running */
+    struct gl_pattern patterns[GL_PATTERNS];
     uint64_t ended;               /* largest ticket known to have ended */
     bool ready;                   /* there is something to finish */
 };

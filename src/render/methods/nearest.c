@@ -9,7 +9,8 @@ static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_p
 {
     struct spl_renderer *r = tile->renderer;
     struct spl_disc_kernels kernels;
-    struct spl_kernel_key key = {"nearest", true, {group, pass}};
+    const uint32_t paint = spl_tile_get_paint(tile, group);
+    struct spl_kernel_key key = {"nearest", true, {group, pass, [SPL_CONSTANT_PAINT] = paint}};
     int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
     rc = rc ? rc : spl_tile_dispatch_splats(tile, &kernels, &(struct spl_dispatch){.phases = phases}, err);
     static const struct spl_panel_kernels panels = {.panels = "panel_nearest",
@@ -17,7 +18,7 @@ static int draw(struct spl_tile *tile, uint32_t group, uint32_t pass, enum spl_p
                                                      .panel_cells = "nearest_cells",
                                                      .mesh_cells = "nearest_mesh_cells"};
     rc = rc ? rc : spl_tile_dispatch_panels(tile, &panels, key, phases, err);
-    struct spl_kernel_key lines = {"line_nearest", true, {group, pass}};
+    struct spl_kernel_key lines = {"line_nearest", true, {group, pass, [SPL_CONSTANT_PAINT] = paint}};
     rc = rc ? rc : spl_tile_dispatch_lines(tile, lines, phases, err);
     spl_gpu_barrier(r->gpu);
     return rc;

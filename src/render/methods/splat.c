@@ -36,7 +36,8 @@ static int shade_panels(struct spl_tile *tile, uint32_t group, struct spl_error 
                                                      .meshes = "mesh_shade",
                                                      .panel_cells = "splat_shade_cells",
                                                      .mesh_cells = "splat_shade_mesh_cells"};
-    return spl_tile_dispatch_panels(tile, &panels, (struct spl_kernel_key){NULL, true, {group}}, SPL_PHASE_BOTH, err);
+    const struct spl_kernel_key key = {NULL, true, {group, [SPL_CONSTANT_PAINT] = spl_tile_get_paint(tile, group)}};
+    return spl_tile_dispatch_panels(tile, &panels, key, SPL_PHASE_BOTH, err);
 }
 
 /* The kernels of `what`, by its number of planes. */
@@ -86,7 +87,7 @@ static int shade(struct spl_tile *tile, uint32_t group, const struct spl_disc_ke
                  ? shade_colors(tile, kernels, err)
                  : spl_tile_dispatch_splats(tile, kernels, &(struct spl_dispatch){.phases = SPL_PHASE_BOTH}, err);
     rc = rc ? rc : shade_panels(tile, group, err);
-    struct spl_kernel_key lines = {"line_shade", true, {group}};
+    struct spl_kernel_key lines = {"line_shade", true, {group, [SPL_CONSTANT_PAINT] = spl_tile_get_paint(tile, group)}};
     return rc ? rc : spl_tile_dispatch_lines(tile, lines, SPL_PHASE_BOTH, err);
 }
 
@@ -112,7 +113,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     struct spl_renderer *r = tile->renderer;
     struct spl_disc_kernels kernels;
     bool mapped = spl_tile_has_map_colors(tile, group);
-    int rc = spl_tile_get_disc_kernels(tile, (struct spl_kernel_key){"splat_shade", true, {group}}, &kernels, err);
+    const struct spl_kernel_key key = {"splat_shade", true, {group, [SPL_CONSTANT_PAINT] = spl_tile_get_paint(tile, group)}};
+    int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
     if (rc)
         return rc;
     if (first)

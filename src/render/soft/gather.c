@@ -34,13 +34,14 @@ static int gather(const struct spl_soft_gathering *from, enum phase phase, const
     struct spl_soft_order *order = from->order;
     struct spl_gpu_buffer *const *buffers = order->memory->buffers;
     struct spl_gpu_binding with[SPL_RESOURCE_COUNT] = {
-        [SPL_RESOURCE_SLOTS] = {.buffer = buffers[SPL_SOFT_SLOTS]},
+        [SPL_RESOURCE_SLOTS] = {.buffer = buffers[order->memory->many ? SPL_SOFT_TOLD : SPL_SOFT_SLOTS]},
         [SPL_RESOURCE_STARTS] = {.buffer = buffers[SPL_SOFT_FIRSTS]},
         [SPL_RESOURCE_ITEMS] = {.buffer = buffers[SPL_SOFT_ITEMS]},
         [SPL_RESOURCE_SORT_TO] = {.buffer = buffers[SPL_SOFT_PAIRS]},
     };
     const bool surface = spl_dataset_get_info(from->tile->resident->dataset)->has_surface;
     const uint32_t details = phase == GATHER && from->details ? surface ? 1 : 2 : 0;
+    const uint32_t paint = spl_tile_get_paint(from->tile, SPL_SUMS_COLOR);
     int rc = spl_soft_put_step(order, step, &with[SPL_RESOURCE_STEP], err);
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds && !rc; i++) {
         struct spl_disc_kernels kernels;
@@ -49,12 +50,28 @@ static int gather(const struct spl_soft_gathering *from, enum phase phase, const
                                           .lanes = kinds[i].lanes,
                                           .role = SPL_ROLE_SOFT,
                                           .with = with};
-        const struct spl_kernel_key key = {kinds[i].name, false, {phase, details}};
+        const struct spl_kernel_key key = {
+            kinds[i].name, false, {phase, details, [SPL_CONSTANT_PAINT] = phase == GATHER ? paint : SPL_PAINT_NONE}};
         rc = spl_tile_get_plain_kernels(from->tile, key, &what, &kernels, err);
         rc = rc ? rc : spl_tile_dispatch_splats(from->tile, &kernels, &what, err);
     }
     spl_gpu_barrier(order->gpu);
     return rc;
+}
+
+/* Counts into zeroes, and lets the host have them: the first `bytes`. */
+static int count(const struct spl_soft_gathering *from, enum phase phase, const struct spl_soft_step *step,
+                 uint64_t bytes, struct spl_error *err)
+{
+    struct spl_soft_order *order = from->order;
+    struct spl_gpu_buffer *const *buffers = order->memory->buffers;
+    const bool many = order->memory->many;
+    spl_gpu_fill(order->gpu, buffers[many ? SPL_SOFT_TOLD : SPL_SOFT_SLOTS], 0, bytes, 0);
+    spl_gpu_barrier(order->gpu);
+    int rc = gather(from, phase, step, err);
+    if (!rc && many)
+        spl_gpu_copy(order->gpu, buffers[SPL_SOFT_TOLD], 0, buffers[SPL_SOFT_SLOTS], 0, bytes);
+    return rc ? rc : spl_soft_run(order, err);
 }
 
 static uint32_t larger(uint32_t a, uint32_t b)
@@ -92,11 +109,7 @@ int spl_soft_count(const struct spl_soft_gathering *from, const struct spl_soft_
 {
     const struct spl_soft_step step = window_step(from, window);
     /* of chunks that are hidden nothing is counted: what another tile left there would be drawn */
-    spl_gpu_fill(from->order->gpu, from->order->memory->buffers[SPL_SOFT_SLOTS], 0,
-                 (uint64_t)from->slots * SPL_SOFT_SLOT_WORDS * sizeof(uint32_t), 0);
-    spl_gpu_barrier(from->order->gpu);
-    int rc = gather(from, COUNT_SLOTS, &step, err);
-    rc = rc ? rc : spl_soft_run(from->order, err);
+    int rc = count(from, COUNT_SLOTS, &step, (uint64_t)from->slots * SPL_SOFT_SLOT_WORDS * sizeof(uint32_t), err);
     if (!rc)
         *sum = sum_slots(from);
     return rc;
@@ -110,10 +123,7 @@ int spl_soft_measure(void *context, const struct spl_soft_range *range, uint32_t
     struct spl_soft_step step = window_step(from, range);
     step.digits = shift < 32;
     step.shift = shift < 32 ? shift : shift - 32;
-    spl_gpu_fill(from->order->gpu, buffer, 0, SPL_SOFT_BUCKETS * sizeof *sums, 0);
-    spl_gpu_barrier(from->order->gpu);
-    int rc = gather(from, COUNT_BUCKETS, &step, err);
-    rc = rc ? rc : spl_soft_run(from->order, err);
+    int rc = count(from, COUNT_BUCKETS, &step, SPL_SOFT_BUCKETS * sizeof *sums, err);
     if (!rc)
         memcpy(sums, spl_gpu_buffer_map(buffer), SPL_SOFT_BUCKETS * sizeof *sums);
     return rc;

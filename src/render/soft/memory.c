@@ -4,21 +4,19 @@
 #include "render/soft/plan.h"
 
 /* Invocations that walk blocks: a software driver has few cores, and each has a counter for every tile. */
-enum { software_threads = 128, gpu_threads = 1024, tables_at_least = 16 };
+enum { threads = 128, kept = 1024, tables_at_least = 16 };
 enum { digits_max = 2048, sort_threads = 1024 };
-
-static uint32_t threads_of(bool software)
-{
-    return software ? software_threads : gpu_threads;
-}
 
 static uint64_t counters_of(const struct spl_soft_sizes *sizes, bool software)
 {
     const uint64_t sort = (uint64_t)digits_max * sort_threads, few = (uint64_t)tables_at_least * sizes->tiles;
-    uint64_t all = (uint64_t)threads_of(software) * sizes->tiles;
+    const uint64_t sorted = sizes->items > sizes->entries ? sizes->items : sizes->entries;
+    const uint64_t many = software ? 0 : (sorted / SPL_SOFT_MANY_BLOCK + 1) << SPL_SOFT_MANY_BITS;
+    uint64_t all = (uint64_t)threads * sizes->tiles;
     const uint64_t most = few > 4 * sort ? few : 4 * sort;
     all = all < most ? all : most;
-    return (all > sort ? all : sort) + 2 * (uint64_t)gpu_threads;
+    all = (all > sort ? all : sort) + 2 * (uint64_t)kept;
+    return all > many ? all : many;
 }
 
 static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t bytes[SPL_SOFT_BUFFERS])
@@ -28,9 +26,11 @@ static void sizes_of(const struct spl_soft_sizes *sizes, bool software, uint64_t
     const uint64_t item = SPL_SOFT_ITEM_WORDS + 1 + (sizes->found ? SPL_SOFT_DETAIL_WORDS : 0);
     bytes[SPL_SOFT_ITEMS] = word * item * sizes->items;
     bytes[SPL_SOFT_PAIRS] = bytes[SPL_SOFT_OTHERS] = word * list;
+    bytes[SPL_SOFT_TILED] = bytes[SPL_SOFT_UNTILED] = software ? 0 : 2 * word * sizes->entries;
     bytes[SPL_SOFT_COUNTS] = word * counters_of(sizes, software);
     const uint64_t slots = sizes->slots, buckets = 2 * (uint64_t)SPL_SOFT_BUCKETS;
     bytes[SPL_SOFT_SLOTS] = word * (SPL_SOFT_SLOT_WORDS * slots > buckets ? SPL_SOFT_SLOT_WORDS * slots : buckets);
+    bytes[SPL_SOFT_TOLD] = software ? 0 : bytes[SPL_SOFT_SLOTS];
     bytes[SPL_SOFT_FIRSTS] = word * (slots ? slots : 1);
     bytes[SPL_SOFT_DIGITS] = word * digits_max;
     bytes[SPL_SOFT_TOTALS] = bytes[SPL_SOFT_STARTS] = word * sizes->tiles;
@@ -64,8 +64,9 @@ int spl_soft_memory_init(struct spl_soft_memory *memory, const struct spl_soft_s
     uint64_t bytes[SPL_SOFT_BUFFERS];
     sizes_of(sizes, software, bytes);
     *memory = (struct spl_soft_memory){.sizes = *sizes,
+                                       .many = !software,
                                        .counters = (uint32_t)counters_of(sizes, software),
-                                       .threads = threads_of(software)};
+                                       .threads = threads};
     for (int i = 0; i < SPL_SOFT_BUFFERS; i++) {
         int rc = !bytes[i] ? SPL_OK : make(context, kinds[i], bytes[i], &memory->buffers[i], err);
         if (rc) {

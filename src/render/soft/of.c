@@ -61,7 +61,7 @@ static int dispatch(struct spl_soft_order *order, const struct look *look, uint3
                      .fall_2 = fall[2] * scale,
                      .fall_3 = fall[3] * scale,
                      .fall_4 = fall[4] * scale},
-            .from = order->sorted == SPL_SOFT_PAIRS ? SPL_SOFT_OTHERS : SPL_SOFT_PAIRS,
+            .from = spl_soft_other(order->sorted),
             .to = order->sorted,
             .totals = SPL_SOFT_TOTALS,
             .workgroups = (uint32_t)(((uint64_t)(end - first) * samples + SPL_WORKGROUP - 1) / SPL_WORKGROUP)},
@@ -75,7 +75,7 @@ static int walk(struct spl_soft_order *order, const struct look *look, uint64_t 
     const uint32_t tiles = order->columns * order->rows;
     const uint32_t work_of_item = look->kernel < SPL_SOFT_FIND_DENSE ? 1 : dense_work;
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups * (SPL_WORKGROUP / samples);
-    const uint32_t *starts = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_STARTS]);
+    const uint32_t *starts = order->starts;
     uint32_t *lists = spl_gpu_buffer_map(order->memory->buffers[SPL_SOFT_LISTS]), listed = 0, begun = 0;
     uint64_t work = 0;
     int rc = SPL_OK;

@@ -1,6 +1,5 @@
-/* Recording of sort, lists and blending; see order.h. The host waits once a window, for how long the tiles' lists are:
- * it lays them out, and knows then how much work each is, so that none is more than a device's patience or a software
- * driver's rounds. */
+/* Recording of sort and blending; see order.h, and list.c for the lists between them, of which the host knows how much
+ * work each is, so that none is more than a device's patience or a software driver's rounds. */
 #include "render/soft/order.h"
 
 #include <string.h>
@@ -11,9 +10,6 @@ enum {
     sort_block = 2048,    // pairs that an invocation sorts at least
     sort_bits = 9,        // of a digit at most
     sort_blocks_max = 1024,
-    digits_max = 2048,
-    list_block = 64,
-    list_blocks_least = 32, // that all cores have some
     blend_work = 1 << 25, // samples that are looked at in a dispatch
     walked_samples = 1    // that moving an item is worth
 };
@@ -74,9 +70,20 @@ static uint32_t groups(uint64_t invocations, uint32_t size)
     return (uint32_t)((invocations + size - 1) / size);
 }
 
-static enum spl_soft_buffer other(enum spl_soft_buffer buffer)
+enum spl_soft_buffer spl_soft_other(enum spl_soft_buffer buffer)
 {
-    return buffer == SPL_SOFT_PAIRS ? SPL_SOFT_OTHERS : SPL_SOFT_PAIRS;
+    static const enum spl_soft_buffer others[SPL_SOFT_BUFFERS] = {
+        [SPL_SOFT_PAIRS] = SPL_SOFT_OTHERS,
+        [SPL_SOFT_OTHERS] = SPL_SOFT_PAIRS,
+        [SPL_SOFT_TILED] = SPL_SOFT_UNTILED,
+        [SPL_SOFT_UNTILED] = SPL_SOFT_TILED,
+    };
+    return others[buffer];
+}
+
+uint32_t spl_soft_groups(const struct spl_soft_order *order, uint64_t invocations)
+{
+    return groups(invocations, order->memory->many ? SPL_WORKGROUP : SPL_LANES);
 }
 
 /* Counts are cleared, counted, and summed up by block. */
@@ -91,10 +98,11 @@ static int count(struct spl_soft_order *order, struct spl_soft_dispatch what, co
     return rc;
 }
 
-static int scan(struct spl_soft_order *order, struct spl_soft_dispatch what, bool starts, struct spl_error *err)
+int spl_soft_scan(struct spl_soft_order *order, struct spl_soft_dispatch what, bool starts, struct spl_error *err)
 {
-    what.key = (struct spl_kernel_key){.name = "sort_scan"};
-    what.workgroups = groups(what.step.digits, SPL_LANES);
+    const bool many = order->memory->many;
+    what.key = (struct spl_kernel_key){.name = many ? "sort_scan_many" : "sort_scan"};
+    what.workgroups = many ? what.step.digits : groups(what.step.digits, SPL_LANES);
     int rc = spl_soft_dispatch(order, &what, err);
     spl_gpu_barrier(order->gpu);
     if (rc || !starts)
@@ -106,105 +114,43 @@ static int scan(struct spl_soft_order *order, struct spl_soft_dispatch what, boo
     return rc;
 }
 
-int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, uint32_t high, struct spl_error *err)
+int spl_soft_sort_pairs(struct spl_soft_order *order, enum spl_soft_buffer *pairs, uint32_t count_of, uint32_t low,
+                        uint32_t high, struct spl_error *err)
 {
+    const bool many = order->memory->many;
+    const uint32_t digit = many ? SPL_SOFT_MANY_BITS : sort_bits;
     const uint32_t bits = high > low ? 32u - (uint32_t)__builtin_clz(high - low) : 0;
-    const uint32_t passes = (bits + sort_bits - 1) / sort_bits;
-    uint32_t block = groups(items, sort_blocks_max);
-    block = block > sort_block ? block : sort_block;
+    const uint32_t passes = (bits + digit - 1) / digit;
+    uint32_t block = groups(count_of, sort_blocks_max);
+    block = many ? SPL_SOFT_MANY_BLOCK : block > sort_block ? block : sort_block;
     int rc = SPL_OK;
-    order->sorted = SPL_SOFT_PAIRS;
-    for (uint32_t pass = 0; pass < passes && !rc && items; pass++) {
+    for (uint32_t pass = 0; pass < passes && !rc && count_of; pass++) {
         const uint32_t first = bits * pass / passes, end = bits * (pass + 1) / passes;
-        struct spl_soft_dispatch what = {.key = {.name = "sort_move"},
-                                         .step = {.count = items,
+        struct spl_soft_dispatch what = {.key = {.name = many ? "sort_move_many" : "sort_move"},
+                                         .step = {.count = count_of,
                                                   .block = block,
-                                                  .blocks = groups(items, block),
+                                                  .blocks = groups(count_of, block),
                                                   .digits = 1u << (end - first),
                                                   .low = low,
                                                   .shift = first},
-                                         .from = order->sorted,
-                                         .to = other(order->sorted),
+                                         .from = *pairs,
+                                         .to = spl_soft_other(*pairs),
                                          .totals = SPL_SOFT_DIGITS};
-        what.workgroups = groups(what.step.blocks, SPL_LANES);
-        rc = spl_soft_add_work(order, (uint64_t)walked_samples * items, err);
-        rc = rc ? rc : count(order, what, "sort_count", err);
-        rc = rc ? rc : scan(order, what, true, err);
+        what.workgroups = spl_soft_groups(order, what.step.blocks);
+        rc = spl_soft_add_work(order, (uint64_t)walked_samples * count_of, err);
+        rc = rc ? rc : count(order, what, many ? "sort_count_many" : "sort_count", err);
+        rc = rc ? rc : spl_soft_scan(order, what, true, err);
         rc = rc ? rc : spl_soft_dispatch(order, &what, err);
         spl_gpu_barrier(order->gpu);
-        order->sorted = what.to;
+        *pairs = what.to;
     }
     return rc;
 }
 
-/* Where lists start; the sum of all, UINT64_MAX where it does not fit. */
-static uint64_t lay_out(const uint32_t *totals, uint32_t *starts, uint32_t tiles)
+int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, uint32_t high, struct spl_error *err)
 {
-    uint64_t sum = 0;
-    for (uint32_t i = 0; i < tiles; i++) {
-        starts[i] = (uint32_t)sum;
-        sum += totals[i];
-    }
-    return sum;
-}
-
-/* Walks all blocks to their ends, as many dispatches as the one with most entries may need. */
-static int walk(struct spl_soft_order *order, struct spl_soft_dispatch *what, uint32_t most, struct spl_error *err)
-{
-    const uint64_t rounds = (uint64_t)what->step.block * most;
-    const uint64_t kept = (uint64_t)what->step.progress * sizeof(uint32_t);
-    int rc = SPL_OK;
-    what->key.name = "soft_list";
-    spl_gpu_fill(order->gpu, order->memory->buffers[SPL_SOFT_COUNTS], kept, 2ull * what->step.blocks * sizeof(uint32_t),
-                 0);
-    spl_gpu_barrier(order->gpu);
-    for (uint64_t done = 0; done < rounds && !rc; done += SPL_SOFT_ROUNDS) {
-        rc = spl_soft_add_work(order, (uint64_t)what->step.blocks * SPL_SOFT_ROUNDS, err);
-        rc = rc ? rc : spl_soft_dispatch(order, what, err);
-        spl_gpu_barrier(order->gpu);
-    }
-    return rc;
-}
-
-int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, struct spl_error *err)
-{
-    const struct spl_soft_memory *memory = order->memory;
-    const uint32_t tiles = order->columns * order->rows, room = memory->counters - 2 * memory->threads;
-    order->entries = 0;
-    if (!items)
-        return SPL_OK;
-    uint32_t threads = items / tiles > list_blocks_least ? items / tiles : list_blocks_least;
-    threads = threads < memory->threads ? threads : memory->threads;
-    threads = threads < room / tiles ? threads : room / tiles;
-    uint32_t block = groups(items, threads);
-    block = block > list_block ? block : list_block;
-    struct spl_soft_dispatch what = {.step = {.count = items,
-                                              .block = block,
-                                              .blocks = groups(items, block),
-                                              .digits = tiles,
-                                              .columns = order->columns,
-                                              .rects = memory->sizes.items * SPL_SOFT_ITEM_WORDS,
-                                              .progress = room},
-                                     .from = order->sorted,
-                                     .to = other(order->sorted),
-                                     .totals = SPL_SOFT_STARTS};
-    what.workgroups = groups(what.step.blocks, SPL_LANES);
-    spl_gpu_fill(order->gpu, memory->buffers[SPL_SOFT_COUNTS], 0,
-                 (uint64_t)what.step.blocks * tiles * sizeof(uint32_t), 0);
-    int rc = walk(order, &what, most, err);
-    struct spl_soft_dispatch sums = what;
-    sums.totals = SPL_SOFT_TOTALS;
-    rc = rc ? rc : scan(order, sums, false, err);
-    rc = rc ? rc : spl_soft_run(order, err);
-    if (rc)
-        return rc;
-    uint64_t entries = lay_out(spl_gpu_buffer_map(memory->buffers[SPL_SOFT_TOTALS]),
-                               spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]), tiles);
-    if (entries > memory->sizes.entries)
-        return SPL_SOFT_CROWDED;
-    order->entries = (uint32_t)entries;
-    what.key.constants[0] = 1;
-    return walk(order, &what, most, err);
+    order->sorted = SPL_SOFT_PAIRS;
+    return spl_soft_sort_pairs(order, &order->sorted, items, low, high, err);
 }
 
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err)
@@ -214,7 +160,7 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
     const uint32_t tiles = order->columns * order->rows;
     if (blend->model != SPL_SOFT_MODEL_EXPRESS)
         return spl_soft_walk(order, blend, err);
-    const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
+    const uint32_t *starts = order->starts;
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]);
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups * (SPL_WORKGROUP / lanes);
     const float scale = 65536;
@@ -252,7 +198,7 @@ int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *bl
                                                       .fall_2 = fall[2] * scale,
                                                       .fall_3 = fall[3] * scale,
                                                       .fall_4 = fall[4] * scale},
-                                             .from = other(order->sorted),
+                                             .from = spl_soft_other(order->sorted),
                                              .workgroups = groups((uint64_t)(listed - begun) * lanes, SPL_WORKGROUP)};
             rc = spl_soft_add_work(order, work, err);
             rc = rc ? rc : spl_soft_dispatch(order, &what, err);

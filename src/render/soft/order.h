@@ -1,10 +1,12 @@
 /* The order of soft spheres: items that a kernel gathered in the order of their ids are sorted by view depth (stable,
  * so that ties fall to the lower id), listed by the tiles of SPL_SOFT_TILE samples that they reach, and blended front
- * to back over what is solid. A counting sort throughout: integers, no barrier within a workgroup, the same bytes on
- * every driver. Everything belongs to the renderer's thread.
+ * to back over what is solid. Counting sorts throughout: integers, the same order on every driver. Everything belongs to the renderer's thread.
  *
  *   items (ids) ── sort_count, sort_scan, sort_move, a digit of the depth at a time ──► pairs (depth, item) in order
  *         ── soft_list ──► count by tile ── the host: where lists start ──► lists of items ── soft_blend ──► samples
+ *
+ * GPUs take a sort in place of the second line's count: soft_entries, sort_…, soft_tiles. They have kernels sort_…_many:
+ * blocks are short and scans shared by a workgroup.
  */
 #ifndef SPL_RENDER_SOFT_ORDER_H
 #define SPL_RENDER_SOFT_ORDER_H
@@ -16,6 +18,8 @@
 #include "shared.h"
 
 enum { SPL_SOFT_STEP_STRIDE = 256, SPL_SOFT_STEPS = 256 };
+/* Where many invocations run: pairs a block, bits of a digit. */
+enum { SPL_SOFT_MANY_BLOCK = 64, SPL_SOFT_MANY_BITS = 5 };
 
 /* Device memory, of so much that any window of depth that is planned for it fits. */
 struct spl_soft_sizes {
@@ -32,8 +36,11 @@ enum spl_soft_buffer {
     SPL_SOFT_ITEMS,   /* and rectangles */
     SPL_SOFT_PAIRS,   /* of key and item, which sorting moves to and fro; then lists */
     SPL_SOFT_OTHERS,
+    SPL_SOFT_TILED,   /* pairs of tile and item, which sorting moves to and fro; NULL but where `many` */
+    SPL_SOFT_UNTILED,
     SPL_SOFT_COUNTS,
-    SPL_SOFT_SLOTS,   /* what they have, for the host */
+    SPL_SOFT_SLOTS,   /* what they have, for the host: where `many`, by way of SPL_SOFT_TOLD */
+    SPL_SOFT_TOLD,    /* counted there, since a GPU's atomics and scattered words are slow in the host's memory; else NULL */
     SPL_SOFT_FIRSTS,  /* their first items, from the host */
     SPL_SOFT_DIGITS,  /* totals of a sort */
     SPL_SOFT_TOTALS,  /* of tiles, for the host */
@@ -48,8 +55,9 @@ enum spl_soft_buffer {
 
 struct spl_soft_memory {
     struct spl_soft_sizes sizes;
+    bool many;         /* thousands of invocations walk a little each, as GPUs want it; else few walk much */
     uint32_t counters; /* words of SPL_SOFT_COUNTS */
-    uint32_t threads;  /* invocations that walk blocks at most: each has counters of its own */
+    uint32_t threads;  /* invocations that walk blocks at most where not `many`: each has counters of its own */
     struct spl_gpu_buffer *buffers[SPL_SOFT_BUFFERS];
 };
 
@@ -81,6 +89,7 @@ struct spl_soft_order {
     uint32_t steps;                /* of SPL_SOFT_STEPS_OF, used since it last ran */
     enum spl_soft_buffer sorted;   /* PAIRS or OTHERS: where the last sort ended */
     uint32_t entries;              /* of the lists */
+    const uint32_t *starts;        /* of the tiles, where the host reads them: mapped memory of the device */
 };
 
 /* Puts the parameters of a dispatch where it may bind them. */
@@ -92,10 +101,10 @@ int spl_soft_run(struct spl_soft_order *order, struct spl_error *err);
 /* Sorts `items` pairs in SPL_SOFT_PAIRS whose keys are in [low, high]. */
 int spl_soft_sort(struct spl_soft_order *order, uint32_t items, uint32_t low, uint32_t high, struct spl_error *err);
 
-/* Lists the sorted items, none of which has more than `most` entries. Runs what was recorded. SPL_SOFT_CROWDED: they
- * are more than fit, and nothing is listed. */
+/* list.c: lists the sorted items, which have `entries` entries in all and at most `most` each. Runs what was recorded.
+ * SPL_SOFT_CROWDED: they are more than fit, and nothing is listed. */
 enum { SPL_SOFT_CROWDED = 1 };
-int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint32_t most, struct spl_error *err);
+int spl_soft_list(struct spl_soft_order *order, uint32_t items, uint64_t entries, uint32_t most, struct spl_error *err);
 
 struct spl_soft_blend {
     enum spl_soft_model model;
@@ -111,7 +120,7 @@ struct spl_soft_blend {
 /* Blends what was listed. */
 int spl_soft_blend(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);
 
-/* order.c for walk.c and of.c: a dispatch of one of its kernels. */
+/* order.c for list.c, walk.c and of.c: a dispatch of one of its kernels. */
 struct spl_soft_dispatch {
     struct spl_kernel_key key;
     struct spl_soft_step step;
@@ -120,6 +129,16 @@ struct spl_soft_dispatch {
 };
 int spl_soft_dispatch(struct spl_soft_order *order, const struct spl_soft_dispatch *what, struct spl_error *err);
 int spl_soft_add_work(struct spl_soft_order *order, uint64_t work, struct spl_error *err);
+/* The other one of two between which pairs are moved. */
+enum spl_soft_buffer spl_soft_other(enum spl_soft_buffer buffer);
+/* Workgroups of so many invocations that each walk a block. */
+uint32_t spl_soft_groups(const struct spl_soft_order *order, uint64_t invocations);
+/* Counters become how many of their digit lie in the blocks before, and totals how many there are, or with `starts`
+ * where each begins. */
+int spl_soft_scan(struct spl_soft_order *order, struct spl_soft_dispatch what, bool starts, struct spl_error *err);
+/* Sorts the pairs in *pairs, whose keys are in [low, high], and says where they are then. */
+int spl_soft_sort_pairs(struct spl_soft_order *order, enum spl_soft_buffer *pairs, uint32_t count, uint32_t low,
+                        uint32_t high, struct spl_error *err);
 
 /* walk.c: spl_soft_blend() of base, concentric and layer. Runs what was recorded. */
 int spl_soft_walk(struct spl_soft_order *order, const struct spl_soft_blend *blend, struct spl_error *err);

@@ -53,7 +53,7 @@ static int draw(struct pass *pass, const struct spl_soft_range *window, const st
     const uint32_t items = (uint32_t)sum->items;
     int rc = spl_soft_gather(&pass->from, window, err);
     rc = rc ? rc : spl_soft_sort(&pass->order, items, sum->low, sum->high, err);
-    rc = rc ? rc : spl_soft_list(&pass->order, items, sum->most, err);
+    rc = rc ? rc : spl_soft_list(&pass->order, items, sum->entries, sum->most, err);
     spl_assert(rc != SPL_SOFT_CROWDED);
     if (!rc && pass->blends)
         rc = spl_soft_blend(&pass->order, &(struct spl_soft_blend){.model = soft->model,

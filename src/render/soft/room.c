@@ -46,6 +46,15 @@ static uint32_t larger(uint32_t a, uint32_t b)
     return a > b ? a : b;
 }
 
+/* So that views that grow little by little do not take memory anew each time. */
+static uint32_t rounded_up(uint64_t slots, uint64_t most)
+{
+    uint64_t power = 1 << 12;
+    while (power < slots)
+        power *= 2;
+    return (uint32_t)(power < most ? power : slots);
+}
+
 /* Items, and lists for them, as many as there may be and as fit in `bytes` and in a binding. */
 static void choose_items(struct spl_soft_sizes *sizes, uint64_t wanted, uint64_t bytes, uint64_t binding, bool software)
 {
@@ -67,7 +76,7 @@ static void choose_entries(struct spl_soft_sizes *sizes, uint64_t bytes, uint64_
     while (sizes->entries < entries_of_window) {
         struct spl_soft_sizes more = *sizes;
         more.entries *= 2;
-        if ((uint64_t)more.entries * sizeof(uint32_t) > binding || spl_soft_memory_bytes(&more, software) > bytes)
+        if (2 * (uint64_t)more.entries * sizeof(uint32_t) > binding || spl_soft_memory_bytes(&more, software) > bytes)
             return;
         *sizes = more;
     }
@@ -87,7 +96,8 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
     if (slots * SPL_SOFT_SLOT_WORDS * sizeof(uint32_t) > limits->binding_bytes)
         return spl_fail_field(err, SPL_E_LIMIT, "lod", "this view has more soft splats than it can sort; raise lod");
     const struct spl_soft_sizes *have = &memory->sizes;
-    struct spl_soft_sizes sizes = {.slots = larger((uint32_t)slots, have->slots),
+    const uint64_t slots_most = limits->binding_bytes / (SPL_SOFT_SLOT_WORDS * sizeof(uint32_t));
+    struct spl_soft_sizes sizes = {.slots = larger(rounded_up(slots, slots_most), have->slots),
                                    .tiles = (uint32_t)((camera->width + columns - 1) / columns *
                                                        ((camera->height + rows - 1) / rows)),
                                    .samples = (uint64_t)camera->width * camera->height};
@@ -106,7 +116,7 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
             larger(sizes.items * entries_of_item, SPL_SOFT_SLOT_CELLS * SPL_SOFT_SPAN_MAX * SPL_SOFT_SPAN_MAX);
     } else {
         choose_items(&sizes, slots * SPL_SOFT_SLOT_SPLATS, share, limits->binding_bytes, software);
-        if (view->soft.model != SPL_SOFT_MODEL_EXPRESS)
+        if (view->soft.model != SPL_SOFT_MODEL_EXPRESS || !software) // a window costs a GPU more than memory does
             choose_entries(&sizes, share, limits->binding_bytes, software);
     }
     const bool exact = renderer->soft_items_most > 0;

@@ -48,7 +48,7 @@ static uint32_t lay_out(const struct spl_soft_order *order, const struct spl_sof
     const struct spl_soft_memory *memory = order->memory;
     const uint32_t tiles = order->columns * order->rows;
     const uint32_t most = spl_gpu_get_limits(order->gpu)->workgroups / (samples / SPL_WORKGROUP + 1);
-    const uint32_t *starts = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_STARTS]);
+    const uint32_t *starts = order->starts;
     uint32_t *lists = spl_gpu_buffer_map(memory->buffers[SPL_SOFT_LISTS]), listed = 0;
     struct group *group = NULL;
     batch->count = batch->words = 0;
@@ -83,7 +83,7 @@ static int dispatch(struct spl_soft_order *order, const struct spl_soft_blend *b
     static const uint32_t models[SPL_SOFT_MODEL_COUNT] = {[SPL_SOFT_MODEL_BASE] = SPL_SOFT_BASE,
                                                           [SPL_SOFT_MODEL_CONCENTRIC] = SPL_SOFT_CONCENTRIC,
                                                           [SPL_SOFT_MODEL_LAYER] = SPL_SOFT_LAYER};
-    const enum spl_soft_buffer lists = order->sorted == SPL_SOFT_PAIRS ? SPL_SOFT_OTHERS : SPL_SOFT_PAIRS;
+    const enum spl_soft_buffer lists = spl_soft_other(order->sorted);
     const struct spl_soft_dispatch what = {
         .key = {"soft_base", order->wide, {models[blend->model], blend->border, blend->thin}},
         .step = {.count = group->count,

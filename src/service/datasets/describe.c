@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "dataset/dataset.h"
+#include "render/soft/suggest.h"
 #include "service/datasets/library.h"
 
 static json_t *vector(const double v[3])
@@ -114,28 +115,14 @@ static json_t *describe_attributes(const struct spl_dataset_info *info)
     return all;
 }
 
-/* What views may name in soft: what is measured, its form and what it is of. */
+/* What views may begin with in soft. */
 static json_t *describe_soft(const struct spl_dataset_info *info)
 {
+    char terms[SPL_SUGGESTIONS_MAX][SPL_SUGGESTION_MAX];
+    const uint32_t terms_count = spl_soft_suggest(info, terms);
     json_t *forms = json_array();
-    for (uint32_t s = 0; s < info->stream_count; s++) {
-        const struct spl_stream_values *values = spl_dataset_info_get_values(info, s);
-        const char *name = info->streams[s].name;
-        bool share = !strcmp(name, "uncertainty"); // is asked for as a share of its 99th percentile
-        if (values && values->kind_count)
-            json_array_append_new(forms, json_sprintf("%s:%.17g", name, values->kinds[values->kind_count - 1].value));
-        else if (values || !share)
-            json_array_append_new(forms, json_sprintf("%s>%.4g", name, !values ? 0 : share ? 0.5 : values->quantiles[32]));
-        if (values)
-            json_array_append_new(forms, json_sprintf("%s>q0.9", name));
-    }
-    const double *low = info->bounds_min, *high = info->bounds_max;
-    double middle[3] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2};
-    json_array_append_new(forms, json_sprintf("axis:%.9g,%.9g,%.9g,0,0,1<%.4g", middle[0], middle[1], middle[2],
-                                              (high[0] - low[0]) / 4));
-    json_array_append_new(forms, json_sprintf("plane:%.9g,%.9g,%.9g,0,0,1>0", middle[0], middle[1], middle[2]));
-    json_array_append_new(forms, json_sprintf("box:%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", low[0], low[1], middle[2], high[0],
-                                              high[1], high[2]));
+    for (uint32_t i = 0; i < terms_count; i++)
+        json_array_append_new(forms, json_string(terms[i]));
     return forms;
 }
 
@@ -162,6 +149,8 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "state", json_string("ready"));
     set(json, "uri", json_string(entry->uri));
     set(json, "view", json_sprintf("%s/view", entry->uri));
+    set(json, "thumbnail", json_sprintf("%s/thumbnail.jpg", entry->uri));
+    set(json, "title", info->title ? json_string(info->title) : json_null());
     set(json, "unit", json_string(spl_unit_word(info)));
     const char *crs = spl_places_get_crs(entry->places);
     set(json, "crs", *crs ? json_string(crs) : json_null());
@@ -195,7 +184,11 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
             json_array_append_new(formats, json_string(spl_format_name((enum spl_format)i)));
     set(json, "formats", formats);
     set(json, "default_view",
-        json_pack("{s:o, s:o, s:o, s:f}", "eye", vector(info->default_eye), "target", vector(info->default_target),
-                  "up", vector(info->default_up), "fov", info->default_fov));
+        json_pack("{s:o, s:o, s:o, s:f, s:o}", "eye", vector(info->default_eye), "target",
+                  vector(info->default_target), "up", vector(info->default_up), "fov", info->default_fov, "fit",
+                  info->default_fit[0] > 0 ? json_pack("[f, f]", info->default_fit[0], info->default_fit[1])
+                                           : json_null()));
+    set(json, "description", info->description ? json_string(info->description) : json_null());
+    set(json, "views", spl_saved_describe(entry->saved));
     return json;
 }

@@ -39,6 +39,10 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     memcpy(entry->defaults.eye, info->default_eye, sizeof entry->defaults.eye);
     memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
     memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
+    memcpy(entry->defaults.fit, info->default_fit, sizeof entry->defaults.fit);
+    if ((rc = spl_saved_create(place, info, &entry->saved, err)))
+        goto done;
+    entry->defaults.names = spl_saved_get_names(entry->saved);
     if ((rc = spl_places_create(entry->dataset, &entry->places, err)))
         goto done;
     spl_places_hook_init(&entry->at_once, entry->places, false);
@@ -84,6 +88,7 @@ void spl_catalog_entry_destroy(struct spl_catalog_entry *entry)
         return;
     spl_plan_destroy(entry->plan);
     spl_places_destroy(entry->places);
+    spl_saved_destroy(entry->saved);
     spl_dataset_close(entry->dataset);
     free(entry);
 }

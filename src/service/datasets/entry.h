@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "dataset/dataset.h"
 #include "geom/camera_json.h"
+#include "service/datasets/saved.h"
 #include "service/place/places.h"
 #include "service/view/plan.h"
 
@@ -35,6 +36,8 @@ struct spl_catalog_entry {
     struct spl_camera_defaults defaults; /* for the loop: whoever may wait has a hook of its own */
     char uri[512]; /* "/v1/datasets/{id}", percent-encoded */
     struct spl_plan *plan;
+    struct spl_saved *saved; /* its views by name */
+    bool saving;             // owned by: loop; one of them is being written
 
     atomic_uint references;
     void (*release)(struct spl_catalog_entry *entry, void *context); // by the last unref; NULL: it is destroyed

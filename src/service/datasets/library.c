@@ -157,6 +157,8 @@ void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *
     spl_log_info("dataset %s: version %016llx %s, %llu splats, %llu bytes", slot->id, (unsigned long long)info->version,
                  slot->current ? "replaces the one before" : "is served", (unsigned long long)info->splats,
                  (unsigned long long)info->file_bytes);
+    if (slot->current && slot->current != entry)
+        spl_saved_inherit(entry->saved, slot->current->saved);
     spl_catalog_entry_unref(slot->current);
     slot->current = entry;
     slot->next = NULL;

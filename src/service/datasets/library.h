@@ -53,8 +53,15 @@ void spl_change_forget_all(struct spl_service *service); /* once no thread has o
 /* `entry` is resident, or refused with entry->err. True: it is a client's, and taken. */
 bool spl_change_take_answer(struct spl_service *service, struct spl_catalog_entry *entry);
 
+/* saved_route.c: PUT and DELETE of a view by name, and what of them waits. */
+struct spl_saving;
+void spl_put_saved_view(struct request *request, const struct spl_call *call);
+void spl_delete_saved_view(struct request *request, const struct spl_call *call);
+void spl_saving_abandon(struct spl_saving *saving); /* its request no longer waits for it; NULL-safe */
+
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
+void spl_show_legend(struct request *request, const struct spl_call *call);
 
 /* describe.c: new references; NULL without memory. */
 json_t *spl_describe_slot(const struct spl_catalog_slot *slot);

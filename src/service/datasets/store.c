@@ -192,14 +192,19 @@ void spl_incoming_abort(struct spl_incoming *incoming)
 
 int spl_stored_remove(const char *path, struct spl_error *err)
 {
-    char *profile = spl_profile_path(path, err);
-    if (!profile)
+    char *profile = spl_profile_path(path, err), *views = profile ? spl_saved_path(path, err) : NULL;
+    if (!views) {
+        free(profile);
         return SPL_E_NOMEM;
+    }
     int rc = unlink(path) && errno != ENOENT ? spl_fail_errno(err, errno, "cannot remove the dataset's file") : 0;
-    if (!rc)
+    if (!rc) {
         unlink(profile);
+        unlink(views);
+    }
     if (!rc && spl_file_sync_folder(path))
         rc = spl_fail_errno(err, errno, "cannot sync the folder of the dataset's file");
     free(profile);
+    free(views);
     return rc;
 }

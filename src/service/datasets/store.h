@@ -37,7 +37,7 @@ int spl_incoming_place(struct spl_incoming *incoming, const char *target, struct
 /* Removes it; idempotent. */
 void spl_incoming_abort(struct spl_incoming *incoming);
 
-/* Removes a dataset's file and its profile. One that is not there is removed already. */
+/* Removes a dataset's file, its profile and the views beside it. One that is not there is removed already. */
 int spl_stored_remove(const char *path, struct spl_error *err);
 
 #endif

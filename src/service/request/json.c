@@ -65,6 +65,13 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
                 return rc;
             continue;
         }
+        if (kind == SPL_KIND_COLOR_BY) {
+            if (!json_is_string(json))
+                return spl_fail_field(err, SPL_E_INPUT, name, "%s must be text, not %s", name, spl_json_type_name(json));
+            if ((rc = spl_values_set_color(values, json_string_value(json), err)))
+                return rc;
+            continue;
+        }
         if ((rc = spl_value_claim(&values->v[param], name, err)) ||
             (rc = kind == SPL_KIND_FORM ? spl_camera_form_from_json(values->v, (enum spl_camera_param)param, json, err)
                                         : parse_value(&values->v[param], kind, json, name, err)))

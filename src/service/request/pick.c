@@ -21,10 +21,16 @@ static int resolve(const struct values *values, const struct spl_camera_defaults
     *out = (struct spl_view_request){.picks = true};
     spl_view_init(&out->view);
     struct spl_camera *camera = &out->pick.camera;
+    struct spl_camera_defaults own;
     int rc;
-    if ((rc = spl_camera_from_values(values->v, defaults, limits, camera, err)) ||
+    out->named = values->v[PARAM_view].given;
+    if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
+        (rc = spl_camera_from_values(values->v, defaults, limits, camera, err)) ||
         (rc = resolve_point(values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
         (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)))
+        return rc;
+    struct spl_view_request picture = {.layer = SPL_LAYER_COLOR}; /* of which a pick has none: it is only checked */
+    if ((rc = spl_values_resolve_encoding(values, &picture, err)))
         return rc;
     out->pick.crs = (uint32_t)values->v[PARAM_crs].n[0];
     spl_values_resolve_splats(values, &out->view);

@@ -71,6 +71,13 @@ static int parse_numbers(struct spl_value *value, const char *text, const char *
     }
 }
 
+static int parse_color(struct values *values, const char *text, size_t length, struct spl_error *err)
+{
+    char decoded[SPL_COLOR_TEXT_MAX];
+    int rc = spl_percent_decode(text, length, decoded, sizeof decoded, "color_by", err);
+    return rc ? rc : spl_values_set_color(values, decoded, err);
+}
+
 /* May be given several times, and is longer than others. */
 static int parse_terms(struct values *values, enum param param, const char *text, size_t length, struct spl_error *err)
 {
@@ -96,6 +103,8 @@ static int parse_pair(struct values *values, const char *pair, size_t length, en
     struct spl_value *value = &values->v[param];
     if (spl_params[param].kind == SPL_KIND_TERMS)
         return parse_terms(values, param, equals + 1, length - name_length - 1, err);
+    if (spl_params[param].kind == SPL_KIND_COLOR_BY)
+        return parse_color(values, equals + 1, length - name_length - 1, err);
     if ((rc = spl_value_claim(&values->v[param], name, err)))
         return rc;
     if ((rc = spl_percent_decode(equals + 1, length - name_length - 1, text, sizeof text, name, err)))

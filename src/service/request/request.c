@@ -31,7 +31,7 @@ struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *r
     return encode;
 }
 
-static int resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err)
+int spl_values_resolve_encoding(const struct values *values, struct spl_view_request *out, struct spl_error *err)
 {
     double quality = get(values, PARAM_quality, 90), scale = get(values, PARAM_depth_scale, 1000);
     double chroma = get(values, PARAM_chroma, 0);
@@ -85,6 +85,7 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (rc)
         return rc;
     spl_values_resolve_splats(values, view);
+    spl_values_resolve_colors(values, view);
     view->supersample = get(values, PARAM_supersample, 1);
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)
@@ -92,6 +93,26 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (get(values, PARAM_transparent, 0) != 0)
         view->background[3] = 0;
     return 0;
+}
+
+void spl_values_resolve_colors(const struct values *values, struct spl_view *view)
+{
+    const double *shade = values->v[PARAM_shade].n, *range = values->v[PARAM_range].n;
+    const enum spl_ramp ramp = view->color.ramp; /* as a method's parameter, which is there by now */
+    view->color = values->color;
+    view->color.ramp = ramp;
+    if (given(values, PARAM_range)) {
+        view->color.has_range = true;
+        for (int i = 0; i < 2; i++) {
+            view->color.range[i] = range[i];
+            view->color.shares[i] = (int)range[2] >> i & 1;
+        }
+    }
+    if (given(values, PARAM_shade)) {
+        view->shade.kinds = (uint32_t)shade[0];
+        view->shade.sun[0] = shade[1];
+        view->shade.sun[1] = shade[2];
+    }
 }
 
 /* Samples and memory, not pixels alone, are what a view costs. */
@@ -156,16 +177,33 @@ void spl_values_resolve_version(const struct values *values, struct spl_view_req
     out->version = v->given ? (uint64_t)v->n[0] << 32 | (uint64_t)v->n[1] : 0;
 }
 
+int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
+                           struct spl_camera_defaults *own, struct spl_error *err)
+{
+    const struct spl_value *view = &values->v[PARAM_view];
+    if (!view->given)
+        return 0;
+    if (!(*defaults)->names)
+        return spl_fail_field(err, SPL_E_INPUT, "view", "there are no views by name here; leave view out");
+    *own = **defaults;
+    int rc = own->names->find(own->names, view->word, own, err);
+    *defaults = own;
+    return rc;
+}
+
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
     *out = (struct spl_view_request){0};
     spl_view_init(&out->view);
+    struct spl_camera_defaults own;
     int rc;
-    if ((rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
+    out->named = given(values, PARAM_view);
+    if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
+        (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) ||
         (rc = spl_values_resolve_terms(values, defaults, &out->view, err)) ||
-        (rc = resolve_encoding(values, out, err)) ||
+        (rc = spl_values_resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);

@@ -26,6 +26,7 @@ struct spl_view_request {
         struct spl_camera camera; /* that was asked for */
         uint32_t crs;             /* the answer's position, a number of EPSG's list; 0 = the world */
     } pick;
+    bool named;     /* view was given: what that shows may change */
     bool versioned; /* v was given: only this version of the dataset will do */
     uint64_t version;
     bool planned;             /* budget or psnr was given: the service chooses what demand.keep_* leaves open */
@@ -41,6 +42,11 @@ int spl_view_request_from_query(const char *query, size_t length, const struct s
 int spl_view_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
+
+/* GET …/thumbnail.jpg: the default view; `query` holds width, background and v. */
+int spl_thumbnail_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
+                                     const struct spl_camera_limits *limits, struct spl_view_request *out,
+                                     struct spl_error *err);
 
 /* GET …/pick: `query` holds x, y, the camera and how splats are drawn. */
 int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,

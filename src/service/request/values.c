@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "base/decimal.h"
+#include "dataset/saved_views.h"
 #include "image/color.h"
 
 #define LAYER_NAMES "color, depth, range, normal, id, coverage, primitive"
@@ -35,6 +36,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
                        : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
+                       : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background and v"
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
@@ -77,6 +79,15 @@ static int parse_duration(struct spl_value *value, const char *name, const char 
     return 0;
 }
 
+static int parse_name(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
+{
+    if (!spl_view_name_is_valid(text))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.64s' is no name of a view: " SPL_VIEW_NAME_FORMS, name,
+                              text);
+    snprintf(value->word, sizeof value->word, "%s", text);
+    return 0;
+}
+
 static int parse_version(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
     size_t length = strspn(text, "0123456789abcdef");
@@ -87,6 +98,32 @@ static int parse_version(struct spl_value *value, const char *name, const char *
     value->n[0] = (double)(version >> 32);
     value->n[1] = (double)(version & UINT32_MAX);
     return 0;
+}
+
+static int parse_shade(struct spl_value *value, const char *text, struct spl_error *err)
+{
+    struct spl_shade_params shade = {0};
+    int rc = spl_shade_parse(text, &shade, err);
+    value->n[0] = shade.kinds;
+    value->n[1] = shade.sun[0];
+    value->n[2] = shade.sun[1];
+    return rc;
+}
+
+static int parse_range(struct spl_value *value, const char *text, struct spl_error *err)
+{
+    struct spl_color_params color = {0};
+    int rc = spl_color_parse_range(text, &color, err);
+    value->n[0] = color.range[0];
+    value->n[1] = color.range[1];
+    value->n[2] = (int)color.shares[0] | (int)color.shares[1] << 1;
+    return rc;
+}
+
+int spl_values_set_color(struct values *values, const char *text, struct spl_error *err)
+{
+    int rc = spl_value_claim(&values->v[PARAM_color_by], "color_by", err);
+    return rc ? rc : spl_color_parse(text, &values->color, err);
 }
 
 /* Of a method's parameter. */
@@ -175,6 +212,12 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         return parse_layers(value, name, text, err);
     if (kind == SPL_KIND_CHOICE)
         return parse_choice(value, name, text, err);
+    if (kind == SPL_KIND_NAME)
+        return parse_name(value, name, text, err);
+    if (kind == SPL_KIND_RANGE)
+        return parse_range(value, text, err);
+    if (kind == SPL_KIND_SHADE)
+        return parse_shade(value, text, err);
     if (kind == SPL_KIND_VERSION)
         return parse_version(value, name, text, err);
     if (kind < SPL_KIND_END)

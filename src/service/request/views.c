@@ -19,6 +19,8 @@ static int resolve_view(const struct values *common, json_t *json, const struct 
     if (!json_is_object(json))
         return spl_fail(err, SPL_E_INPUT, "a view must be an object, not %s", spl_json_type_name(json));
     int rc = spl_values_from_object(&own, json, SPL_BODY, err);
+    if (!own.v[PARAM_color_by].given)
+        own.color = common->color;
     spl_values_inherit_terms(&own, common);
     for (int i = 0; i < PARAM_COUNT; i++)
         if (!own.v[i].given)

@@ -102,6 +102,8 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
         return fail_type("settings", "an object", settings, err);
     if (json_object_get(settings, "camera"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.camera", "a tour's cameras are its path");
+    if (json_object_get(settings, "view"))
+        return spl_fail_field(err, SPL_E_INPUT, "settings.view", "a tour's cameras are its path; name no view");
     if (json_object_get(settings, "crs"))
         return spl_fail_field(err, SPL_E_INPUT, "settings.crs",
                               "crs goes into the path, beside its keyframes or frames");
@@ -153,6 +155,16 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
         return spl_fail_field(err, SPL_E_INPUT, "path",
                               "a tour needs a path; TourRequest in /v1/openapi.json has the formats");
     return spl_camera_path_from_json(json, &options, path, err);
+}
+
+/* What fades along a path, but is nowhere, would be taken for done. */
+static int check_fades(const struct spl_camera_path *path, const struct spl_view *settings, struct spl_error *err)
+{
+    if (!path->values || settings->soft.what.count)
+        return 0;
+    return spl_fail_field(err, SPL_E_INPUT, "settings.soft",
+                          "the path changes soft_opacity, soft_cover or soft_blend, and nothing is soft: say what, as "
+                          "{\"soft\": \"class:3-5\"}, or leave these out");
 }
 
 /* A path may bring its own size, so a frame is judged here as well. */
@@ -212,6 +224,7 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
         (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, limits->frames,
                                     &out->frames, &out->fps, err)) ||
+        (rc = check_fades(&path, &out->view.view, err)) ||
         (rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))

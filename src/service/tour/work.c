@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/decimal.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "image/load.h"
@@ -72,7 +73,7 @@ static void write_frame(uv_work_t *uv)
 static void write_state(uv_work_t *uv)
 {
     struct work *work = uv->data;
-    char *text = json_dumps(work->state, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    char *text = spl_decimal_shorten(json_dumps(work->state, JSON_INDENT(1) | JSON_REAL_PRECISION(17)));
     if (!text) {
         spl_fail(&work->err, SPL_E_NOMEM, "out of memory for the tour's state");
         return;

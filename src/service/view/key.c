@@ -38,7 +38,7 @@ uint64_t spl_renderer_hash(const struct spl_device_info *device)
 }
 
 struct form {
-    uint64_t words[96];
+    uint64_t words[128];
     size_t count;
 };
 
@@ -82,6 +82,29 @@ static void add_terms(struct form *form, const struct spl_terms *terms)
     add(form, hash.low64);
 }
 
+/* What it comes to, so that what is so by itself and what is asked for have one key. */
+static void add_shade(struct form *form, const struct spl_shade_params *shade, uint32_t kinds)
+{
+    add(form, kinds);
+    add_number(form, kinds & SPL_SHADE_SUN ? shade->sun[0] : 0);
+    add_number(form, kinds & SPL_SHADE_SUN ? shade->sun[1] : 0);
+}
+
+/* What colours show, as text; the ramp is among the methods' parameters. */
+static void add_color(struct form *form, const struct spl_color_params *color, bool painted)
+{
+    char text[SPL_COLOR_TEXT_MAX];
+    XXH128_hash_t hash = {0};
+    const bool ranged = painted && color->has_range;
+    if (painted)
+        hash = XXH3_128bits(text, (size_t)spl_color_print(color, text, sizeof text));
+    add(form, hash.high64);
+    add(form, hash.low64);
+    add(form, ranged ? 4u | (uint64_t)color->shares[0] | (uint64_t)color->shares[1] << 1 : 0);
+    add_number(form, ranged ? color->range[0] : 0);
+    add_number(form, ranged ? color->range[1] : 0);
+}
+
 static void add_encoding(struct form *form, const struct spl_view_request *request, enum spl_layer layer)
 {
     struct spl_encode_options options = spl_view_get_encoding(request, layer), *encode = &options;
@@ -107,15 +130,21 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
     bool colored = view->layers >> SPL_LAYER_COLOR & 1;
+    const uint32_t shades = colored && !request->picks ? spl_shade_for(&view->shade, dataset) : 0;
+    const bool painted = colored && !request->picks && view->color.by != SPL_COLOR_BY_RGB;
     uint32_t params = spl_method_get_params(view->method);
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {
         const struct spl_method_param_info *param = spl_method_param_get(i);
         bool counts = params >> i & 1 && spl_method_param_counts(param, dataset) &&
                       (colored || param->changes != SPL_CHANGES_TEXTURES) &&
+                      (shades & SPL_SHADE_EDL || param->changes != SPL_CHANGES_SHADE) &&
+                      (painted || param->changes != SPL_CHANGES_COLORS) &&
                       (view->soft.what.count || param->changes != SPL_CHANGES_SOFT);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
     add_terms(&form, &view->soft.what);
+    add_shade(&form, &view->shade, shades);
+    add_color(&form, &view->color, painted);
     add(&form, colored ? background : 0);
     add(&form, (uint64_t)request->picks << 32 | (uint64_t)request->container);
     if (request->picks) {

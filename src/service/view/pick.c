@@ -7,6 +7,7 @@
 
 #include <splatd/dataset.h>
 
+#include "base/decimal.h"
 #include "base/error.h"
 #include "render/pick.h"
 
@@ -96,7 +97,7 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
         json_decref(json);
         return rc;
     }
-    char *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
     json_decref(json);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for what was picked");

@@ -15,6 +15,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "render/soft/share.h"
 #include "service/datasets/catalog.h"
 #include "shared.h"
 
@@ -142,6 +143,8 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
         read_profile(plan);
     struct spl_demand demand = request->demand;
     demand.soft = &request->view.soft;
+    demand.soft_splats = (double)plan->info->leaf_splats;
+    demand.soft_share = spl_soft_share_of_all(&request->view.soft, plan->info);
     demand.keep_atoms &= plan->info->atoms > 0;
     demand.keep_maps &= plan->info->maps > 0;
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {

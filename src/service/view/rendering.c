@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/soft_params.h"
 #include "service/headers.h"
 
 static void add_plan(struct spl_headers *headers, const struct spl_job *job)
@@ -54,6 +55,8 @@ static bool write_headers(const struct spl_job *job, char **text, size_t *length
         spl_headers_add(&headers, "Splatd-Panels", "%llu", (unsigned long long)job->stats.panels_drawn);
         spl_headers_add(&headers, "Splatd-Meshes", "%llu", (unsigned long long)job->stats.meshes_drawn);
         spl_headers_add(&headers, "Splatd-Lines", "%llu", (unsigned long long)job->stats.lines_drawn);
+        if (spl_view_shows_soft(&job->request.view))
+            spl_headers_add(&headers, "Splatd-Soft-Drawn", "%llu", (unsigned long long)job->stats.soft_drawn);
     }
     spl_headers_add(&headers, "Splatd-Device", "%s", job->device);
     bool good = spl_headers_close(&headers);

@@ -77,7 +77,7 @@ static void make(struct request *request, const struct spl_call *call, parse_fn 
     if (!view.planned) {
         key = spl_key_make(&view, entry->info, spl_pipeline_get_renderer(service->views->pipeline));
         request->validated = call->method == SPL_GET;
-        request->versioned = view.versioned;
+        request->versioned = view.versioned && !view.named;
         if (answer_at_once(request, &view, &key))
             return;
     }
@@ -106,4 +106,9 @@ void spl_pick(struct request *request, const struct spl_call *call)
 {
     make(request, call, call->method == SPL_POST ? spl_pick_request_from_json : spl_pick_request_from_query,
          spl_pick);
+}
+
+void spl_make_thumbnail(struct request *request, const struct spl_call *call)
+{
+    make(request, call, spl_thumbnail_request_from_query, spl_make_thumbnail);
 }

@@ -7,7 +7,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "dataset/dataset.h"
-#include "render/marks.h"
+#include "render/view.h"
 #include "service/datasets/library.h"
 #include "service/http.h"
 #include "service/ops/ops.h"
@@ -111,7 +111,7 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);
     if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
         view->view.layers &= ~(1u << SPL_LAYER_NORMAL);
-    return view->planned ? spl_marks_check_view(&view->view, info, err) // it may get another method
+    return view->planned ? spl_view_check_colors(&view->view, info, err) // it may get another method
                          : spl_view_check_layers(&view->view, info, err);
 }
 

@@ -48,7 +48,8 @@ bool spl_view_has_no_room(const struct spl_service *service, const struct spl_vi
                           struct spl_error *err); /* too much waits for clients */
 struct spl_camera_limits spl_view_get_limits(const struct spl_service *service);
 
-/* route.c: /v1/datasets/{id}/view and /pick. */
+/* route.c: /v1/datasets/{id}/view, /pick and /thumbnail.jpg. */
+void spl_make_thumbnail(struct request *request, const struct spl_call *call);
 void spl_make_view(struct request *request, const struct spl_call *call);
 void spl_pick(struct request *request, const struct spl_call *call);
 

@@ -188,6 +188,22 @@ FORGE(radius_gone, json_object_del(p->meta, "splat_radius"))
 FORGE(bounds_turned, json_array_set_new(json_object_get(json_object_get(p->meta, "bounds"), "min"), 0, json_real(1e9)))
 FORGE(bounds_short, json_array_remove(json_object_get(json_object_get(p->meta, "bounds"), "max"), 2))
 FORGE(fov, json_object_set_new(json_object_get(p->meta, "default_view"), "fov", json_real(180)))
+FORGE(fit_right, json_object_set_new(json_object_get(p->meta, "default_view"), "fit", json_pack("[f, i]", 60.5, 45)))
+FORGE(fit_wide, json_object_set_new(json_object_get(p->meta, "default_view"), "fit", json_pack("[i, i]", 60, 180)))
+FORGE(fit_short, json_object_set_new(json_object_get(p->meta, "default_view"), "fit", json_pack("[i]", 60)))
+FORGE(title_right, json_object_set_new(p->meta, "title", json_string("The hall")))
+FORGE(title_number, json_object_set_new(p->meta, "title", json_integer(5)))
+FORGE(description_list, json_object_set_new(p->meta, "description", json_array()))
+static void set_view(struct parts *p, const char *name, double eye)
+{
+    json_object_set_new(p->meta, "views",
+                        json_pack("[{s:s, s:[f, f, f], s:[f, f, f], s:s}]", "name", name, "eye", eye, 0.0, 0.0, "target",
+                                  0.0, 0.0, 0.0, "later", "more"));
+}
+FORGE(view_right, set_view(p, "door", 1))
+FORGE(view_name, set_view(p, "a/b", 1))
+FORGE(view_blind, set_view(p, "door", 0))
+FORGE(views_text, json_object_set_new(p->meta, "views", json_string("door")))
 FORGE(eye, json_object_set(json_object_get(p->meta, "default_view"), "eye",
                            json_object_get(json_object_get(p->meta, "default_view"), "target")))
 FORGE(up, json_array_set_new(json_object_get(json_object_get(p->meta, "default_view"), "up"), 1, json_string("north")))
@@ -281,6 +297,16 @@ static const struct {
     {bounds_turned, "section META: \"bounds.min[0]\" is 1000000000.0, and must be at most that of"},
     {bounds_short, "section META: \"bounds.max\" is an array of 2, and must be an array of three"},
     {fov, "section META: \"default_view.fov\" is 180.0, and must be"},
+    {fit_right, NULL},
+    {fit_wide, "section META: \"default_view.fit\" is an array of 2, and must be two numbers of degrees"},
+    {fit_short, "section META: \"default_view.fit\" is an array of 1, and must be two numbers of degrees"},
+    {title_right, NULL},
+    {title_number, "section META: \"title\" is 5, and must be a text of at most 200 bytes"},
+    {description_list, "section META: \"description\" is an array of 0, and must be a text of at most 4000 bytes"},
+    {view_right, NULL},
+    {view_name, "section META: view 0: 'a/b' is no name of a view"},
+    {view_blind, "section META: view 0: "},
+    {views_text, "section META: views must be an array"},
     {up, "section META: \"default_view.up[1]\" is \"north\", and must be a coordinate"},
     {eye, "section META: \"default_view\" is no view: "},
     {flags, "section META: \"attributes.color\" is missing, and must be true"},

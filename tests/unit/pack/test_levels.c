@@ -243,6 +243,53 @@ static void what_faces_everywhere_comes_to_an_end(void **state)
     done(&made);
 }
 
+/* Beside panels, of which a node of this tree has none here; what is on none are all its points. */
+static struct spl_panel_maker add_panels(struct made *made)
+{
+    static const struct spl_planes planes = {.count = 1};
+    struct spl_panel_maker maker = {0};
+    made->points.plane = malloc(count * sizeof *made->points.plane);
+    for (int i = 0; i < count; i++)
+        made->points.plane[i] = SPL_NO_PLANE;
+    assert_int_equal(spl_panel_maker_init(&maker, &made->points, &planes, 1, NULL), 0);
+    return maker;
+}
+
+/* A few splats, 18 radii from each other: without panels two discs, which reach over what lies between; beside panels
+ * they stay as they are. Those close to one another are one disc there too, of little more than their area. */
+static void what_panels_leave_reaches_over_nothing_else(void **state)
+{
+    (void)state;
+    for (int beside = 0; beside < 2; beside++) {
+        enum { strays = 6, close = 3 };
+        struct made made = make();
+        struct spl_panel_maker maker = {0};
+        for (int i = 0; i < strays + close; i++)
+            made.points.axis[0][i] = (i < strays ? 10 * i : 10 * strays + 1 + 0.3 * (i - strays)) * cell_size();
+        for (int i = strays; i < strays + close; i++)
+            made.points.radius[i] = 0.01f;
+        for (uint32_t k = 0; k < 2; k++) {
+            made.tree.nodes[1 + k].begin = k * strays;
+            made.tree.nodes[1 + k].end = k ? strays + close : strays;
+            made.tree.nodes[1 + k].splat_count = k ? close : strays;
+        }
+        made.tree.nodes[0].end = strays + close;
+        if (beside) {
+            maker = add_panels(&made);
+            made.tree.panels = &maker;
+        }
+        const struct spl_inner_splat *splats = build(&made, beside ? strays + 1 : 2);
+        for (int i = 0; beside && i < strays; i++)
+            assert_float_equal(splats[i].radius, usual, 1e-6);
+        if (beside)
+            assert_float_equal(splats[strays].radius, 1.5 * sqrt(close) * 0.01, 1e-6);
+        else
+            assert_true(splats[0].radius > 5 * (float)usual);
+        spl_panel_maker_finish(&maker);
+        done(&made);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -251,6 +298,7 @@ int main(void)
         cmocka_unit_test(a_thin_wall_keeps_both_faces),
         cmocka_unit_test(a_surface_is_a_splat_of_its_own_where_inner_nodes_are_drawn_for_good),
         cmocka_unit_test(what_faces_everywhere_comes_to_an_end),
+        cmocka_unit_test(what_panels_leave_reaches_over_nothing_else),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

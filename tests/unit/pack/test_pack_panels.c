@@ -184,6 +184,66 @@ static void panels_alone(void **state)
     spl_dataset_close(dataset);
 }
 
+/* The largest disc of the leaves, or of the nodes above them. */
+static float largest_disc(const struct spl_dataset *dataset, bool inner)
+{
+    uint64_t nodes, chunks;
+    const struct spl_node *node = spl_dataset_get_nodes(dataset, &nodes);
+    const struct spl_chunk *all = spl_dataset_get_chunks(dataset, &chunks);
+    float largest = 0;
+    for (uint64_t n = 0; n < nodes; n++)
+        for (uint64_t c = node[n].first_chunk; c < node[n].first_chunk + node[n].chunk_count; c++)
+            for (uint32_t i = 0; (node[n].child_count > 0) == inner && i < all[c].count; i++) {
+                struct spl_splat splat;
+                if (spl_chunk_kind(&all[c]) != SPL_CHUNK_DISCS)
+                    continue;
+                assert_true(spl_dataset_find_splat(dataset, all[c].first_id + i, &splat));
+                largest = fmaxf(largest, splat.radius);
+            }
+    return largest;
+}
+
+/* A few points that lie by themselves before walls: no level has a disc from one to the other. */
+static void few_discs_beside_panels_stay_small(void **state)
+{
+    (void)state;
+    pack(write_corner("strays.csv", walls, 5), path_of("strays.spld"), SPL_PRIMITIVES_ALL, 2, NULL);
+    struct spl_dataset *dataset = open_verified(path_of("strays.spld"));
+    const float leaves = largest_disc(dataset, false), above = largest_disc(dataset, true);
+    print_message("largest disc %.3f, of the levels above %.3f\n", (double)leaves, (double)above);
+    assert_true(leaves > 0 && leaves < 0.1f);
+    assert_true(above > 0 && above < 2.5f * leaves);
+    spl_dataset_close(dataset);
+}
+
+/* A sagging wire through foliage over a wall: where lines stand for splats these share no chunk with others, so that a
+ * view that softens the foliage finds in the headers that no wire is soft. */
+static void splats_on_wires_have_chunks_of_their_own(void **state)
+{
+    (void)state;
+    const char *scan = write_corner("wire.csv", walls, foliage), *out = path_of("wire.spld");
+    uint64_t chunks, linear = 0, others = 0, lines = 0;
+    FILE *f = fopen(scan, "ab");
+    assert_non_null(f);
+    for (int i = 0; i < 600; i++)
+        fprintf(f, "%.5f,%.5f,%.5f,20,20,20,14\n", 0.01 * i - 2, 0.71, 0.72 + 0.02 * (0.01 * i - 2) * (0.01 * i - 2));
+    assert_int_equal(fclose(f), 0);
+    pack(scan, out, SPL_PRIMITIVES_ALL, 2, NULL);
+    struct spl_dataset *dataset = open_verified(out);
+    const struct spl_chunk *all = spl_dataset_get_chunks(dataset, &chunks);
+    for (uint64_t c = 0; c < chunks; c++) {
+        const uint32_t mode = all[c].geometry_bits >> SPL_GEOMETRY_LINEAR;
+        lines += spl_chunk_kind(&all[c]) == SPL_CHUNK_LINES;
+        if (spl_chunk_kind(&all[c]) != SPL_CHUNK_DISCS)
+            continue;
+        assert_int_not_equal(mode, SPL_LINEAR_SOME);
+        linear += mode == SPL_LINEAR_ALL ? all[c].count : 0;
+        others += mode == SPL_LINEAR_ALL ? 0 : all[c].count;
+    }
+    assert_true(lines > 0 && linear > 300 && others > foliage / 2);
+    spl_dataset_close(dataset);
+}
+
 /* Nothing flat: but for what META says, primitives change nothing. */
 static void foliage_alone(void **state)
 {
@@ -324,6 +384,8 @@ int main(void)
         cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(panels_alone),
         cmocka_unit_test(foliage_alone),
+        cmocka_unit_test(few_discs_beside_panels_stay_small),
+        cmocka_unit_test(splats_on_wires_have_chunks_of_their_own),
         cmocka_unit_test(counts_of_panels_are_compared),
         cmocka_unit_test(what_does_not_go_together_is_refused),
         cmocka_unit_test(a_bound_is_held_against_the_scan),

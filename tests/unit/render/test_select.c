@@ -326,6 +326,42 @@ static void nodes_are_listed_front_to_back(void **state)
     spl_dataset_close(dataset);
 }
 
+/* What several cores list, node by node, is what one does. */
+static void shared_among_cores_it_is_the_same(void **state)
+{
+    (void)state;
+    random_state = 29;
+    struct spl_dataset *dataset = make_clumps(3);
+    size_t several = 0;
+    for (int view = 0; view < 60; view++) {
+        struct spl_camera camera = random_camera(uniform, width, height);
+        struct spl_draw_list list[2] = {{0}, {0}};
+        for (int shared = 0; shared < 2; shared++) {
+            int left = view % 3 ? 1 << 30 : 3;
+            struct spl_select_params params = {.dataset = dataset, .camera = &camera, .lod = view % 2, .discs = true,
+                                               .resident = take_one, .context = &left,
+                                               .share_from = shared ? 1 : UINT32_MAX};
+            assert_int_equal(spl_select(&params, &list[shared], NULL), SPL_OK);
+        }
+        const struct spl_draw_list *a = &list[0], *b = &list[1];
+        assert_true(a->chunk_count == b->chunk_count && a->entry_count == b->entry_count && a->nodes == b->nodes);
+        assert_true(a->batch_count == b->batch_count && a->first_back_chunk == b->first_back_chunk);
+        assert_true(a->listed_splats == b->listed_splats && a->sample_splats == b->sample_splats);
+        assert_memory_equal(a->drawn, b->drawn, sizeof a->drawn);
+        assert_int_equal(a->complete, b->complete);
+        several += a->nodes > 1;
+        if (a->chunk_count) {
+            assert_memory_equal(a->chunks, b->chunks, a->chunk_count * sizeof *a->chunks);
+            assert_memory_equal(a->bounds, b->bounds, a->chunk_count * sizeof *a->bounds);
+            assert_memory_equal(a->entries, b->entries, a->entry_count * sizeof *a->entries);
+        }
+        spl_draw_list_finish(&list[0]);
+        spl_draw_list_finish(&list[1]);
+    }
+    assert_true(several > 20);
+    spl_dataset_close(dataset);
+}
+
 /* The root is there, the others later: all of them are asked for. */
 static enum spl_select_answer take_later(void *context, uint32_t page)
 {
@@ -371,6 +407,7 @@ int main(void)
         cmocka_unit_test(every_splat_that_is_seen_is_drawn_at_its_level),
         cmocka_unit_test(one_large_disc_at_the_edge_is_drawn),
         cmocka_unit_test(nodes_are_listed_front_to_back),
+        cmocka_unit_test(shared_among_cores_it_is_the_same),
         cmocka_unit_test(what_comes_later_is_asked_for_at_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

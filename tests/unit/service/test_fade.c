@@ -15,6 +15,8 @@
 
 #define KEY(x, rest) "{\"camera\":{\"eye\":[" #x ",0,0],\"target\":[" #x ",1,0]}" rest "}"
 
+static const char *soft = ",\"soft\":\"u>1\""; /* of the settings */
+
 static int read_spec(const char *path, const char *rest, struct spl_tour_spec *spec, struct spl_error *err)
 {
     static const struct spl_camera_defaults defaults = {
@@ -22,7 +24,7 @@ static int read_spec(const char *path, const char *rest, struct spl_tour_spec *s
     static const struct spl_tour_limits limits = {
         {.side_px = 4096, .pixels = 4 << 20}, .frames = 500, .pixels = 100 << 20};
     char body[4096];
-    snprintf(body, sizeof body, "{\"path\":%s,\"settings\":{\"width\":16,\"height\":16,\"soft\":\"u>1\"}%s}", path, rest);
+    snprintf(body, sizeof body, "{\"path\":%s,\"settings\":{\"width\":16,\"height\":16%s}%s}", path, soft, rest);
     *err = (struct spl_error){0};
     return spl_tour_spec_from_text(body, strlen(body), &defaults, &limits, spec, err);
 }
@@ -120,6 +122,22 @@ static void what_is_out_of_range_is_named(void **state)
     }
 }
 
+static void what_fades_has_to_be_somewhere(void **state)
+{
+    (void)state;
+    struct spl_tour_spec spec;
+    struct spl_error err;
+    const char *some = soft;
+    static const char fading[] = "{\"keyframes\":[" KEY(0, "") "," KEY(1, ",\"soft_cover\":1") "]}";
+    soft = "";
+    assert_int_equal(read_spec(fading, ",\"frames\":2", &spec, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "settings.soft");
+    soft = ",\"soft_opacity\":0.5"; /* as in a view: nothing of it counts */
+    assert_int_equal(read_spec("{\"keyframes\":[" KEY(0, "") "]}", ",\"frames\":2", &spec, &err), 0);
+    spl_tour_spec_finish(&spec);
+    soft = some;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -129,6 +147,7 @@ int main(void)
         cmocka_unit_test(frames_of_a_whole_path_have_their_own),
         cmocka_unit_test(what_no_key_says_is_of_the_settings),
         cmocka_unit_test(what_is_out_of_range_is_named),
+        cmocka_unit_test(what_fades_has_to_be_somewhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

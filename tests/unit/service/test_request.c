@@ -100,6 +100,104 @@ static void nothing_given_is_the_default_view(void **state)
     assert_int_equal(a.view.method, SPL_METHOD_SPLAT);
 }
 
+/* Half the angles' tangents, across and upright. */
+static void get_tangents(const struct spl_view_request *r, double tangent[2])
+{
+    tangent[0] = r->view.camera.width / 2.0 / r->view.camera.fx;
+    tangent[1] = r->view.camera.height / 2.0 / r->view.camera.fy;
+}
+
+static void the_field_of_view_follows_the_shape(void **state)
+{
+    (void)state;
+    struct spl_camera_defaults fitted = defaults;
+    struct spl_view_request r;
+    struct spl_error err = {0};
+    double t[2], wide = tan(40 * M_PI / 180), high = tan(20 * M_PI / 180);
+    fitted.fit[0] = 80;
+    fitted.fit[1] = 40;
+    static const char *const sizes[] = {"width=1600&height=900", "width=390&height=844", "width=500&height=500",
+                                        "width=2000&height=200"};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        assert_int_equal(spl_view_request_from_query(sizes[i], strlen(sizes[i]), &fitted, &limits, &r, &err), 0);
+        get_tangents(&r, t);
+        assert_true(t[0] > wide - 1e-9 && t[1] > high - 1e-9); // all is there
+        assert_true(fabs(t[0] - wide) < 1e-9 || fabs(t[1] - high) < 1e-9); // and no more
+    }
+    const char *given = "width=390&height=844&fov=50";
+    assert_int_equal(spl_view_request_from_query(given, strlen(given), &fitted, &limits, &r, &err), 0);
+    get_tangents(&r, t);
+    assert_true(fabs(t[1] - tan(25 * M_PI / 180)) < 1e-9);
+    assert_int_equal(query("width=390&height=844", &r, &err), 0); // a dataset of before
+    get_tangents(&r, t);
+    assert_true(fabs(t[1] - tan(30 * M_PI / 180)) < 1e-9);
+}
+
+static int find_door(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
+                     struct spl_error *err)
+{
+    (void)names;
+    if (strcmp(name, "door"))
+        return spl_fail_field(err, SPL_E_INPUT, "view", "no");
+    out->eye[0] = 7;
+    out->fov = out->fit[0] = out->fit[1] = 70;
+    return 0;
+}
+
+static void a_view_by_name_stands_for_what_is_left_out(void **state)
+{
+    (void)state;
+    const struct spl_camera_names names = {find_door};
+    struct spl_camera_defaults named = defaults;
+    struct spl_view_request r, other;
+    struct spl_error err = {0};
+    named.names = &names;
+    const char *door = "view=door&width=300&height=200", *body = "{\"view\": \"door\", \"width\": 300, \"height\": 200}";
+    assert_int_equal(spl_view_request_from_query(door, strlen(door), &named, &limits, &r, &err), 0);
+    assert_int_equal(spl_view_request_from_json(body, strlen(body), &named, &limits, &other, &err), 0);
+    assert_memory_equal(&r.view.camera, &other.view.camera, sizeof r.view.camera);
+    assert_true(r.named && r.view.camera.eye[0] == 7 && fabs(100 / r.view.camera.fy - tan(35 * M_PI / 180)) < 1e-9);
+    const char *moved = "view=door&eye=1,2,3&fov=50";
+    assert_int_equal(spl_view_request_from_query(moved, strlen(moved), &named, &limits, &r, &err), 0);
+    assert_true(r.view.camera.eye[0] == 1 && fabs(360 / r.view.camera.fy - tan(25 * M_PI / 180)) < 1e-9);
+    const char *list = "{\"view\": \"door\", \"views\": [{}, {\"camera\": {\"eye\": [3, 0, 0]}}]}";
+    struct spl_views_request views;
+    assert_int_equal(spl_views_request_from_json(list, strlen(list), &named, &limits, &views, &err), 0);
+    assert_true(views.views[0].view.camera.eye[0] == 7 && views.views[1].view.camera.eye[0] == 3);
+    spl_views_request_finish(&views);
+    static const char *const wrong[] = {"view=window", "view=", "view=.a", "view=a/b", "view=door&view=door", "view=a%20b"};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        err = (struct spl_error){0};
+        assert_int_equal(spl_view_request_from_query(wrong[i], strlen(wrong[i]), &named, &limits, &r, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "view");
+    }
+    assert_int_equal(query("view=door", &r, &err), SPL_E_INPUT); // nobody here knows any
+    assert_int_equal(json("{\"view\": 5}", &r, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "view");
+}
+
+static void a_thumbnail_is_small(void **state)
+{
+    (void)state;
+    struct spl_view_request r;
+    struct spl_error err = {0};
+    assert_int_equal(spl_thumbnail_request_from_query("", 0, &defaults, &limits, &r, &err), 0);
+    assert_true(r.view.camera.width == 320 && r.view.camera.height == 180 && r.encode.format == SPL_FORMAT_JPEG);
+    assert_true(r.view.camera.eye[0] == 10 && r.view.supersample == 2);
+    assert_int_equal(spl_thumbnail_request_from_query("width=640", 9, &defaults, &limits, &r, &err), 0);
+    assert_true(r.view.camera.width == 640 && r.view.camera.height == 360);
+    static const struct {
+        const char *text, *field;
+    } wrong[] = {{"width=15", "width"}, {"width=1281", "width"}, {"width=1.5", "width"}, {"height=90", "height"},
+                 {"eye=1,2,3", "eye"},  {"v=5", "v"},            {"shade=1", "shade"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        err = (struct spl_error){0};
+        assert_int_equal(spl_thumbnail_request_from_query(wrong[i].text, strlen(wrong[i].text), &defaults, &limits, &r, &err),
+                         SPL_E_INPUT);
+        assert_string_equal(err.field, wrong[i].field);
+    }
+}
+
 static void every_parameter_arrives(void **state)
 {
     (void)state;
@@ -311,6 +409,13 @@ static void queries_are_refused_by_name(void **state)
         {"soft_opacity=1.1", "soft_opacity"},
         {"soft_model=exact", "soft_model"},
         {"soft_blend=-1", "soft_blend"},
+        {"shade=glow", "shade"},
+        {"shade=edl%2Bnone", "shade"},
+        {"edl_radius=0", "edl_radius"},
+        {"color_by=", "color_by"},
+        {"color_by=rgb%2B", "color_by"},
+        {"range=5", "range"},
+        {"ramp=jet", "ramp"},
         {"soft_cover=1.1", "soft_cover"},
         {"soft_cover=-0.5", "soft_cover"},
         {"soft_of=1", "soft_of"},
@@ -589,6 +694,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_of_other_coordinates_are_moved_into_the_world),
         cmocka_unit_test(nothing_given_is_the_default_view),
+        cmocka_unit_test(the_field_of_view_follows_the_shape),
+        cmocka_unit_test(a_view_by_name_stands_for_what_is_left_out),
+        cmocka_unit_test(a_thumbnail_is_small),
         cmocka_unit_test(every_parameter_arrives),
         cmocka_unit_test(ogc_names_mean_the_same),
         cmocka_unit_test(camera_forms_agree),

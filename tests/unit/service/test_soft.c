@@ -141,7 +141,7 @@ static void headers_say_what_a_body_would(void **state)
         at += strlen(at) + 1;
     assert_true(*at);
     at += strlen(at) + 1;
-    assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.10000000000000001,"
+    assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.1,"
                             "\"soft_cover\":1,\"soft_blend\":0,\"of\":\"solid\"}");
     struct spl_soft_params again = soft_asked(at);
     assert_memory_equal(again.what.terms, r.view.soft.what.terms, sizeof again.what.terms);

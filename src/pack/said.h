@@ -1,0 +1,21 @@
+/* What the user says about the dataset: title, description, views. */
+#ifndef SPL_PACK_SAID_H
+#define SPL_PACK_SAID_H
+
+#include <jansson.h>
+
+#include <splatd/pack.h>
+
+#include "base/error.h"
+#include "pack/view.h"
+
+/* SPL_E_USAGE names the option. */
+int spl_said_check(const struct spl_pack_options *options, struct spl_error *err);
+
+/* The default view that the user gives; `up` is the dataset's. */
+void spl_said_view(const struct spl_saved_view *given, const double up[3], struct spl_default_view *view);
+
+/* Adds it to META; of a user who says nothing, nothing. SPL_E_NOMEM. */
+int spl_said_add(const struct spl_pack_options *options, const double up[3], json_t *meta, struct spl_error *err);
+
+#endif

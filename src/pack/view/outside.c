@@ -1,0 +1,205 @@
+/* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much of
+ * its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it, a
+ * street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal view. */
+#include "pack/view/outside.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+enum { raster = 96, azimuths = 24, elevations = 3, spread_most = 3 };
+static const double aspect = 16.0 / 9, margin = 1.06;
+static const double beyond = 0.002; /* of the sample may lie beyond the frame */
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Right, up and forward of a picture taken from azimuth and elevation. */
+static void get_axes(double azimuth, double elevation, double axes[3][3])
+{
+    double ca = cos(azimuth), sa = sin(azimuth), ce = cos(elevation), se = sin(elevation);
+    const double rows[3][3] = {{-sa, ca, 0}, {-se * ca, -se * sa, ce}, {-ce * ca, -ce * sa, -se}};
+    memcpy(axes, rows, sizeof rows);
+}
+
+/* Of the picture: where it begins and how large a cell is. */
+struct frame {
+    double low[2], cell;
+};
+
+static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
+{
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (size_t i = 0; i < s->count; i++)
+        for (int c = 0; c < 2; c++) {
+            double x = dot(axes[c], s->at[i]);
+            low[c] = fmin(low[c], x);
+            high[c] = fmax(high[c], x);
+        }
+    double width = fmax(fmax(high[0] - low[0], aspect * (high[1] - low[1])), DBL_MIN);
+    struct frame frame = {.cell = width / (raster - 1)};
+    for (int c = 0; c < 2; c++)
+        frame.low[c] = 0.5 * (low[c] + high[c]) - 0.5 * (c ? width / aspect : width);
+    return frame;
+}
+
+enum { rows = raster * 9 / 16 + 2 };
+
+/* The nearest depth of each cell. */
+static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame, double depth[rows][raster])
+{
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < raster; x++)
+            depth[y][x] = INFINITY;
+    for (size_t i = 0; i < s->count; i++) {
+        double z = dot(axes[2], s->at[i]);
+        int spread = (int)fmin(spread_most, 0.7 * sqrt((double)s->area[i]) / frame->cell);
+        int cx = (int)((dot(axes[0], s->at[i]) - frame->low[0]) / frame->cell),
+            cy = (int)((dot(axes[1], s->at[i]) - frame->low[1]) / frame->cell);
+        for (int y = cy - spread; y <= cy + spread; y++)
+            for (int x = cx - spread; x <= cx + spread; x++)
+                if (x >= 0 && x < raster && y >= 0 && y < rows && z < depth[y][x])
+                    depth[y][x] = z;
+    }
+}
+
+/* Share of the frame that is filled, times the share of the surface that is seen. */
+static double judge(const struct spl_view_sample *s, double azimuth, double elevation, double depth[rows][raster])
+{
+    double axes[3][3], seen = 0, all = 0;
+    get_axes(azimuth, elevation, axes);
+    struct frame frame = frame_of(s, axes);
+    draw(s, axes, &frame, depth);
+    static bool filled[rows][raster];
+    memset(filled, 0, sizeof filled);
+    for (size_t i = 0; i < s->count; i++) {
+        int x = (int)((dot(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
+            y = (int)((dot(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
+        double facing = 1, weight = (double)s->area[i];
+        if (s->sides)
+            facing = -((double)s->normal[i][0] * axes[2][0] + (double)s->normal[i][1] * axes[2][1] +
+                       (double)s->normal[i][2] * axes[2][2]);
+        all += weight;
+        weight *= pow(fmax(facing, 0), 1.5); /* from straight ahead it shows most */
+        if (facing <= 0 || x < 0 || x >= raster || y < 0 || y >= rows ||
+            dot(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
+            continue;
+        filled[y][x] = true;
+        seen += weight;
+    }
+    size_t covered = 0;
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < raster; x++)
+            covered += filled[y][x];
+    return all > 0 ? (double)covered * seen / all : 0;
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* The value that all but `share` of them do not exceed. */
+static double most_of(double *values, size_t count, double share)
+{
+    qsort(values, count, sizeof *values, compare_doubles);
+    return values[count - 1 - (size_t)(share * (double)count)];
+}
+
+/* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and the
+ * eye is where the narrower pair meets, in the middle of the other. */
+static void find_eye(const struct spl_view_sample *s, double axes[3][3], const double tangent[2], double *values,
+                     double eye[3])
+{
+    double side[2][2], local[3], z = INFINITY;
+    for (int c = 0; c < 2; c++)
+        for (int k = 0; k < 2; k++) {
+            for (size_t i = 0; i < s->count; i++)
+                values[i] = (k ? -1 : 1) * dot(axes[c], s->at[i]) - tangent[c] * dot(axes[2], s->at[i]);
+            side[c][k] = most_of(values, s->count, beyond);
+        }
+    for (int c = 0; c < 2; c++) {
+        z = fmin(z, -0.5 * (side[c][0] + side[c][1]) / tangent[c]);
+        local[c] = 0.5 * (side[c][0] - side[c][1]);
+    }
+    local[2] = z;
+    for (int c = 0; c < 3; c++)
+        eye[c] = axes[0][c] * local[0] + axes[1][c] * local[1] + axes[2][c] * local[2];
+}
+
+int spl_view_fit(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
+                 double share, double least, double most, double fit[2], struct spl_error *err)
+{
+    struct spl_camera camera = {0};
+    int rc = spl_camera_look_at(&camera, eye, target, up, err);
+    double *values = rc ? NULL : spl_alloc_raw(s->count, sizeof *values, err);
+    if (!values)
+        return rc ? rc : SPL_E_NOMEM;
+    for (int c = 0; c < 2; c++) {
+        size_t count = 0;
+        for (size_t i = 0; i < s->count; i++) {
+            double arm[3] = {s->at[i][0] - eye[0], s->at[i][1] - eye[1], s->at[i][2] - eye[2]};
+            double z = dot(&camera.rotation[6], arm);
+            if (z > 0)
+                values[count++] = fabs(dot(&camera.rotation[3 * c], arm)) / z;
+        }
+        double tangent = count ? margin * most_of(values, count, share) : 0;
+        fit[c] = fmin(most, fmax(least, 2 * atan(tangent) * 180 / M_PI));
+    }
+    free(values);
+    return 0;
+}
+
+/* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from before. */
+static double first_elevation(const struct spl_view_sample *s)
+{
+    double height = s->high[2] - s->low[2], width = spl_view_sample_width(s);
+    return fmin(32, fmax(10, 36 - 40 * height / fmax(width, DBL_MIN)));
+}
+
+int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_view *view, struct spl_error *err)
+{
+    static const double tangent[2] = {0.41421356237309503 * 16 / 9, 0.41421356237309503}; /* of 45 degrees upright */
+    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err), *values = spl_alloc_raw(s->count, sizeof *values, err);
+    double best = -1, axes[3][3], eye[3], target[3], up[3] = {0, 0, 1};
+    double azimuth = 0, elevation = 0;
+    int rc = depth && values ? 0 : SPL_E_NOMEM;
+    for (int e = 0; !rc && e < elevations; e++)
+        for (int a = 0; a < azimuths; a++) {
+            double at = 2 * M_PI * a / azimuths - M_PI / 2, above = (first_elevation(s) + 8 * e) * M_PI / 180;
+            double score = judge(s, at, above, depth);
+            if (score <= 1.02 * best) /* the first of what is about the same */
+                continue;
+            best = score;
+            azimuth = at;
+            elevation = above;
+        }
+    if (!rc) {
+        get_axes(azimuth, elevation, axes);
+        find_eye(s, axes, tangent, values, eye);
+        double middle[3], square = 0;
+        for (int c = 0; c < 3; c++) {
+            middle[c] = 0.5 * (s->low[c] + s->high[c]) - eye[c];
+            square += 0.25 * (s->high[c] - s->low[c]) * (s->high[c] - s->low[c]);
+        }
+        double at = dot(axes[2], middle), depth_of = fmax(margin * at, sqrt(square)); /* not in a single point */
+        for (int c = 0; c < 3; c++) {
+            eye[c] -= (depth_of - at) * axes[2][c];
+            target[c] = eye[c] + depth_of * axes[2][c];
+        }
+        rc = spl_view_fit(s, eye, target, up, beyond, 20, 90, view->fit, err);
+    }
+    if (!rc) {
+        spl_view_to_world(s, eye, view->eye);
+        spl_view_to_world(s, target, view->target);
+    }
+    free(depth);
+    free(values);
+    return rc;
+}

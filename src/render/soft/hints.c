@@ -1,0 +1,114 @@
+/* Names are compared by how many letters one is from the other (Levenshtein), and a start of one counts as it. Bounded
+ * by the lengths of names; nothing is allocated. */
+#include "render/soft/hints.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/decimal.h"
+#include "dataset/classes.h"
+#include "dataset/streams.h"
+
+bool spl_soft_hint_sign(const char *name, const char *at, char hint[SPL_SOFT_HINT_MAX])
+{
+    const bool not = *at == '!';
+    double value;
+    char text[SPL_DECIMAL_MAX];
+    if (*at != '=' && !(not && at[1] == '='))
+        return false;
+    at += strspn(at, "!=");
+    const char *end = spl_decimal_parse(at + strspn(at, " "), &value);
+    if (!end)
+        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no %s; write '%s:' and a value, a range or a list of them",
+                 not ? "!=" : "=", name);
+    else if (not)
+        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no !=; write what is meant: '%s<%s or %s>%s'", name,
+                 spl_decimal_print(value, text), name, text);
+    else
+        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no =; write '%s:%s'", name, spl_decimal_print(value, text));
+    return true;
+}
+
+bool spl_soft_hint_list(const char *name, const char *at, char hint[SPL_SOFT_HINT_MAX])
+{
+    if (strcmp(name, "class") || !isalpha((unsigned char)*at) || (*at == 'q' && !isalpha((unsigned char)at[1])))
+        return false;
+    snprintf(hint, SPL_SOFT_HINT_MAX, "classes are numbers: %s", SPL_CLASSES_LISTED);
+    return true;
+}
+
+static unsigned least(unsigned a, unsigned b)
+{
+    return a < b ? a : b;
+}
+
+/* Letters to put in, take out or exchange. */
+static unsigned distance(const char *a, const char *b)
+{
+    unsigned row[SPL_STREAM_TEXT_MAX + 1];
+    const size_t width = strnlen(b, SPL_STREAM_TEXT_MAX);
+    for (size_t j = 0; j <= width; j++)
+        row[j] = (unsigned)j;
+    for (; *a; a++) {
+        unsigned corner = row[0]++;
+        for (size_t j = 1; j <= width; j++) {
+            unsigned other = corner + (tolower((unsigned char)*a) != tolower((unsigned char)b[j - 1]));
+            corner = row[j];
+            row[j] = least(other, least(row[j - 1], row[j]) + 1);
+        }
+    }
+    return row[width];
+}
+
+/* NULL where none is near. */
+static const char *find_near(const char *name, const struct spl_dataset_info *info)
+{
+    const char *found = NULL;
+    const size_t length = strlen(name);
+    unsigned best = 1 + (unsigned)least((unsigned)length, 9) / 3;
+    for (uint32_t s = 0; s < info->stream_count; s++) {
+        const char *known = info->streams[s].name;
+        const size_t shorter = least((unsigned)length, (unsigned)strlen(known));
+        const bool begins = shorter >= 3 && !strncmp(known, name, shorter);
+        const unsigned far = begins ? 0 : distance(name, known);
+        if (spl_stream_type_from_name(info->streams[s].type) == SPL_STREAM_UNKNOWN || far >= best)
+            continue;
+        best = far;
+        found = known;
+    }
+    return found;
+}
+
+/* The axis that a coordinate's name means, or -1. */
+static int axis_of(const char *name)
+{
+    static const char *const heights[] = {"height", "elevation", "altitude"};
+    if (strchr("xyzXYZ", *name) && *name && !name[1])
+        return tolower((unsigned char)*name) - 'x';
+    for (size_t i = 0; i < sizeof heights / sizeof *heights; i++)
+        if (!strcmp(name, heights[i]))
+            return 2;
+    return -1;
+}
+
+bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_info *info,
+                        char hint[SPL_SOFT_HINT_MAX])
+{
+    const char *near = find_near(term->name, info);
+    const int axis = axis_of(term->name);
+    char at[SPL_DECIMAL_MAX];
+    if (axis >= 0) {
+        const bool above = isfinite(term->least) || !isfinite(term->most);
+        const double end = above ? term->least : term->most;
+        spl_decimal_print(isfinite(end) && term->measure == SPL_TERM_ATTRIBUTE ? end : 0, at);
+        snprintf(hint, SPL_SOFT_HINT_MAX, "a coordinate is measured from a plane: write 'plane:%s,%s,%s,%d,%d,%d%c0'",
+                 axis ? "0" : at, axis == 1 ? at : "0", axis == 2 ? at : "0", !axis, axis == 1, axis == 2,
+                 above ? '>' : '<');
+        return true;
+    }
+    if (near)
+        snprintf(hint, SPL_SOFT_HINT_MAX, "did you mean '%s'?", near);
+    return near;
+}

@@ -1,0 +1,288 @@
+"""Views by name, titles and thumbnails: what a dataset was packed with, what clients save beside it, that this lasts, and
+who may. Wrong links are pages for browsers."""
+import contextlib
+import json
+import math
+import os
+import pathlib
+import socket
+import subprocess
+import tempfile
+import time
+
+import openapi
+from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, run
+
+ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
+AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/json"}
+DOOR = {"eye": [3, 0, 1], "target": [0, 0, 1], "up": [0, 0, 1], "fov": 50.0}
+BROWSER = {"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
+
+
+def pack(folder, *options, name="site.spld"):
+    """A floor of 20 x 10 m."""
+    scan = pathlib.Path(folder, "scan.xyz")
+    scan.write_text("".join(f"{x / 4} {y / 4} 0\n" for x in range(81) for y in range(41)))
+    return subprocess.run([REAL, "pack", str(scan), "-o", str(pathlib.Path(folder, name)), *options], text=True,
+                          capture_output=True)
+
+
+@contextlib.contextmanager
+def serving(*args, binary=FAKE, files=(WALL,), **kw):
+    with tempfile.TemporaryDirectory() as top:
+        home = pathlib.Path(top, "home")
+        home.mkdir()
+        for file in files:
+            (home / pathlib.Path(file).name).write_bytes(pathlib.Path(file).read_bytes())
+        tokens = pathlib.Path(top, "tokens")
+        tokens.write_text(f"{ADMIN} view,admin,tour\n{VIEWER} view\n")
+        tokens.chmod(0o600)
+
+        @contextlib.contextmanager
+        def start():
+            with Daemon(binary, "--watch", "30", "--tokens", str(tokens), *args, datasets=[str(home)], **kw) as d:
+                yield d
+        yield home, start
+
+
+def put(d, name, view, headers=AUTH, dataset="wall"):
+    body = view if isinstance(view, (str, bytes)) else json.dumps(view)
+    return d.ask(f"/v1/datasets/{dataset}/views/{name}", "PUT", body, headers)
+
+
+def delete(d, name, headers=AUTH):
+    return d.ask(f"/v1/datasets/wall/views/{name}", "DELETE", headers=headers)
+
+
+def views(d, dataset="wall"):
+    return {view["name"]: view for view in d.ask(f"/v1/datasets/{dataset}", headers=AUTH).json()["views"]}
+
+
+def get(d, query, dataset="wall", route="view", headers={}):
+    return d.ask(f"/v1/datasets/{dataset}/{route}?{query}", headers={**AUTH, **headers})
+
+
+def camera(reply):
+    return json.loads(reply.headers["Splatd-Camera"])
+
+
+def test_what_it_was_packed_with():
+    with tempfile.TemporaryDirectory() as folder:
+        made = pack(folder, "--title", "Old <site>", "--description", "A floor.\nNo more.", "--default-view",
+                    "eye=10,-9,6,target=10,5,0,fov=40", "--view", "top=eye=10,5,20,target=10,5.001,0,up=0,1,0",
+                    "--view", "low=target=10,5,0,eye=1e1,-9,2,fov=70")
+        assert made.returncode == 0, made.stderr
+        info = json.loads(subprocess.run([REAL, "info", "--json", f"{folder}/site.spld"], text=True, capture_output=True,
+                                         check=True).stdout)
+        assert info["title"] == "Old <site>" and [v["name"] for v in info["views"]] == ["low", "top"], info["views"]
+        table = subprocess.run([REAL, "info", f"{folder}/site.spld"], text=True, capture_output=True, check=True).stdout
+        assert "Old <site>" in table and "--view low" in table
+        with Daemon(REAL, datasets=[f"{folder}/site.spld"]) as d:
+            assert d.ask("/v1/datasets").json()["datasets"][0]["title"] == "Old <site>"
+            full = d.ask("/v1/datasets/site").json()
+            assert full["description"] == "A floor.\nNo more." and full["thumbnail"] == "/v1/datasets/site/thumbnail.jpg"
+            assert full["default_view"]["eye"] == [10, -9, 6] and full["default_view"]["fit"] == [40, 40]
+            assert [(v["name"], v["from"], v["fov"]) for v in full["views"]] == [("low", "dataset", 70), ("top", "dataset", 60)]
+            named, written = d.ask("/v1/datasets/site/view?view=low"), d.ask("/v1/datasets/site/view?eye=10,-9,2&target=10,5,0&fov=70")
+            assert named.status == 200 and named.body == written.body and named.headers["ETag"] == written.headers["ETag"]
+            tall = d.ask("/v1/datasets/site/view?view=low&width=90&height=160")
+            assert abs(camera(tall)["fx"] - 45 / math.tan(math.radians(35))) < 1e-6
+            assert d.post({"view": "low"}, "/v1/datasets/site/view").body == named.body
+            picked = d.ask("/v1/datasets/site/pick?view=top&x=640.5&y=360.5").json()
+            assert math.dist(picked["position"], [10, 5, 0]) < 0.1, picked
+            assert d.post({"view": "top", "x": 640.5, "y": 360.5}, "/v1/datasets/site/pick").json()["position"] == picked["position"]
+            several = d.post({"view": "low", "views": [{"width": 16, "height": 16}], "container": "zip"}, "/v1/datasets/site/views")
+            assert several.status == 200
+            for wrong in ("view=door", "view=", "view=a/b", "view=low&view=low"):
+                reply = d.ask(f"/v1/datasets/site/view?{wrong}")
+                assert reply.status == 400 and reply.json()["field"] == "view", (wrong, reply.body)
+            frame = subprocess.run([REAL, "render", f"{folder}/site.spld", "--view", "low", "-o", f"{folder}/a.jpg"])
+            assert frame.returncode == 0 and pathlib.Path(folder, "a.jpg").read_bytes() == named.body
+            assert subprocess.run([REAL, "render", f"{folder}/site.spld", "--view", "door", "-o", f"{folder}/a.jpg"],
+                                  capture_output=True).returncode == 2
+
+
+def test_what_is_said_wrongly():
+    with tempfile.TemporaryDirectory() as folder:
+        for options, word in [
+            (("--default-view", "eye=1,2,3"), "target"), (("--default-view", "eye=1,2,target=0,0,0"), "--default-view"),
+            (("--default-view", "eye=1,2,3,target=1,2,3"), "target"), (("--default-view", "eye=1,2,3,target=0,0,0,fov=200"), "179"),
+            (("--default-view", "eye=1,2,3,target=0,0,0,eye=2,2,2"), "once"), (("--default-view", "from=1,2,3"), "eye=X,Y,Z"),
+            (("--view", "eye=1,2,3,target=0,0,0"), "--view"), (("--view", "=eye=1,2,3,target=0,0,0"), "NAME"),
+            (("--view", "a b=eye=1,2,3,target=0,0,0"), "name"), (("--title", "a\nb"), "title"), (("--title", "x" * 201), "200"),
+        ]:
+            made = pack(folder, *options)
+            assert made.returncode == 2 and word in made.stderr, (options, made.stderr)
+            assert not pathlib.Path(folder, "site.spld").exists()
+
+
+def test_views_are_saved_and_last():
+    with serving(files=(WALL,)) as (home, start):
+        with start() as d:
+            assert views(d) == {}
+            reply = put(d, "door", DOOR)
+            assert reply.status == 201 and reply.json() == {"name": "door", **DOOR, "from": "service"}, reply.body
+            assert put(d, "door", {**DOOR, "fov": 55}).status == 200 and views(d)["door"]["fov"] == 55
+            assert put(d, "a.b_c-1", {"eye": [1, 2, 3], "target": [0, 0, 0]}).status == 201
+            assert list(views(d)) == ["a.b_c-1", "door"] and views(d)["a.b_c-1"]["fov"] == 60
+            file = home / "wall.views.json"
+            assert [v["name"] for v in json.loads(file.read_text())["views"]] == ["a.b_c-1", "door"]
+            assert sorted(p.name for p in home.iterdir()) == ["wall.spld", "wall.views.json"]
+            before = get(d, "view=door&width=64&height=64")
+            version = d.ask("/v1/datasets/wall", headers=AUTH).json()["version"]
+            kept, named = get(d, f"width=64&height=64&v={version}"), get(d, f"view=door&width=64&height=64&v={version}")
+            assert "immutable" in kept.headers["Cache-Control"] and "immutable" not in named.headers["Cache-Control"]
+            assert get(d, "view=door&width=64&height=64", headers={"If-None-Match": before.headers["ETag"]}).status == 304
+        with start() as d:  # another process
+            assert list(views(d)) == ["a.b_c-1", "door"]
+            after = get(d, "view=door&width=64&height=64")
+            assert after.headers["ETag"] == before.headers["ETag"]
+            other = pathlib.Path(os.environ["SPLATD_WALL_2"]).read_bytes()
+            (home / "new").write_bytes(other)
+            (home / "new").rename(home / "wall.spld")
+            end = time.monotonic() + 30
+            while d.ask("/v1/datasets/wall", headers=AUTH).json()["version"] == version:
+                assert time.monotonic() < end
+                time.sleep(0.02)
+            assert list(views(d)) == ["a.b_c-1", "door"]  # and another version
+            assert delete(d, "a.b_c-1").status == 204 and list(views(d)) == ["door"]
+            assert delete(d, "a.b_c-1").status == 404
+            assert d.ask("/v1/datasets/wall", "DELETE", headers=AUTH).status == 204
+            assert list(home.iterdir()) == []
+
+
+def test_a_saved_view_hides_one_of_the_pack():
+    with tempfile.TemporaryDirectory() as folder:
+        assert pack(folder, "--view", "low=eye=10,-9,2,target=10,5,0").returncode == 0
+        with serving(files=(f"{folder}/site.spld",)) as (home, start), start() as d:
+            def low():
+                return d.ask("/v1/datasets/site/views/low", "DELETE", headers=AUTH)
+            refused = low()
+            assert refused.status == 409 and refused.json()["field"] == "name"
+            assert put(d, "low", DOOR, dataset="site").status == 200
+            assert views(d, "site")["low"]["from"] == "service" and camera(get(d, "view=low", "site"))["eye"] == DOOR["eye"]
+            assert low().status == 204
+            assert views(d, "site")["low"]["from"] == "dataset" and camera(get(d, "view=low", "site"))["eye"] == [10, -9, 2]
+
+
+def test_who_may_and_what():
+    with serving() as (home, start), start() as d:
+        for headers, status in (({}, 401), ({"Authorization": f"Bearer {VIEWER}"}, 403)):
+            assert put(d, "door", DOOR, headers).status == status and delete(d, "door", headers).status == status
+        for name in (".a", "a%2Fb", "a%20b", "x" * 64):
+            reply = put(d, name, DOOR)
+            assert reply.status == 400 and reply.json()["field"] == "name", (name, reply.body)
+        for view, field in [
+            ({"eye": [1, 2, 3]}, "target"), ({**DOOR, "eye": [1, 2]}, "eye"), ({**DOOR, "up": [0, 0, "1"]}, "up"),
+            ({**DOOR, "fov": 180}, "fov"), ({**DOOR, "fov": "50"}, "fov"), ({**DOOR, "fov": 0}, "fov"), ({**DOOR, "lod": 1}, "lod"),
+            ({**DOOR, "name": "a"}, "name"), ({**DOOR, "target": DOOR["eye"]}, "target"), ({**DOOR, "up": [1, 0, 0]}, "up"),
+            ({**DOOR, "eye": [1e13, 0, 0]}, "eye"), ("{", "body"), ("", "body"), ("[]", "body"),
+            ('{"eye": [1,2,3], "eye": [1,2,3]}', "body"), (json.dumps([[1]] * 100), "body"),
+        ]:
+            reply = put(d, "door", view)
+            assert reply.status == 400 and reply.json()["field"] == field, (view, reply.body)
+        assert put(d, "door", b"{" + b" " * (2 << 20)).status == 413
+        assert put(d, "door", DOOR, dataset="nothing").status == 404
+        assert d.ask("/v1/datasets/wall/views/door", headers=AUTH).status == 405
+        assert views(d) == {} and [p.name for p in home.iterdir()] == ["wall.spld"]
+        for i in range(64):
+            assert put(d, f"v{i}", DOOR).status == 201
+        full = put(d, "v64", DOOR)
+        assert full.status == 400 and full.json()["field"] == "name" and put(d, "v63", DOOR).status == 200
+        (home / "wall.views.json").rename(home / "before")
+        (home / "wall.views.json" / "in the way").mkdir(parents=True)
+        for reply in (put(d, "v0", {**DOOR, "fov": 20}), delete(d, "v0")):
+            assert reply.status == 500 and str(home) not in reply.json()["detail"], reply.body
+        assert views(d)["v0"]["fov"] == 50 and not [p for p in home.iterdir() if p.name.startswith(".")]
+        with socket.create_connection(("127.0.0.1", d.port), 20) as s:  # a new version is on its way
+            s.sendall(f"PUT /v1/datasets/wall HTTP/1.1\r\nHost: a\r\nAuthorization: {AUTH['Authorization']}\r\n"
+                      "Content-Length: 5000\r\n\r\n".encode())
+            eventually(lambda: put(d, "v0", DOOR).status == 503)
+            assert delete(d, "v0").status == 503
+    with Daemon(FAKE) as d:  # nobody is an admin without --tokens
+        assert put(d, "door", DOOR, {}).status == 403
+
+
+def test_a_file_named_itself_and_a_broken_list_are_left_alone():
+    with tempfile.TemporaryDirectory() as top:
+        tokens = pathlib.Path(top, "tokens")
+        tokens.write_text(f"{ADMIN} view,admin\n")
+        tokens.chmod(0o600)
+        copy = pathlib.Path(top, "wall.spld")
+        copy.write_bytes(pathlib.Path(WALL).read_bytes())
+        with Daemon(FAKE, "--tokens", str(tokens), datasets=[str(copy)]) as d:
+            assert put(d, "door", DOOR).status == 409
+    for text in ("{", '{"views": 5}', '{"views": [{"name": "a"}]}', '{"views": [' + ",".join(['{}'] * 70) + "]}"):
+        with serving() as (home, start):
+            (home / "wall.views.json").write_text(text)
+            with start() as d:
+                assert views(d) == {} and put(d, "door", DOOR).status == 409
+                assert get(d, "width=16&height=16").status == 200
+                assert any("wall.views.json" in line for line in d.lines)
+            assert (home / "wall.views.json").read_text() == text
+
+
+def test_thumbnails():
+    with Daemon(REAL) as d:
+        path = "/v1/datasets/wall/thumbnail.jpg"
+        small = d.ask(path)
+        assert small.status == 200 and small.headers["Content-Type"] == "image/jpeg"
+        assert camera(small)["width"] == 320 and camera(small)["height"] == 180
+        assert camera(small)["eye"] == d.ask("/v1/datasets/wall").json()["default_view"]["eye"]
+        tag = small.headers["ETag"]
+        assert d.ask(path, headers={"If-None-Match": tag}).status == 304
+        assert d.ask(path, "HEAD").headers["ETag"] == tag and d.ask(path).headers["Splatd-Cache"] == "hit"
+        version = d.ask("/v1/datasets/wall").json()["version"]
+        assert d.ask(f"{path}?background=ff0000").body != small.body
+        large = d.ask(f"{path}?width=640&v={version}")
+        assert camera(large)["width"] == 640 and "immutable" in large.headers["Cache-Control"]
+        for query, field in (("width=15", "width"), ("width=1281", "width"), ("height=9", "height"), ("eye=1,2,3", "eye"),
+                             ("v=5", "v")):
+            reply = d.ask(f"{path}?{query}")
+            assert reply.status == 400 and reply.json()["field"] == field, reply.body
+        assert d.ask(f"{path}?v=0123456789abcdef").status == 404
+        assert d.ask("/v1/datasets/nothing/thumbnail.jpg").status == 404
+    for setting, arguments, status in (({"FAKE_ROOM_PX": "0"}, (), 507), ({"FAKE_FRAME_MS": "2000"}, ("--deadline", "100"), 503)):
+        with Daemon(FAKE, *arguments, **setting) as d:
+            assert d.ask(path).status == status
+
+
+def test_the_default_view_fits_narrow_images():
+    with tempfile.TemporaryDirectory() as folder:
+        assert pack(folder).returncode == 0
+        with Daemon(REAL, datasets=[f"{folder}/site.spld"]) as d:
+            fit = d.ask("/v1/datasets/site").json()["default_view"]["fit"]
+            for width, height in ((640, 360), (195, 422), (200, 200)):
+                seen = camera(d.ask(f"/v1/datasets/site/view?width={width}&height={height}"))
+                angles = [2 * math.degrees(math.atan(size / 2 / seen[f])) for size, f in ((width, "fx"), (height, "fy"))]
+                assert all(a > b - 1e-6 for a, b in zip(angles, fit)), (angles, fit)
+                assert any(abs(a - b) < 1e-6 for a, b in zip(angles, fit)), (angles, fit)
+
+
+def test_wrong_links_are_pages_for_browsers():
+    with Daemon(FAKE) as d:
+        def browse(path, method="GET"):
+            connection = d.connect()
+            connection.request(method, path, headers=BROWSER)
+            answer = connection.getresponse()
+            reply = Reply(answer.status, answer.headers, answer.read())
+            connection.close()
+            openapi.check(method, path, BROWSER, None, reply)
+            return reply
+        for path, status, word in [
+            ("/?dataset=wall", 400, b'href="/#dataset=wall"'), ("/nowhere", 404, b"nothing here"),
+            ("/embed/wall?eye=1,2,3", 400, b"behind"), ("/viewer/none.js", 404, b"no such file"),
+            ('/?a="<b>', 400, b"&#60;b&#62;"),
+        ]:
+            reply = browse(path)
+            assert reply.status == status and reply.headers["Content-Type"].startswith("text/html"), (path, reply.body)
+            assert word in reply.body and reply.headers["Vary"] == "Accept", reply.body
+            assert reply.headers["Content-Security-Policy"].startswith("default-src 'none'")
+            assert b"<b>" not in reply.body
+            assert browse(path, "HEAD").status == status
+            assert d.ask(path).headers["Content-Type"] == "application/problem+json"
+        assert browse("/v1/datasets/none").headers["Content-Type"] == "application/problem+json"
+        assert browse("/embed/none").status == 200  # the page asks for its dataset itself, and says so
+
+
+run(globals())

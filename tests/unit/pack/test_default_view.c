@@ -1,0 +1,285 @@
+/* The default view: inside of what lies around one, before what faces somewhere, all of it in images of any shape, and
+ * what the user says in its place. Whole packs of small clouds. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <splatd/pack.h>
+
+#include "clouds.h"
+#include "dataset/dataset.h"
+
+static char folder[] = "/tmp/splatd-view-XXXXXX";
+static char scan[64], packed[64];
+
+struct cloud {
+    size_t count;
+    float (*at)[6]; /* position, normal */
+};
+
+static void add(struct cloud *cloud, double x, double y, double z, double nx, double ny, double nz)
+{
+    cloud->at = realloc(cloud->at, (cloud->count + 1) * sizeof *cloud->at);
+    const double all[6] = {x, y, z, nx, ny, nz};
+    for (int i = 0; i < 6; i++)
+        cloud->at[cloud->count][i] = (float)all[i];
+    cloud->count++;
+}
+
+/* A rectangle from corner `a` along u and v, a point every `step`. */
+static void add_sheet(struct cloud *cloud, const double a[3], const double u[3], const double v[3], double step,
+                      const double normal[3])
+{
+    double lu = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]), lv = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (double s = 0; s <= lu; s += step)
+        for (double t = 0; t <= lv; t += step)
+            add(cloud, a[0] + u[0] * s / lu + v[0] * t / lv, a[1] + u[1] * s / lu + v[1] * t / lv,
+                a[2] + u[2] * s / lu + v[2] * t / lv, normal[0], normal[1], normal[2]);
+}
+
+static void add_box(struct cloud *cloud, double x, double y, double z, double step, bool open)
+{
+    static const double none[3] = {0};
+    const double o[3] = {0}, top[3] = {0, 0, z}, right[3] = {x, 0, 0}, back[3] = {0, y, 0}, u[3] = {x, 0, 0},
+                 v[3] = {0, y, 0}, w[3] = {0, 0, z};
+    add_sheet(cloud, o, u, v, step, none);
+    if (!open)
+        add_sheet(cloud, top, u, v, step, none);
+    add_sheet(cloud, o, u, w, step, none);
+    add_sheet(cloud, back, u, w, step, none);
+    add_sheet(cloud, o, v, w, step, none);
+    add_sheet(cloud, right, v, w, step, none);
+}
+
+static int pack_with(const struct cloud *cloud, bool normals, struct spl_pack_options *options, struct spl_error *err)
+{
+    FILE *f = fopen(scan, "wb");
+    assert_non_null(f);
+    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\n%send_header\n",
+            cloud->count, normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "");
+    for (size_t i = 0; i < cloud->count; i++)
+        fwrite(cloud->at[i], sizeof(float), normals ? 6 : 3, f);
+    assert_int_equal(fclose(f), 0);
+    const char *input = scan;
+    options->size = sizeof *options;
+    options->inputs = &input;
+    options->input_count = 1;
+    options->output = packed;
+    options->threads = 2;
+    return spl_pack(options, NULL, err);
+}
+
+static struct spl_dataset *open_packed(const struct cloud *cloud, bool normals, const char *unit)
+{
+    struct spl_pack_options options = {.unit = unit};
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    if (pack_with(cloud, normals, &options, &err) || spl_dataset_open(packed, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    return dataset;
+}
+
+/* Share of the cloud's first `count` points in the image, and of the image's narrower fit that they take up. */
+static double share_in_view(const struct spl_dataset *dataset, const struct cloud *cloud, size_t count, uint32_t width,
+                            uint32_t height, double *fill)
+{
+    struct spl_camera camera;
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    size_t inside = 0;
+    assert_int_equal(spl_dataset_get_default_camera(dataset, width, height, &camera, NULL), 0);
+    for (size_t i = 0; i < count; i++) {
+        double pixel[2], depth, at[3] = {(double)cloud->at[i][0], (double)cloud->at[i][1], (double)cloud->at[i][2]};
+        if (!spl_camera_project(&camera, at, pixel, &depth))
+            continue;
+        inside += pixel[0] >= 0 && pixel[0] < width && pixel[1] >= 0 && pixel[1] < height;
+        for (int c = 0; c < 2; c++) {
+            low[c] = fmin(low[c], pixel[c]);
+            high[c] = fmax(high[c], pixel[c]);
+        }
+    }
+    *fill = fmax((high[0] - low[0]) / width, (high[1] - low[1]) / height);
+    return (double)inside / (double)count;
+}
+
+static void a_room_is_seen_from_inside_lengthwise(void **state)
+{
+    (void)state;
+    struct cloud cloud = {0};
+    add_box(&cloud, 10, 5, 3, 0.15, false);
+    static const char *const units[] = {"m", "unknown"};
+    for (int k = 0; k < 2; k++) {
+        struct spl_dataset *dataset = open_packed(&cloud, false, units[k]);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        const double *eye = info->default_eye, *target = info->default_target;
+        assert_true(eye[0] > 0.2 && eye[0] < 9.8 && eye[1] > 0.2 && eye[1] < 4.8 && eye[2] > 1 && eye[2] < 2.2);
+        double dx = target[0] - eye[0], dy = target[1] - eye[1];
+        assert_true(fabs(dx) > 3 && fabs(dx) > 1.5 * fabs(dy));
+        assert_true(dx > 0 ? eye[0] < 4 : eye[0] > 6);
+        spl_dataset_close(dataset);
+    }
+    free(cloud.at);
+}
+
+/* A tray has no ceiling: one looks into it from above. */
+static void what_is_open_is_seen_from_outside(void **state)
+{
+    (void)state;
+    struct cloud cloud = {0};
+    add_box(&cloud, 10, 5, 1, 0.15, true);
+    struct spl_dataset *dataset = open_packed(&cloud, false, "m");
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    assert_true(info->default_eye[2] > 2);
+    spl_dataset_close(dataset);
+    free(cloud.at);
+}
+
+static void all_of_it_is_in_images_of_any_shape(void **state)
+{
+    (void)state;
+    static const double z[3] = {0, 0, 1};
+    static const uint32_t sizes[][2] = {{1280, 720}, {390, 844}, {500, 500}, {2000, 300}};
+    struct cloud cloud = {0};
+    add_sheet(&cloud, (double[]){0, 0, 0}, (double[]){60, 0, 0}, (double[]){0, 20, 0}, 0.5, z);
+    size_t count = cloud.count;
+    struct spl_dataset *alone = open_packed(&cloud, false, "m");
+    for (int k = 0; k < 40; k++) /* birds */
+        add(&cloud, 30 + 5 * k, 10, 300 + 11 * k, 0, 0, 0);
+    struct spl_dataset *with = open_packed(&cloud, false, "m");
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
+        double fill, fill_with;
+        assert_true(share_in_view(alone, &cloud, count, sizes[s][0], sizes[s][1], &fill) > 0.99);
+        assert_true(share_in_view(with, &cloud, count, sizes[s][0], sizes[s][1], &fill_with) > 0.99);
+        assert_true(fill > 0.7 && fill <= 1.05);
+        assert_true(fill_with > 0.9 * fill);
+    }
+    spl_dataset_close(alone);
+    spl_dataset_close(with);
+    free(cloud.at);
+}
+
+/* A facade whose front is known, turned to every side. */
+static void what_faces_somewhere_is_seen_from_there(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 4; k++) {
+        struct cloud cloud = {0};
+        double angle = 0.3 + k * M_PI / 2, u[3] = {12 * cos(angle), 12 * sin(angle), 0};
+        const double normal[3] = {sin(angle), -cos(angle), 0};
+        add_sheet(&cloud, (double[]){0, 0, 0}, u, (double[]){0, 0, 6}, 0.2, normal);
+        struct spl_dataset *dataset = open_packed(&cloud, true, "m");
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        double arm[3], length = 0, along = 0;
+        for (int c = 0; c < 3; c++) {
+            arm[c] = info->default_eye[c] - info->default_target[c];
+            length += arm[c] * arm[c];
+            along += arm[c] * normal[c];
+        }
+        assert_true(along > 0.88 * sqrt(length)); /* within 28 degrees, 10 of them from above */
+        spl_dataset_close(dataset);
+        free(cloud.at);
+    }
+}
+
+static void what_is_said_stands(void **state)
+{
+    (void)state;
+    struct cloud cloud = {0};
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    add_box(&cloud, 10, 5, 3, 0.3, false);
+    const struct spl_saved_view first = {.eye = {1, 2, 3}, .target = {4, 2, 3}, .fov = 50};
+    const struct spl_saved_view views[] = {{.name = "door", .eye = {1, 1, 1}, .target = {2, 2, 1}, .up = {0, 1, 0}},
+                                           {.name = "back", .eye = {9, 1, 1}, .target = {2, 2, 1}, .fov = 70}};
+    struct spl_pack_options options = {
+        .title = "The hall", .description = "Two\nlines", .default_view = &first, .views = views, .view_count = 2};
+    assert_int_equal(pack_with(&cloud, false, &options, &err), 0);
+    assert_int_equal(spl_dataset_open(packed, true, &dataset, &err), 0);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    struct spl_camera camera;
+    assert_string_equal(info->title, "The hall");
+    assert_string_equal(info->description, "Two\nlines");
+    assert_true(info->default_eye[0] == 1 && info->default_target[0] == 4 && info->default_up[2] == 1);
+    assert_true(info->default_fov == 50 && info->default_fit[0] == 50);
+    assert_int_equal(info->view_count, 2);
+    assert_string_equal(info->views[0].name, "back");
+    assert_true(info->views[0].up[2] == 1 && info->views[1].up[1] == 1 && info->views[1].fov == 60);
+    assert_int_equal(spl_dataset_get_default_camera(dataset, 300, 600, &camera, &err), 0);
+    assert_true(fabs(camera.fy - 150 / tan(25 * M_PI / 180)) < 1e-9); /* 50 degrees across */
+    spl_dataset_close(dataset);
+    free(cloud.at);
+}
+
+static void what_is_said_wrongly_is_refused_by_name(void **state)
+{
+    (void)state;
+    struct cloud cloud = {0};
+    add(&cloud, 0, 0, 0, 0, 0, 0);
+    static char long_title[202];
+    memset(long_title, 'a', sizeof long_title - 1);
+    static const struct spl_saved_view blind = {.eye = {1, 2, 3}, .target = {1, 2, 3}},
+                                       wide = {.eye = {1, 0, 0}, .fov = 180}, turned = {.eye = {1, 0, 0}, .fov = -1},
+                                       nameless = {.eye = {1, 0, 0}},
+                                       hidden = {.name = ".a", .eye = {1, 0, 0}}, far = {.eye = {NAN, 0, 0}};
+    static const struct spl_saved_view twice[] = {{.name = "a", .eye = {1, 0, 0}}, {.name = "a", .eye = {2, 0, 0}}};
+    const struct {
+        struct spl_pack_options options;
+        const char *field;
+    } wrong[] = {
+        {{.title = long_title}, "title"},
+        {{.title = "two\nlines"}, "title"},
+        {{.title = "\xff"}, "title"},
+        {{.description = "a\tb"}, "description"},
+        {{.default_view = &blind}, "default-view"},
+        {{.default_view = &wide}, "default-view"},
+        {{.default_view = &turned}, "default-view"},
+        {{.default_view = &far}, "default-view"},
+        {{.views = &nameless, .view_count = 1}, "view"},
+        {{.views = &hidden, .view_count = 1}, "view"},
+        {{.views = twice, .view_count = 2}, "view"},
+        {{.views = twice, .view_count = SPL_SAVED_VIEWS_MAX + 1}, "view"},
+    };
+    unlink(packed);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        struct spl_error err = {0};
+        struct spl_pack_options options = wrong[i].options;
+        assert_int_equal(pack_with(&cloud, false, &options, &err), SPL_E_USAGE);
+        assert_string_equal(err.field, wrong[i].field);
+        assert_int_equal(access(packed, F_OK), -1);
+    }
+    free(cloud.at);
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    if (!mkdtemp(folder))
+        return -1;
+    snprintf(scan, sizeof scan, "%s/in.ply", folder);
+    snprintf(packed, sizeof packed, "%s/out.spld", folder);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    unlink(scan);
+    unlink(packed);
+    return rmdir(folder);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
+        cmocka_unit_test(what_is_open_is_seen_from_outside),
+        cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
+        cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
+        cmocka_unit_test(what_is_said_stands),
+        cmocka_unit_test(what_is_said_wrongly_is_refused_by_name),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
