@@ -9,7 +9,7 @@
 
 #include "gpu/gpu.h"
 
-enum { SPL_KERNEL_CONSTANTS = 5 };
+enum { SPL_KERNEL_CONSTANTS = 6 };
 
 struct spl_kernel_key {
     const char *name;                         /* of shaders/meson.build; static */

@@ -118,7 +118,7 @@ static void test_nothing_has_a_reason(void **state)
     struct spl_dataset_info info = make_hall();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char reason[SPL_SOFT_REASON_MAX];
-        spl_soft_explain(&read_terms(rows[i].terms).terms[0], &info, reason);
+        spl_soft_explain(&read_terms(rows[i].terms).what.terms[0], &info, reason);
         if (strncmp(reason, rows[i].says, strlen(rows[i].says)) || (!*rows[i].says && *reason))
             fail_msg("%s: %s", rows[i].terms, reason);
     }
