@@ -103,9 +103,7 @@ bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_in
         const bool above = isfinite(term->least) || !isfinite(term->most);
         const double end = above ? term->least : term->most;
         spl_decimal_print(isfinite(end) && term->measure == SPL_TERM_ATTRIBUTE ? end : 0, at);
-        snprintf(hint, SPL_SOFT_HINT_MAX, "a coordinate is measured from a plane: write 'plane:%s,%s,%s,%d,%d,%d%c0'",
-                 axis ? "0" : at, axis == 1 ? at : "0", axis == 2 ? at : "0", !axis, axis == 1, axis == 2,
-                 above ? '>' : '<');
+        snprintf(hint, SPL_SOFT_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<', at);
         return true;
     }
     if (near)

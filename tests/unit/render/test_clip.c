@@ -167,7 +167,7 @@ static void test_what_is_degenerate_is_refused(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         refused(cases[i][0], "clip", cases[i][1]);
-    refused("2,x", "class", "no number");
+    refused("2,x", "class", "classes are numbers");
     refused("", "class", "empty");
     refused("class:2 and z<1", "soft", "neither the end");
     char text[4096] = "polygon:0,0";

@@ -204,10 +204,10 @@ static void test_names_are_guessed(void **state)
         {"clas:5", "did you mean 'class'?"},
         {"int>5", "did you mean 'intensity'?"},
         {"smell>1", NULL},
-        {"z>20.5", "a coordinate is measured from a plane: write 'plane:0,0,20.5,0,0,1>0'"},
-        {"height<2", "a coordinate is measured from a plane: write 'plane:0,0,2,0,0,1<0'"},
-        {"X:1..2", "a coordinate is measured from a plane: write 'plane:1,0,0,1,0,0>0'"},
-        {"y<q0.5", "a coordinate is measured from a plane: write 'plane:0,0,0,0,1,0<0'"},
+        {"elevation>20.5", "coordinates are x, y and z: write 'z>20.5'"},
+        {"height<2", "coordinates are x, y and z: write 'z<2'"},
+        {"X:1..2", "coordinates are x, y and z: write 'x>1'"},
+        {"Y<q0.5", "coordinates are x, y and z: write 'y<0'"},
     };
     struct spl_dataset_info info = make_hall();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
