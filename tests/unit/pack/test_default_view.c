@@ -76,7 +76,7 @@ static int pack_with(const struct cloud *cloud, bool normals, struct spl_pack_op
 static struct spl_dataset *open_packed(const struct cloud *cloud, bool normals, const char *unit)
 {
     struct spl_pack_options options = {.unit = unit};
-    struct spl_dataset *dataset;
+    struct spl_dataset *dataset = NULL;
     struct spl_error err = {0};
     if (pack_with(cloud, normals, &options, &err) || spl_dataset_open(packed, true, &dataset, &err))
         fail_msg("%s", err.message);
