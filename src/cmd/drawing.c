@@ -90,7 +90,7 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
     }
     if (!rc)
         spl_view_set_param(&d->view, param, value);
-    if (!rc && SPL_PARAMS_OF_ALL >> param & 1)
+    if (!rc && info->changes == SPL_CHANGES_SOFT)
         snprintf(d->soft_option, sizeof d->soft_option, "%s", option);
     return rc;
 }

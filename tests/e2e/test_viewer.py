@@ -798,7 +798,8 @@ def test_controls_are_those_of_the_table():
         for method in table["methods"]:
             tab.choose("#method", method["name"])
             lacks = {name for name, parameter in parameters.items()  # the wall
-                     if parameter["textures"] or parameter["maps"] or parameter["primitives"] or parameter["soft"]}
+                     if parameter["textures"] or parameter["maps"] or parameter["primitives"] or parameter["soft"] or
+                     parameter["colors"]}
             names = {name for name in method["parameters"] if name not in lacks}
             assert shown(tab) == names, method["name"]
             assert tab.text("#method-help") == method["description"]
