@@ -85,7 +85,7 @@ def test_requests():
             assert asked >= 12, asked
             for file in [ROOT / "README.md", *(ROOT / "api").rglob("*.md")]:
                 for address in re.findall(r"(?<!\()" + re.escape(SERVICE) + r"(/[^\s\"'`#)<]*)", file.read_text(encoding="utf-8")):
-                    if not address.endswith("/tours"):
+                    if not address.endswith("/tours") and "{" not in address:  # templates are for maps to fill in
                         assert d.ask(address).status == 200, (file, address)
 
 
