@@ -14,7 +14,7 @@ static uint32_t blocks_of(uint64_t items, uint32_t block)
     return (uint32_t)((items + block - 1) / block);
 }
 
-/* Where lists start; the sum of all, UINT64_MAX where it does not fit. */
+/* Where lists start; the sum of all. */
 static uint64_t lay_out(const uint32_t *totals, uint32_t *starts, uint32_t tiles)
 {
     uint64_t sum = 0;
