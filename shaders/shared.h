@@ -330,8 +330,13 @@ struct spl_draw_chunk {
 #define SPL_MARK_MOST 254
 #define SPL_MARK_WHOLE 255u
 
-/* Tests that marks are made of: words, see src/render/marks.c. A chunk's begin with how many there are, of each
- * SPL_TEST_WORDS:
+/* Of chunks that shapes cut sample by sample (common/cut.glsl), marks of what is solid are: SPL_MARK_WHOLE what is not
+ * drawn, else a bit, from the low end, for each of the view's conditions that have attributes and shapes, set where the
+ * splat's attributes make it hold. */
+
+/* Tests that marks are made of: words, see src/render/marks.c. A chunk's begin with a word: how many there are of what is
+ * soft; from bit SPL_TESTS_CLIP on how many of what is drawn; from SPL_TESTS_MODE on what the marks are of. Of each
+ * SPL_TEST_WORDS, whose first has one of these in its low byte and SPL_TEST_AND ... above:
  *   SPL_TEST_NUMBERS  word of the page where its codes begin; their width, and SPL_TEST_LAST_NONE where the last code is
  *                     no value; start; span; shift; floats: W at the lower end and of a number more, at the upper one
  *   SPL_TEST_TABLE    the same two; from SPL_TEST_TABLE_WORD on a mark for each of up to 32 codes, four a word
@@ -341,14 +346,33 @@ struct spl_draw_chunk {
 #define SPL_TEST_NUMBERS 0u
 #define SPL_TEST_TABLE 1u
 #define SPL_TEST_SHAPE 2u
+#define SPL_TEST_OR 0x100u      /* not of the list of the test before, but of its condition */
+#define SPL_TEST_AND 0x200u     /* of another condition */
+#define SPL_TEST_OUTSIDE 0x400u /* what is in none of its list's tests */
+#define SPL_TEST_BIT 12         /* 4 bits: the condition's bit in the mark, plus 1; 0 = what does not hold is not drawn */
+#define SPL_TESTS_CLIP 8
+#define SPL_TESTS_MODE 16
+#define SPL_TESTS_SOFT 0u       /* marks are of what is soft */
+#define SPL_TESTS_OF_SOLID 1u   /* what is drawn as solid: SPL_MARK_WHOLE where it is not, else the bits */
+#define SPL_TESTS_OF_SOFT 2u    /* what is soft and drawn */
+#define SPL_TESTS_OF_ALL_SOFT 3u /* the same where all of it is soft */
+/* Constants of kernels beside the kinds of tests: any test is of what is drawn; of a polygon. */
+#define SPL_TESTS_HAVE_CLIP 3u
+#define SPL_TESTS_HAVE_POLYGON 4u
 #define SPL_TEST_LAST_NONE 64u
 #define SPL_TEST_EXACT 0xffffffu /* numbers from an end up to which floats are exact; W is 1 beyond */
 #define SPL_TEST_TABLE_WORD 3
 #define SPL_SHAPE_AXIS 0u
 #define SPL_SHAPE_PLANE 1u
 #define SPL_SHAPE_BOX 2u
+#define SPL_SHAPE_POLYGON 3u /* number of corners in place of half a box's x; these, x and y, behind the rest */
 #define SPL_SHAPE_WITH_LEAST 4u
 #define SPL_SHAPE_WITH_MOST 8u
+
+/* Shapes that samples are asked of: words of the tests, from frame.fill_from on: how many, and of each where it lies and
+ * the flags of a test. Kernels are made for planes and coordinates alone, and for all. */
+#define SPL_CUT_PLANES 1u
+#define SPL_CUT_BODIES 2u /* these too */
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
@@ -391,7 +415,7 @@ struct spl_frame_params {
     SPL_F32 fill_threshold;               /* open sectors, of 8, from which on a sample is visible */
     SPL_U32 fill_levels;                  /* of the rings that are looked at; the coarse level */
     SPL_U32 fill_level;                   /* that this pass makes */
-    SPL_U32 fill_from, fill_to;           /* words of its planes */
+    SPL_U32 fill_from, fill_to;           /* words of its planes; of discs fill_from is where what cuts them is (SPL_CUT_*) */
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */

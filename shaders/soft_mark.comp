@@ -1,30 +1,20 @@
-/* Marks of splats, or with SPL_CELL_LANES of the cells of panels: which of them are soft, by the tests that the host
- * made of a chunk (src/render/marks.c), which begin where its `texture` says. An invocation makes a word of four, so
+/* Marks of splats, or with SPL_CELL_LANES of the cells of panels: which of them are soft, and which are drawn at all, by
+ * the tests that the host made of a chunk (src/render/marks.c), which begin where its `texture` says. An invocation makes a word of four, so
  * that none is written twice: SPL_LANES make those of a run of splats, SPL_CELL_LANES two words each of a panel. Whole
  * numbers, and floats by rounded products and sums alone, so that every driver marks the same. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"
+#include "common/terms.glsl"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint KINDS = 7; /* bit per kind of test that the tile has: the others cost nothing */
 
 const bool SHAPES = (KINDS >> SPL_TEST_SHAPE & 1u) != 0u, TABLES = (KINDS >> SPL_TEST_TABLE & 1u) != 0u;
 const bool NUMBERS = (KINDS >> SPL_TEST_NUMBERS & 1u) != 0u;
+const bool CLIPS = (KINDS >> SPL_TESTS_HAVE_CLIP & 1u) != 0u, POLYGONS = (KINDS >> SPL_TESTS_HAVE_POLYGON & 1u) != 0u;
 
 layout(std430, binding = SPL_STORAGE_MARKS) writeonly buffer mark_buffer { uint marks[]; };
-SPL_TEXEL_BUFFER(SPL_TEXELS_TESTS) test_texels;
-
-uint test_word(uint at)
-{
-    return imageLoad(test_texels, int(at)).x;
-}
-
-float test_float(uint at)
-{
-    return uintBitsToFloat(test_word(at));
-}
-
 /* Of W of eq. 22. */
 uint mark_of(float share)
 {
@@ -41,52 +31,74 @@ uint test_numbers(uint at, uint code, uint width, bool last_none)
     return none || past > span ? 0u : mark_of(min(low, high));
 }
 
-float distance_to(uint at, uint kind, vec3 p)
-{
-    precise vec3 q;
-    for (uint i = 0u; i < 3u; i++) /* of fixed length: it is unrolled */
-        q[i] = test_float(at + 4u * i) * p.x + test_float(at + 4u * i + 1u) * p.y + test_float(at + 4u * i + 2u) * p.z +
-               test_float(at + 4u * i + 3u);
-    precise vec3 beyond = abs(q) - vec3(test_float(at + 12u), test_float(at + 13u), test_float(at + 14u));
-    precise vec3 outside = max(beyond, 0.0);
-    precise float axis = sqrt(q.x * q.x + q.y * q.y);
-    precise float box = sqrt(outside.x * outside.x + outside.y * outside.y + outside.z * outside.z) +
-                        min(max(max(beyond.x, beyond.y), beyond.z), 0.0);
-    return kind == SPL_SHAPE_AXIS ? axis : kind == SPL_SHAPE_PLANE ? q.z : box;
-}
-
 uint test_shape(uint at, vec3 p)
 {
     uint flags = test_word(at + 19u);
-    float distance = distance_to(at, flags & 3u, p);
+    float distance = distance_to(at, flags & 3u, p, true, POLYGONS);
     float least = test_float(at + 15u), most = test_float(at + 16u);
-    bool above = distance > least || ((flags & SPL_SHAPE_WITH_LEAST) != 0u && distance == least);
-    bool below = distance < most || ((flags & SPL_SHAPE_WITH_MOST) != 0u && distance == most);
     float rise = test_float(at + 17u), fall = test_float(at + 18u);
     precise float low = (distance - least) * rise, high = (most - distance) * fall;
-    return above && below ? mark_of(min(rise > 0.0 ? low : 1.0, fall > 0.0 ? high : 1.0)) : 0u;
+    return is_within(at, flags, distance) ? mark_of(min(rise > 0.0 ? low : 1.0, fall > 0.0 ? high : 1.0)) : 0u;
 }
 
-/* Item `index`, splat or panel, whose splat or cell lies at `p`: the largest mark of all tests, of which any makes it
- * soft. */
+/* What the test at word `at` makes of item `index`, splat or panel, whose splat or cell lies at `p`. */
+uint make_test(uint at, uint index, vec3 p)
+{
+    uint kind = test_word(at) & 255u, word = test_word(at + 1u), packed_width = test_word(at + 2u);
+    uint width = packed_width & (SPL_TEST_LAST_NONE - 1u), own = 0u;
+    if (SHAPES && kind == SPL_TEST_SHAPE)
+        return test_shape(word, p);
+    if (TABLES || NUMBERS) {
+        uint code = load_code(word, width, index);
+        if (TABLES && kind == SPL_TEST_TABLE)
+            own = test_word(at + SPL_TEST_TABLE_WORD + (code & 31u) / 4u) >> 8u * (code & 3u) & 255u;
+        else if (NUMBERS)
+            own = test_numbers(at, code, width, (packed_width & SPL_TEST_LAST_NONE) != 0u);
+    }
+    return own;
+}
+
+uint turn_around(uint mark)
+{
+    return mark == 0u ? SPL_MARK_WHOLE : 0u;
+}
+
+/* Of what is soft: the largest mark of the tests, of which any makes it soft; `at` goes on to behind them. What is
+ * outside a list is so by all of its tests. */
+uint make_soft_mark(inout uint at, uint count, uint index, vec3 p)
+{
+    uint mark = 0u, listed = SPL_MARK_WHOLE; /* of a list that is not done: inverted, nothing */
+    for (uint t = 0u; t < count; t++) {
+        uint flags = test_word(at), own = make_test(at, index, p);
+        bool outside = (flags & SPL_TEST_OUTSIDE) != 0u;
+        if (!outside || (flags & SPL_TEST_OR) != 0u) {
+            mark = max(mark, turn_around(listed));
+            listed = outside ? 0u : SPL_MARK_WHOLE;
+        }
+        listed = outside ? max(listed, own) : listed;
+        mark = outside ? mark : max(mark, own);
+        at += SPL_TEST_WORDS;
+    }
+    return max(mark, turn_around(listed));
+}
+
+/* The mark of item `index`, whose splat or cell lies at `p`. */
 uint make_mark(spl_draw_chunk chunk, uint index, vec3 p)
 {
-    uint first = chunk.texture, count = test_word(first), mark = 0u;
+    uint head = test_word(chunk.texture), at = chunk.texture + 1u, mode = head >> SPL_TESTS_MODE;
+    uint mark = make_soft_mark(at, head & 255u, index, p);
+    if (!CLIPS || mode == SPL_TESTS_SOFT)
+        return mark;
+    uint count = head >> SPL_TESTS_CLIP & 255u;
+    term_fold f = begin_fold();
     for (uint t = 0u; t < count; t++) {
-        uint at = first + 1u + t * SPL_TEST_WORDS, kind = test_word(at), word = test_word(at + 1u);
-        uint packed_width = test_word(at + 2u), width = packed_width & (SPL_TEST_LAST_NONE - 1u);
-        if (SHAPES && kind == SPL_TEST_SHAPE) {
-            mark = max(mark, test_shape(word, p));
-        } else if (TABLES || NUMBERS) {
-            uint code = load_code(word, width, index), own = 0u;
-            if (TABLES && kind == SPL_TEST_TABLE)
-                own = test_word(at + SPL_TEST_TABLE_WORD + (code & 31u) / 4u) >> 8u * (code & 3u) & 255u;
-            else if (NUMBERS)
-                own = test_numbers(at, code, width, (packed_width & SPL_TEST_LAST_NONE) != 0u);
-            mark = max(mark, own);
-        }
+        fold_test(f, test_word(at), make_test(at, index, p) != 0u, false);
+        at += SPL_TEST_WORDS;
     }
-    return mark;
+    end_condition(f);
+    if (mode == SPL_TESTS_OF_SOLID)
+        return mark != 0u || !f.all ? SPL_MARK_WHOLE : f.bits;
+    return !f.all ? 0u : mode == SPL_TESTS_OF_SOFT ? mark : SPL_MARK_WHOLE;
 }
 
 #ifdef SPL_CELL_LANES
@@ -97,6 +109,8 @@ uint make_mark(spl_draw_chunk chunk, uint index, vec3 p)
 uint make_panel_mark(spl_draw_chunk chunk, uint index, vec3 p, float reach)
 {
     uint first = chunk.texture, count = test_word(first), mark = 0u;
+    if (count > 255u) /* what is drawn is asked of the cells */
+        return UNKNOWN;
     for (uint t = 0u; t < count; t++) {
         uint at = test_word(first + 1u + t * SPL_TEST_WORDS + 1u), kind = test_word(first + 1u + t * SPL_TEST_WORDS);
         if (kind != SPL_TEST_SHAPE)
@@ -104,7 +118,7 @@ uint make_panel_mark(spl_draw_chunk chunk, uint index, vec3 p, float reach)
         float far = abs(p.x) + abs(p.y) + abs(p.z);
         for (uint i = 0u; i < 3u; i++)
             far += abs(test_float(at + 4u * i + 3u)) + test_float(at + 12u + i);
-        float distance = distance_to(at, test_word(at + 19u) & 3u, p), most = test_float(at + 16u);
+        float distance = distance_to(at, test_word(at + 19u) & 3u, p, true, POLYGONS), most = test_float(at + 16u);
         float above = distance - reach - 1e-5 * far - test_float(at + 15u);
         float below = most - distance - reach - 1e-5 * far, rise = test_float(at + 17u), fall = test_float(at + 18u);
         bool none = above < -2.0 * (reach + 1e-5 * far) || below < -2.0 * (reach + 1e-5 * far);

@@ -45,7 +45,7 @@ class Dataset:
         self.views = {view["name"]: view for view in info.get("views", [])}
 
     def view(self, **params):
-        """One view. Parameters as in api/openapi.yaml; vectors, and several terms of soft, are lists. A `camera` is a dict, in any convention."""
+        """One view. Parameters as in api/openapi.yaml; vectors, and several terms of soft and clip, are lists; class as text: "2,6". A `camera` is a dict, in any convention."""
         return View(*self.ask(self.info["view"], params))
 
     def thumbnail(self, width=320):
@@ -120,15 +120,17 @@ class Splatd:
 
 
 def query(params):
-    """Vectors are joined by commas; of soft, which is a list of terms, each is given by itself."""
+    """Vectors are joined by commas; of soft and clip, which are lists of terms, each is given by itself."""
     def text(value):
         if isinstance(value, bool):
             return str(value).lower()
         return ",".join(map(text, value)) if isinstance(value, (list, tuple)) else str(value)
 
-    several = params.get("soft") if isinstance(params.get("soft"), (list, tuple)) else None
-    pairs = [(name, text(value)) for name, value in params.items() if name != "soft" or several is None]
-    return urllib.parse.urlencode(pairs + [("soft", term) for term in several or []], safe=",:")
+    def each(name, value):
+        several = name in ("soft", "clip") and isinstance(value, (list, tuple))
+        return [(name, term) for term in value] if several else [(name, text(value))]
+
+    return urllib.parse.urlencode([pair for name in params for pair in each(name, params[name])], safe=",:")
 
 
 def ring(target, count, radius, height, up=(0, 0, 1)):

@@ -15,6 +15,7 @@
 #include <splatd/image.h>
 #include <splatd/method.h>
 #include <splatd/soft.h>
+#include <splatd/terms.h>
 
 SPL_BEGIN_DECLARATIONS
 
@@ -37,6 +38,7 @@ struct spl_view {
     enum spl_maps maps;         /* of methods that draw them, as SPL_METHOD_PARAMS says */
     enum spl_shapes shapes;     /* the same */
     struct spl_soft_params soft; /* what is soft, of every method */
+    struct spl_terms clip;      /* conditions, all of which hold for what is drawn, solid or soft; none: all is drawn */
     struct spl_shade_params shade; /* of colours: how what is solid is shaded, the same */
     struct spl_color_params color; /* what they show, the same */
 };

@@ -9,6 +9,7 @@
 
 #include <splatd/api.h>
 #include <splatd/error.h>
+#include <splatd/terms.h>
 
 SPL_BEGIN_DECLARATIONS
 
@@ -33,31 +34,8 @@ enum spl_soft_of {
 SPL_API const char *spl_soft_of_name(enum spl_soft_of of);
 SPL_API int spl_soft_of_from_name(const char *name); /* -1 for an unknown name */
 
-/* What a term measures of a splat. */
-enum spl_soft_measure {
-    SPL_SOFT_ATTRIBUTE, /* an optional attribute by name: of uncertainty its share of the dataset's 99th percentile, of
-                           others the value as the dataset has it */
-    SPL_SOFT_QUANTILE,  /* the same as the share of the dataset's splats that have less, 0 to 1 */
-    SPL_SOFT_AXIS,      /* distance to the line through shape[0..2] along shape[3..5] */
-    SPL_SOFT_PLANE,     /* distance to the plane through shape[0..2], positive on the side of shape[3..5] */
-    SPL_SOFT_BOX,       /* distance to the box from shape[0..2] to shape[3..5], negative inside */
-};
-
-enum { SPL_SOFT_TERMS_MAX = 16, SPL_SOFT_NAME_MAX = 32, SPL_SOFT_TEXT_MAX = 4096 };
-
-/* A splat is soft where least < measure < most, or where the measure is one of both ends that are included. Splats that
- * have no value of an attribute are solid. */
-struct spl_soft_term {
-    enum spl_soft_measure measure;
-    char name[SPL_SOFT_NAME_MAX]; /* of the attribute; "" of shapes */
-    double least, most;           /* -INFINITY, INFINITY = no end */
-    bool with_least, with_most;   /* the ends are included */
-    double shape[6];              /* world; directions of any length but 0 */
-};
-
 struct spl_soft_params {
-    uint32_t count; /* terms, of which any makes a splat soft; 0 = everything is solid */
-    struct spl_soft_term terms[SPL_SOFT_TERMS_MAX];
+    struct spl_terms what; /* of which any makes a splat soft; none: everything is solid */
     enum spl_soft_model model;
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
@@ -67,16 +45,10 @@ struct spl_soft_params {
                             together, and their colour, is scaled: the most that they ever hide of what is solid */
 };
 
-/* Reads terms, joined by " or ", and appends them to `out`:
- *   uncertainty>0.4   intensity<=300   gps_time:1.5..2   class:3-5,9   uncertainty>q0.9   0.2<uncertainty<=0.4
- *   axis:x,y,z,dx,dy,dz<4   plane:x,y,z,nx,ny,nz>0   box:x0,y0,z0,x1,y1,z1   box:…<2   NAME:* (any value)
- * Ends of ranges are included; 3-5 and 3..5 are the same, and the second reads better with signs: -5..-2. A box alone
- * is its inside. At most SPL_SOFT_TEXT_MAX bytes. SPL_E_INPUT (field "soft") says what is wrong with which term, at
- * which character; SPL_E_LIMIT above SPL_SOFT_TERMS_MAX. On failure `out` is as it was. */
+/* spl_terms_parse() of field "soft", into `what`. */
 SPL_API int spl_soft_parse(const char *text, struct spl_soft_params *out, struct spl_error *err);
 
-/* Writes the terms so that spl_soft_parse() gives the same ones; returns the length, as snprintf(). What has passed
- * spl_soft_check() is never longer than SPL_SOFT_TEXT_MAX. */
+/* spl_terms_print() of `what`. */
 SPL_API int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes);
 
 /* Are terms, model, opacity, blend, of and cover in range? SPL_E_USAGE names the field. */

@@ -12,6 +12,7 @@
 #include <splatd/log.h>
 #include <splatd/method.h>
 #include <splatd/soft.h>
+#include <splatd/terms.h>
 #include <splatd/pack.h>
 #include <splatd/render.h>
 

@@ -7,6 +7,7 @@
 #ifndef SPL_CAPSULE_GLSL
 #define SPL_CAPSULE_GLSL
 
+#include "common/cut.glsl"
 #include "common/piece.glsl"
 
 struct capsule {
@@ -127,6 +128,13 @@ float capsule_sample(capsule c, capsule_walk walk, out float z, out bool second)
     z = depth;
     second = !(way < c.middle);
     return distance;
+}
+
+/* The point of view space at depth z of the sample. */
+vec3 capsule_point(capsule c, capsule_walk walk, float z)
+{
+    precise vec2 uv = vec2(sample_of(c, walk)) + 0.5 - vec2(frame.cx, frame.cy);
+    return view_point(uv, z);
 }
 
 /* How far depth z is pushed back for blending: as a disc's of the half width that faces the eye. */

@@ -10,10 +10,14 @@
 
 layout(constant_id = 2) const uint CLIPPED = 0;
 
-/* Where a disc ends; compare with the offset of a sample from its centre, in radii. */
+/* Where a disc ends; compare with the offset of a sample from its centre, in radii. And what shapes that cut it ask for:
+ * its centre, radius, and what is known of it. */
 struct clip_line {
     vec3 direction; /* view space */
     float end;
+    vec3 center;
+    float radius;
+    uint known;
 };
 
 clip_line load_clip(spl_draw_chunk chunk, splat s)
@@ -21,6 +25,9 @@ clip_line load_clip(spl_draw_chunk chunk, splat s)
     clip_line line;
     line.direction = vec3(0.0);
     line.end = 1.0;
+    line.center = s.position;
+    line.radius = s.radius;
+    line.known = load_known(chunk, mark_byte(s.index));
     if (CLIPPED == 0u)
         return line;
     uint at = chunk.color_word + (chunk.color_bits >> SPL_COLOR_CLIP) - 1u, own = s.index >> 5, bit = s.index & 31u;
@@ -48,10 +55,25 @@ bool is_drawn(spl_draw_chunk chunk, uint index)
     return (CLIPPED == 0u || !is_linear(chunk, index)) && !is_soft(chunk, mark_byte(index));
 }
 
-/* The squared distance of a sample that lies `offset` off the centre: 1 and more beyond the line. No comparison: see
- * disc.glsl. */
+#ifdef SPL_TEXELS_TESTS
+/* 1 and more where shapes leave nothing of the disc at `offset`. What is drawn beyond its rim, as it is smaller than a
+ * sample, is asked of at its rim. */
+float cut(clip_line line, vec3 offset)
+{
+    precise float within = line.radius / sqrt(max(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z, 1.0));
+    precise vec3 p = line.center + within * offset;
+    return is_kept(p, line.known) ? 0.0 : 2.0;
+}
+#endif
+
+/* The squared distance of a sample that lies `offset` off the centre: 1 and more beyond the line, and where the disc is
+ * cut. No comparison: see disc.glsl. */
 float clip(clip_line line, vec3 offset, float distance)
 {
+#ifdef SPL_TEXELS_TESTS
+    if (CUT != 0u)
+        distance = max(distance, cut(line, offset));
+#endif
     if (CLIPPED == 0u)
         return distance;
     float beyond = offset.x * line.direction.x + offset.y * line.direction.y + offset.z * line.direction.z - line.end;

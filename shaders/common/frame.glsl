@@ -40,6 +40,13 @@ vec2 image_place(vec3 p)
     return place;
 }
 
+/* The point of view space at depth z that falls uv off the principal point. */
+vec3 view_point(vec2 uv, float z)
+{
+    precise vec2 beside = vec2(uv.x * frame.inverse_fx, uv.y * frame.inverse_fy) * ray_scale(z);
+    return vec3(beside, z);
+}
+
 /* Words of a buffer as texels, under a number SPL_TEXELS_…; these and the SPL_STORAGE_… come from the kernel's row in
  * shaders/meson.build. */
 #define SPL_TEXEL_BUFFER(number) layout(binding = number, r32ui) uniform readonly uimageBuffer

@@ -28,6 +28,7 @@ struct panel_draw {
     vec3 u, v;          /* products with (ray, 1) of sample - principal point: cells along u and v at depth 1 */
     vec2 eye;           /* the foot of the eye in cells of the panel */
     float radius;       /* by which it blends */
+    uint known;         /* of shapes that cut it: cut.glsl */
     uint paint;         /* its entry of the palette */
     /* Of the piece: */
     vec3 facing;        /* its normal, view space, unit */
@@ -56,6 +57,7 @@ panel_draw begin_panel(splat_run run, uint index)
     d.own = load_panel(run.chunk, index);
     if (is_soft(run.chunk, index * 4u * SPL_MARKS_PANEL)) /* all of its cells are, or none */
         d.own.known = false;
+    d.known = load_known(run.chunk, index * 4u * SPL_MARKS_PANEL);
     d.id = run.chunk.first_id + index;
     vec3 o = plane.origin, u = plane.u, v = plane.v;
     precise float inverse_cell = 1.0 / plane.cell;
@@ -170,7 +172,7 @@ void draw_sample(panel_draw d, ivec2 at)
     float within = clamp(z, d.least, d.most);
     uvec2 cell = uvec2(clamp(place, vec2(0.0), vec2(float(SPL_PANEL_SIDE) - 0.5)));
     bool inside = z > 0.0 && covers(d, place) && within >= frame.near && within <= frame.far;
-    if (inside && at.y <= d.last.y && panel_has(d.own, cell))
+    if (inside && at.y <= d.last.y && panel_has(d.own, cell) && is_kept(view_point(uv, within), d.known))
         panel_fragment(d, at, within, 0.0, panel_push(d, within, tilt), place);
 }
 
@@ -208,7 +210,7 @@ void draw_cell(splat_run run, panel_draw d, uvec2 cell, vec3 p)
     tilt = PARALLEL != 0u ? plane_tilt(d, uv) : tilt;
     bool inside = z >= frame.near && z <= frame.far && place.x >= run.low.x && place.y >= run.low.y &&
                   place.x < run.high.x + 1.0 && place.y < run.high.y + 1.0;
-    if (inside && panel_has(d.own, cell))
+    if (inside && panel_has(d.own, cell) && is_kept(p, d.known))
         panel_fragment(d, ivec2(place), z, 1.0, panel_push(d, z, tilt), vec2(cell) + 0.5);
 }
 

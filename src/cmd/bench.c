@@ -32,7 +32,7 @@ static void warn(const struct spl_cmd_bench_arguments *a, const struct spl_bench
     spl_view_init(&view);
     view.layers = 1u << SPL_LAYER_COLOR;
     view.soft = a->soft;
-    for (size_t d = 0; d < a->bench.dataset_count && a->soft.count; d++) {
+    for (size_t d = 0; d < a->bench.dataset_count && a->soft.what.count; d++) {
         struct spl_frame_stats stats = {0};
         for (size_t i = 0; i < report->row_count; i++)
             if (report->rows[i].dataset == a->datasets[d])

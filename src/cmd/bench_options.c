@@ -129,6 +129,14 @@ static int take_soft(void *arguments, const char *option, char *text, struct spl
     return SPL_OK;
 }
 
+static int take_clip(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    if (spl_terms_parse(text, "clip", &((struct spl_cmd_bench_arguments *)arguments)->bench.clip, &why))
+        return spl_fail_field(err, SPL_E_USAGE, "clip", "%s '%.60s': %s", option, text, why.message);
+    return SPL_OK;
+}
+
 static const char *name_of_model(int model)
 {
     return spl_soft_model_name((enum spl_soft_model)model);
@@ -194,6 +202,7 @@ static const struct spl_cmd_option options[] = {
     {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
     {"maps", "on|off|both", "colours from stations' maps, where the dataset has them", .otherwise = "on; both with -o",
      .take = take_maps},
+    {"clip", "TERMS", "what is drawn, as of 'splatd render': of frame times alone, without -o", .take = take_clip},
     {"soft", "TERMS",
      "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is solid; "
      "with -o the first model is the reference of all of them",
@@ -306,12 +315,17 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
 static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
 {
     static const struct spl_soft_params usual = {.opacity = 0.3, .cover = 1};
-    if (!a->soft.count && a->soft_model_count)
+    if (a->bench.clip.count && a->sweep.output)
+        return spl_fail(err, SPL_E_USAGE, "--clip is of frame times: leave -o out");
+    int rc = spl_terms_check(&a->bench.clip, "clip", err);
+    if (rc)
+        return rc;
+    if (!a->soft.what.count && a->soft_model_count)
         return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'class:3-5'");
-    if (!a->soft.count && (a->soft.opacity != usual.opacity || a->soft.cover != usual.cover || a->soft.blend != 0))
+    if (!a->soft.what.count && (a->soft.opacity != usual.opacity || a->soft.cover != usual.cover || a->soft.blend != 0))
         return spl_fail(err, SPL_E_USAGE, "--soft-opacity, --soft-cover and --soft-blend are of what is soft: give them "
                                           "with --soft 'class:3-5'");
-    if (a->soft.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
+    if (a->soft.what.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
         return spl_fail(err, SPL_E_USAGE,
                         "--reference and --photographs show nothing soft: with --soft the reference is the dataset's "
                         "own render");
@@ -321,7 +335,7 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
     a->bench.softs = a->softs;
     a->sweep.softs = a->softs;
     a->bench.soft_count = 1;
-    for (size_t i = 0; a->soft.count && i < a->soft_model_count; i++) {
+    for (size_t i = 0; a->soft.what.count && i < a->soft_model_count; i++) {
         struct spl_soft_params *soft = &a->softs[a->bench.soft_count++];
         *soft = a->soft;
         soft->model = a->soft_models[i];

@@ -145,7 +145,7 @@ static int make_settings(const struct spl_cmd_bench_sweep *o, const struct spl_d
         struct spl_setting s = {.method = o->methods[i % each / o->supersample_count / o->lod_count],
                                 .lod = o->lods[i / o->supersample_count % o->lod_count],
                                 .supersample = o->supersamples[i % o->supersample_count],
-                                .soft = soft->count ? 1 + (uint32_t)soft->model : 0};
+                                .soft = soft->what.count ? 1 + (uint32_t)soft->model : 0};
         rc = add_colors(o, info, s, *out, count, err);
     }
     if (!rc && *count > SPL_PROFILE_POINTS_MAX)

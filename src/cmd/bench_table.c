@@ -6,7 +6,7 @@
 
 static const char *name_soft(const struct spl_soft_params *soft)
 {
-    return soft->count ? spl_soft_model_name(soft->model) : "solid";
+    return soft->what.count ? spl_soft_model_name(soft->model) : "solid";
 }
 
 void spl_cmd_bench_print_table(const struct spl_bench_options *o, const struct spl_bench_report *r)

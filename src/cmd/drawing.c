@@ -102,6 +102,20 @@ int spl_cmd_take_soft(void *drawing, const char *option, char *text, struct spl_
     return rc ? spl_fail_field(err, SPL_E_USAGE, "soft", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
 }
 
+int spl_cmd_take_clip(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_terms_parse(text, "clip", &((struct spl_cmd_drawing *)drawing)->view.clip, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "clip", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
+int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_terms_parse_classes(text, &((struct spl_cmd_drawing *)drawing)->view.clip, &why);
+    return rc ? spl_fail_field(err, SPL_E_USAGE, "class", "%s '%.60s': %s", option, text, why.message) : SPL_OK;
+}
+
 int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     struct spl_error why = {0};
@@ -125,7 +139,7 @@ int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl
 
 int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
 {
-    if (!*drawing->soft_option || drawing->view.soft.count)
+    if (!*drawing->soft_option || drawing->view.soft.what.count)
         return SPL_OK;
     return spl_fail_field(err, SPL_E_USAGE, "soft",
                           "%s is of what is soft, and nothing is: say what with --soft, as in --soft 'class:3-5'; "
@@ -137,19 +151,22 @@ void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *da
                        const struct spl_frame_stats *stats)
 {
     uint32_t told = 0;
-    for (uint32_t i = 0; i < view->soft.count; i++) {
-        char reason[SPL_SOFT_REASON_MAX], text[SPL_SOFT_TEXT_MAX];
-        const struct spl_soft_params one = {.count = 1, .terms = {view->soft.terms[i]}};
-        spl_soft_explain(&view->soft.terms[i], spl_dataset_get_info(dataset), reason);
+    for (uint32_t i = 0; i < view->soft.what.count; i++) {
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_TERMS_TEXT_MAX];
+        uint32_t next = i + 1;
+        struct spl_terms one = view->soft.what;
+        spl_soft_explain(&one.terms[i], spl_dataset_get_info(dataset), reason);
         if (!*reason)
             continue;
-        spl_soft_print(&one, text, sizeof text);
+        for (uint32_t t = next; t < one.count; t++) /* a text of its own */
+            one.terms[t].joint = SPL_TERM_AND;
+        spl_terms_print_condition(&one, i, &next, text, sizeof text);
         fprintf(stderr, "splatd: nothing is soft by '%s': ", text);
         spl_cmd_put_text(stderr, reason, 0);
         fputc('\n', stderr);
         told++;
     }
-    if (stats && told < view->soft.count && spl_view_shows_soft(view) && !stats->soft_drawn)
+    if (stats && told < view->soft.what.count && spl_view_shows_soft(view) && !stats->soft_drawn)
         fprintf(stderr, "splatd: nothing of what is in view is soft, or it lies behind what is not\n");
 }
 
@@ -205,6 +222,16 @@ void spl_cmd_print_methods(FILE *out, size_t column)
             if ((info->params & ~SPL_PARAMS_OF_ALL) >> i & 1)
                 print_param(out, (enum spl_method_param)i, column);
     }
+}
+
+void spl_cmd_print_clip(FILE *out, size_t column)
+{
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --clip TERMS"), column,
+                          "what is drawn: 'z<2.5', 'z:1.2..1.3', 'box:x0,y0,z0,x1,y1,z1' (and degrees it is turned), "
+                          "'polygon:x,y,x,y,x,y' ('@0..2.5': its heights), 'plane:x,y,z,nx,ny,nz>0', 'intensity>0.2', any "
+                          "term of --soft; '!' before a term: what is not in it; ' or ' joins; of several --clip all hold");
+    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --class LIST"), column,
+                          "the classes that are drawn: 2,6 or 3-5; '!7': all others");
 }
 
 /* What any method takes. */

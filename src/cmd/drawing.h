@@ -47,6 +47,9 @@ int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl
 int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl_error *err);
 void spl_cmd_print_soft(FILE *out, size_t column);
+int spl_cmd_take_clip(void *drawing, const char *option, char *text, struct spl_error *err);
+int spl_cmd_take_class(void *drawing, const char *option, char *text, struct spl_error *err);
+void spl_cmd_print_clip(FILE *out, size_t column);
 void spl_cmd_print_colors(FILE *out, size_t column);
 void spl_cmd_print_methods(FILE *out, size_t column);
 
@@ -59,6 +62,9 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
          .take = spl_cmd_take_background},                                                                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
+        {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \
+        {"clip", "TERMS", NULL, .take = spl_cmd_take_clip},                                                            \
+        {"class", "LIST", NULL, .take = spl_cmd_take_class},                                                           \
         {.help = "Colours and their shading, with any method:", .print = spl_cmd_print_colors},                        \
         {"color-by", "WHAT", NULL, .take = spl_cmd_take_color},                                                        \
         {"range", "LOW..HIGH", NULL, .take = spl_cmd_take_range},                                                      \

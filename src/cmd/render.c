@@ -53,7 +53,7 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_TEXT(struct arguments, view)},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
-    {"crs", "EPSG:N", "what --eye, --target and shapes of --soft are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
+    {"crs", "EPSG:N", "what --eye, --target and shapes of --soft and --clip are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
     {"up", "X,Y,Z", "what is up in the image", SPL_CMD_VECTOR(struct arguments, up)},
     {"fov", "DEG", "vertical field of view; or a pinhole in pixels:", SPL_CMD_REAL(struct arguments, fov, 1e-6, 179)},
     {"fx", "F", "focal length", SPL_CMD_REAL(struct arguments, fx, 1e-6, 1e9)},
@@ -107,6 +107,10 @@ static const struct spl_cmd_table table = {
         "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
         "Without what lies above a plane, a roof or a ceiling:\n"
         "  splatd render courtyard.spld --soft 'plane:0,0,3,0,0,1>0' --soft-opacity 0 -o open.jpg\n"
+        "What lies above 2.5 cut away; a slice of 10 cm; what lies in one building's plot, but for vegetation:\n"
+        "  splatd render courtyard.spld --clip 'z<2.5' -o cut.jpg\n"
+        "  splatd render courtyard.spld --clip 'z:1.2..1.3' -o slice.jpg\n"
+        "  splatd render courtyard.spld --clip 'polygon:-4,-4,6,-4,6,5,-4,5' -o plot.jpg\n"
         "Cut out, four samples a pixel side, to another program:\n"
         "  splatd render courtyard.spld --background transparent --supersample 4 --format png -o - | file -\n\n",
     .options = options,
@@ -149,7 +153,9 @@ static int place(struct arguments *a, const struct spl_dataset *dataset, struct 
     if (!rc && !isnan(a->target[0]))
         rc = hook.hook.to_world(&hook.hook, a->crs, "--target", a->target, a->target, err);
     if (!rc)
-        rc = spl_soft_to_world(&a->drawing.view.soft, a->crs, &hook.hook, err);
+        rc = spl_terms_to_world(&a->drawing.view.soft.what, "soft", a->crs, &hook.hook, err);
+    if (!rc)
+        rc = spl_terms_to_world(&a->drawing.view.clip, "clip", a->crs, &hook.hook, err);
     spl_places_destroy(places);
     return rc;
 }

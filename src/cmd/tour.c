@@ -155,7 +155,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) &&
              !(rc = spl_fade_sample(&path, &motion, a->count, &a->fades, err)) && a->video)
         rc = spl_video_check(a->cameras->width, a->cameras->height, err);
-    if (!rc && a->fades && !a->drawing.view.soft.count)
+    if (!rc && a->fades && !a->drawing.view.soft.what.count)
         rc = spl_fail_field(err, SPL_E_USAGE, "soft",
                             "the path changes soft_opacity, soft_cover or soft_blend, and nothing is soft: say what "
                             "with --soft, as in --soft 'class:3-5'");

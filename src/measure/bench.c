@@ -87,6 +87,7 @@ static int render(struct bench *b, size_t row, uint32_t frame, struct sample *sa
                                             SPL_TEXTURE_ATOMS, o->maps},
                       &view);
     view.soft = *b->report->rows[row].drawn_soft;
+    view.clip = o->clip;
     double share = (double)frame / (o->frames - 1);
     int status = spl_path_get_camera(&b->paths[row_dataset(o, row)], share, o->width, o->height, &view.camera, err);
     if (status)

@@ -21,6 +21,7 @@ struct spl_bench_options {
     enum spl_setting_maps maps;          /* of datasets with maps; NO_MAPS = as views have it */
     const struct spl_soft_params *softs; /* what is soft and how; without terms everything is solid */
     size_t soft_count;                   /* at least 1 */
+    struct spl_terms clip;               /* what is drawn of all */
     uint32_t width, height;
     uint32_t frames;                     /* places on the path, at least 2 */
     const struct spl_path *path;         /* NULL = each dataset's own orbit */

@@ -241,7 +241,7 @@ static struct standing assess(const struct spl_planner *planner, size_t index, c
     struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
     double spread = planner->spread;
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
-    if (demand->soft && demand->soft->count) {
+    if (demand->soft && demand->soft->what.count) {
         struct spl_soft_work work = work_of(&c->setting, demand->width, demand->height, demand->layer);
         work.spheres = spl_soft_guess_spheres(demand->soft_splats, demand->soft_splats > 0 ? demand->soft_share : NAN,
                                               work.megasamples, work.lod);

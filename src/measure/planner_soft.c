@@ -38,7 +38,7 @@ static bool is_drawn(const struct spl_soft_params *soft)
 /* FNV-1a; never 0. Opacity and border change what a frame shows, and hardly what it takes. */
 static uint64_t key_of(const struct spl_soft_params *soft, enum spl_layer layer)
 {
-    char text[SPL_SOFT_TEXT_MAX + 1];
+    char text[SPL_TERMS_TEXT_MAX + 1];
     uint64_t key = 14695981039346656037u ^ ((uint64_t)layer << 8 | (uint64_t)soft->of << 4 | (uint64_t)soft->model << 1 | is_drawn(soft));
     spl_soft_print(soft, text, sizeof text);
     for (const char *c = text; *c; c++)

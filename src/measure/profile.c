@@ -44,7 +44,7 @@ void spl_setting_apply_soft(const struct spl_setting *setting, const struct spl_
 {
     spl_setting_apply(setting, view);
     if (!setting->soft || !terms) {
-        view->soft.count = 0;
+        view->soft.what.count = 0;
         return;
     }
     view->soft = *terms;

@@ -171,7 +171,7 @@ static int read_soft_model(const json_t *object, const struct spl_profile *profi
     const json_t *json = json_object_get(object, "soft_model");
     int model = json_is_string(json) ? spl_soft_model_from_name(json_string_value(json)) : -1;
     *out = model < 0 ? 0 : 1 + (uint32_t)model;
-    if (json && (model < 0 || !profile->soft.count))
+    if (json && (model < 0 || !profile->soft.what.count))
         return spl_fail_field(err, SPL_E_INPUT, "soft_model",
                               model < 0 ? "%s: point %zu: 'soft_model' is no model's name"
                                         : "%s: point %zu has a 'soft_model', and the profile no 'soft' that it is of",
@@ -386,8 +386,8 @@ static json_t *point_to_json(const struct spl_profile_point *point)
 
 static json_t *soft_to_json(const struct spl_soft_params *soft)
 {
-    char terms[SPL_SOFT_TEXT_MAX + 1];
-    if (!soft->count)
+    char terms[SPL_TERMS_TEXT_MAX + 1];
+    if (!soft->what.count)
         return NULL;
     spl_soft_print(soft, terms, sizeof terms);
     return json_pack("{s:s, s:f, s:f, s:f}", "terms", terms, "opacity", soft->opacity, "cover", soft->cover, "blend",
@@ -400,7 +400,7 @@ json_t *spl_profile_to_json(const struct spl_profile *profile)
     for (size_t i = 0; i < profile->count; i++)
         json_array_append_new(points, point_to_json(&profile->points[i]));
     return json_pack("{s:s, s:i, s:s, s:{s:s, s:o}, s:{s:s, s:s, s:s, s:b}, s:s, s:i, s:i, s:i, s:o*, s:o}", "format",
-                     FORMAT, "format_version", profile->soft.count ? SPL_PROFILE_VERSION : 1, "splatd",
+                     FORMAT, "format_version", profile->soft.what.count ? SPL_PROFILE_VERSION : 1, "splatd",
                      profile->splatd, "dataset", "id", profile->dataset_id, "version",
                      json_sprintf("%016" PRIx64, profile->dataset_version), "device", "backend", profile->backend,
                      "name", profile->device, "driver", profile->driver, "software", profile->software, "reference",

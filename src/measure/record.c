@@ -167,7 +167,7 @@ static json_t *plan_setting(const struct spl_setting *s)
 /* What is soft where something is, and the model of the reference. */
 static json_t *plan_soft(const struct spl_soft_params *soft)
 {
-    char terms[SPL_SOFT_TEXT_MAX + 1];
+    char terms[SPL_TERMS_TEXT_MAX + 1];
     if (!soft)
         return NULL;
     spl_soft_print(soft, terms, sizeof terms);

@@ -54,7 +54,8 @@ static struct spl_draw_key key_of(const struct spl_draw_origin *origin, const st
                                  .apart = chunk->color_bits >> SPL_COLOR_CLIP || origin->lined,
                                  .marked = chunk->marks != 0,
                                  .cells = origin->cells,
-                                 .role = origin->role};
+                                 .role = origin->role,
+                                 .cut = origin->cut};
 }
 
 static uint64_t word_of(const struct spl_draw_key *key)
@@ -64,12 +65,18 @@ static uint64_t word_of(const struct spl_draw_key *key)
            (uint32_t)key->planes << 3 | (uint32_t)key->smooth << 2 | (uint32_t)key->apart << 1 | key->back;
 }
 
+static bool are_same(const struct spl_draw_key *a, const struct spl_draw_key *b)
+{
+    return word_of(a) == word_of(b) && a->cut == b->cut;
+}
+
 void spl_draw_list_clear(struct spl_draw_list *list)
 {
     list->chunk_count = list->entry_count = list->batch_count = list->map_count = list->first_back_chunk = 0;
     list->first_soft_chunk = list->first_mark_chunk = list->test_count = 0;
     list->mark_words = SPL_MARKS_NONE;
-    list->test_kinds = 0;
+    list->test_kinds = list->cut_kinds = 0;
+    list->cut_count = 0;
     memset(list->drawn, 0, sizeof list->drawn);
     list->listed_splats = list->sample_splats = list->sample_panels = 0;
     list->nodes = 0;
@@ -156,6 +163,25 @@ int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, u
     return SPL_OK;
 }
 
+const struct spl_draw_cut *spl_draw_list_find_cut(const struct spl_draw_list *list, uint32_t cut)
+{
+    for (size_t i = 0; i < list->cut_count; i++)
+        if (list->cuts[i].cut == cut)
+            return &list->cuts[i];
+    return NULL;
+}
+
+int spl_draw_list_add_cut(struct spl_draw_list *list, uint32_t cut, const uint32_t *words, uint32_t count,
+                          struct spl_error *err)
+{
+    struct spl_draw_cut added = {.cut = cut};
+    int rc = grow((void **)&list->cuts, &list->cut_capacity, list->cut_count + 1, sizeof *list->cuts, err);
+    rc = rc ? rc : spl_draw_list_add_tests(list, words, count, &added.word, err);
+    if (!rc)
+        list->cuts[list->cut_count++] = added;
+    return rc;
+}
+
 /* Batches by their keys, open addressing. */
 struct table {
     uint32_t *batch; /* + 1; 0 = free */
@@ -165,9 +191,9 @@ struct table {
 /* Where `key` is or would be. */
 static uint32_t *find(const struct table *table, const struct spl_draw_list *list, const struct spl_draw_key *key)
 {
-    uint64_t word = word_of(key);
+    uint64_t word = word_of(key) ^ (uint64_t)key->cut << 20;
     size_t at = (size_t)(word * 0x9e3779b97f4a7c15ull >> 32) & (table->size - 1);
-    while (table->batch[at] && word_of(&list->batches[table->batch[at] - 1].key) != word)
+    while (table->batch[at] && !are_same(&list->batches[table->batch[at] - 1].key, key))
         at = (at + 1) & (table->size - 1);
     return &table->batch[at];
 }
@@ -221,7 +247,7 @@ static int count_batches(struct spl_draw_list *list, uint32_t *batch_of_chunk, s
         before += worth(key->kind, &list->chunks[i]);
         key->back = i >= list->first_back_chunk && key->role == SPL_ROLE_SOLID;
         const uint64_t work = list->work_of_chunk[i];
-        if (i && word_of(key) == word_of(key - 1) && has_room(&list->batches[batch_of_chunk[i - 1]], work))
+        if (i && are_same(key, key - 1) && has_room(&list->batches[batch_of_chunk[i - 1]], work))
             batch_of_chunk[i] = batch_of_chunk[i - 1]; /* most are */
         else
             rc = get_batch(list, &table, key, work, &batch_of_chunk[i], err);
@@ -363,5 +389,6 @@ void spl_draw_list_finish(struct spl_draw_list *list)
     free(list->key_of_chunk);
     free(list->work_of_chunk);
     free(list->tests);
+    free(list->cuts);
     *list = (struct spl_draw_list){0};
 }

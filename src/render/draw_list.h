@@ -37,6 +37,7 @@ struct spl_draw_key {
     bool cells;     /* panels and meshes whose cells are drawn, whatever the view says */
     uint8_t role;   /* enum spl_draw_role */
     uint16_t trims; /* the station whose map trims them, plus 1; 0 = none does */
+    uint16_t cut;   /* bit per term of the view's clip whose shape cuts them; solid ones alone */
 };
 
 /* Draw-list entries of one key: all of them where they are not too much work. */
@@ -50,6 +51,11 @@ struct spl_draw_batch {
 /* Cells of the image that take colours from the map of a station. */
 struct spl_draw_map {
     uint32_t station, first_entry, cells;
+};
+
+/* What samples of chunks that shapes cut are asked of: the terms' bits, and where it is among the tests. */
+struct spl_draw_cut {
+    uint32_t cut, word;
 };
 
 struct spl_draw_list {
@@ -77,7 +83,10 @@ struct spl_draw_list {
     uint64_t mark_words;               /* of the buffer of marks, whose first SPL_MARKS_NONE are nobody's */
     uint32_t *tests;                   /* what marks are made of, see marks.h: words */
     size_t test_count, test_capacity;
-    uint32_t test_kinds;               /* bit per SPL_TEST_NUMBERS …: kinds of tests among them */
+    uint32_t test_kinds;               /* bit per SPL_TEST_NUMBERS … and SPL_TESTS_HAVE_CLIP …: what is among them */
+    struct spl_draw_cut *cuts;         /* each set of terms that cuts any chunk */
+    size_t cut_count, cut_capacity;
+    uint32_t cut_kinds;                /* SPL_CUT_* of all of them */
     bool complete;                     /* false: a coarser node stood in for pages that are not resident */
 };
 
@@ -91,6 +100,7 @@ struct spl_draw_origin {
     bool lined;          /* its linear splats are not drawn: lines stand for them */
     bool cells;          /* as in spl_draw_key */
     uint8_t role;        /* enum spl_draw_role */
+    uint16_t cut;        /* as in spl_draw_key */
 };
 
 /* Appends a chunk whose kernels look at `looks` samples at most for each of its splats, vertices, panels or meshes.
@@ -104,6 +114,11 @@ int spl_draw_list_append(struct spl_draw_list *list, const struct spl_draw_list 
 /* Appends `count` words to the tests; *first is where they begin. SPL_E_NOMEM. */
 int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, uint32_t count, uint32_t *first,
                             struct spl_error *err);
+
+/* Where it is among the tests what samples that the terms of `cut` cut are asked of; added where it is not there. */
+const struct spl_draw_cut *spl_draw_list_find_cut(const struct spl_draw_list *list, uint32_t cut); /* NULL = nowhere */
+int spl_draw_list_add_cut(struct spl_draw_list *list, uint32_t cut, const uint32_t *words, uint32_t count,
+                          struct spl_error *err);
 
 /* Lays out entries and batches of all chunks added: solid ones in the order in which they were, soft ones by first_id
  * and, of one id, in that order, and those to mark. SPL_E_NOMEM. */

@@ -106,6 +106,7 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
         .mapped = ask_map,
         .marks = job->marks.count ? &job->marks : NULL,
         .draws_soft = job->view->soft.opacity > 0,
+        .clip = job->clip.count ? &job->clip : NULL,
         .context = job,
     };
 }

@@ -25,6 +25,7 @@ struct spl_frame_job {
     struct spl_frame *frame;
     struct spl_tiling tiling;
     struct spl_marks marks;                /* what is soft; count 0 = nothing */
+    struct spl_marks clip;                 /* what is drawn; count 0 = all */
     struct spl_paint paint;                /* what its colours show; kind 0 = the splats' own */
     const atomic_bool *cancelled;  // may be NULL
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */

@@ -5,12 +5,14 @@
 #include <stdio.h>
 #include <string.h>
 
+#include <splatd/render.h>
+
 #include "render/marks.h"
 #include "render/soft/hints.h"
 
-static bool is_shape(const struct spl_soft_term *term)
+static bool is_shape(const struct spl_term *term)
 {
-    return term->measure != SPL_SOFT_ATTRIBUTE && term->measure != SPL_SOFT_QUANTILE;
+    return term->measure != SPL_TERM_ATTRIBUTE && term->measure != SPL_TERM_QUANTILE;
 }
 
 int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name)
@@ -36,10 +38,11 @@ int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name,
                           hint ? "; " : "", hint ? hint : "");
 }
 
-static int refuse_values(const struct spl_dataset_info *info, const struct spl_soft_term *term, struct spl_error *err)
+static int refuse_values(const struct spl_dataset_info *info, const struct spl_term *term, const char *field,
+                         struct spl_error *err)
 {
-    const bool quantile = term->measure == SPL_SOFT_QUANTILE;
-    return spl_fail_field(err, SPL_E_INPUT, "soft",
+    const bool quantile = term->measure == SPL_TERM_QUANTILE;
+    return spl_fail_field(err, SPL_E_INPUT, field,
                           "dataset '%s' does not say how its values of '%s' are distributed, which %s of them needs: it "
                           "was packed by a splatd from before; pack it again%s",
                           info->id, term->name, quantile ? "a quantile" : "a share of the 99th percentile",
@@ -66,7 +69,7 @@ double spl_marks_value_at(const struct spl_stream_values *values, double q)
     return kept[below] + (kept[below + 1] - kept[below]) * (at - below);
 }
 
-static int resolve(const struct spl_soft_term *term, double blend, const struct spl_dataset_info *info,
+static int resolve(const struct spl_term *term, double blend, const struct spl_dataset_info *info, const char *field,
                    struct spl_marks_term *out, struct spl_error *err)
 {
     const struct spl_stream_values *values = NULL;
@@ -77,7 +80,11 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
                                    .with_least = term->with_least,
                                    .with_most = term->with_most,
                                    .blend_least = blend,
-                                   .blend_most = blend};
+                                   .blend_most = blend,
+                                   .outside = term->outside,
+                                   .joint = term->joint,
+                                   .first_corner = term->first_corner,
+                                   .corners = term->corners};
     memcpy(out->shape, term->shape, sizeof out->shape);
     if (is_shape(term))
         return SPL_OK;
@@ -85,18 +92,18 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
     if (out->stream < 0) {
         char hint[SPL_SOFT_HINT_MAX];
         const bool hinted = spl_soft_hint_name(term, info, hint);
-        return spl_marks_refuse_name(info, term->name, "soft", "axis, plane and box", hinted ? hint : NULL, err);
+        return spl_marks_refuse_name(info, term->name, field, "shapes are left: axis, plane, box, polygon, x, y and z", hinted ? hint : NULL, err);
     }
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
     out->complete = values && values->count == info->leaf_splats;
-    const bool share = term->measure == SPL_SOFT_ATTRIBUTE && !strcmp(term->name, "uncertainty");
-    if ((term->measure == SPL_SOFT_QUANTILE || share) && !values)
-        return refuse_values(info, term, err);
+    const bool share = term->measure == SPL_TERM_ATTRIBUTE && !strcmp(term->name, "uncertainty");
+    if ((term->measure == SPL_TERM_QUANTILE || share) && !values)
+        return refuse_values(info, term, field, err);
     if (share) { /* without ends it is infinite times 0 where all are certain */
         out->least = isfinite(term->least) ? term->least * values->p99 : term->least;
         out->most = isfinite(term->most) ? term->most * values->p99 : term->most;
         out->blend_least = out->blend_most = blend * values->p99;
-    } else if (term->measure == SPL_SOFT_QUANTILE) {
+    } else if (term->measure == SPL_TERM_QUANTILE) {
         out->least = isfinite(term->least) ? spl_marks_value_at(values, term->least) : term->least;
         out->most = isfinite(term->most) ? spl_marks_value_at(values, term->most) : term->most;
         out->blend_least = isfinite(term->least) ? spl_marks_value_at(values, term->least + blend) - out->least : 0;
@@ -107,14 +114,26 @@ static int resolve(const struct spl_soft_term *term, double blend, const struct 
     return SPL_OK;
 }
 
-int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
-                      struct spl_marks_term *ends, struct spl_error *err)
+static int resolve_all(const struct spl_terms *terms, double blend, const struct spl_dataset_info *info,
+                       const char *field, struct spl_marks_term *ends, struct spl_error *err)
 {
     struct spl_marks_term one;
     int rc = SPL_OK;
-    for (uint32_t i = 0; i < soft->count && !rc; i++)
-        rc = resolve(&soft->terms[i], soft->blend, info, ends ? &ends[i] : &one, err);
+    for (uint32_t i = 0; i < terms->count && !rc; i++)
+        rc = resolve(&terms->terms[i], blend, info, field, ends ? &ends[i] : &one, err);
     return rc;
+}
+
+int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
+                      struct spl_marks_term *ends, struct spl_error *err)
+{
+    return resolve_all(&soft->what, soft->blend, info, "soft", ends, err);
+}
+
+int spl_marks_check_view(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    int rc = spl_marks_resolve(&view->soft, info, NULL, err);
+    return rc ? rc : resolve_all(&view->clip, 0, info, "clip", NULL, err);
 }
 
 static double value_of(const struct spl_stream *stream, enum spl_stream_type type, uint32_t number)
@@ -179,17 +198,42 @@ static void find_numbers(struct spl_marks_term *term, const struct spl_stream *s
              &term->share_step_high);
 }
 
-int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, const struct spl_dataset *dataset,
-                   struct spl_error *err)
+static int init(struct spl_marks *marks, const struct spl_terms *terms, double blend, const char *field,
+                const struct spl_dataset *dataset, struct spl_error *err)
 {
     uint32_t streams;
     *marks = (struct spl_marks){.streams = spl_dataset_get_streams(dataset, &streams)};
-    int rc = spl_marks_resolve(soft, spl_dataset_get_info(dataset), marks->terms, err);
+    int rc = resolve_all(terms, blend, spl_dataset_get_info(dataset), field, marks->terms, err);
     if (rc)
         return rc;
-    marks->count = soft->count;
+    marks->count = terms->count;
+    memcpy(marks->corners, terms->corners, sizeof marks->corners);
     spl_marks_find_numbers(marks);
     return SPL_OK;
+}
+
+int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, const struct spl_dataset *dataset,
+                   struct spl_error *err)
+{
+    return init(marks, &soft->what, soft->blend, "soft", dataset, err);
+}
+
+int spl_marks_init_clip(struct spl_marks *marks, const struct spl_terms *clip, const struct spl_dataset *dataset,
+                        struct spl_error *err)
+{
+    uint32_t mixed = 0;
+    int rc = init(marks, clip, 0, "clip", dataset, err);
+    for (uint32_t i = 0, end; !rc && i < marks->count; i = end) {
+        bool kinds[2] = {false, false};
+        end = i;
+        do
+            kinds[marks->terms[end].stream < 0] = true;
+        while (++end < marks->count && marks->terms[end].joint != SPL_TERM_AND);
+        mixed += kinds[0] && kinds[1];
+        for (uint32_t t = i; t < end; t++)
+            marks->terms[t].mixed = kinds[0] && kinds[1] ? mixed : 0;
+    }
+    return rc;
 }
 
 void spl_marks_find_numbers(struct spl_marks *marks)

@@ -139,10 +139,11 @@ uint64_t spl_tile_get_map_work(uint32_t cells);
 int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 
 /* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), of which some splats
- * are soft (common/marks.glsl), or several of these; NULL = as those that have none, but for marks. */
-enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_COUNT = 8 };
-/* The constants that say whether a kernel looks at marks, and what colours show (SPL_PAINT_*). */
-enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4 };
+ * are soft (common/marks.glsl), that shapes cut (common/cut.glsl), or several of these; NULL = as those that have none,
+ * but for marks and cuts. */
+enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_CUT = 8, SPL_ENDS_COUNT = 16 };
+/* The constants that say whether a kernel looks at marks, what colours show (SPL_PAINT_*), and at shapes of which kinds. */
+enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4, SPL_CONSTANT_CUT = 5 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];
     uint32_t lanes; /* of SPL_WORKGROUP invocations, that share an entry; 0 = as the dispatch has it */

@@ -79,7 +79,7 @@ static int push_children(struct spl_walk *w, const struct spl_node *node, struct
     bool all = !rc && found == SPL_SELECT_YES;
     for (uint32_t i = 0; i < node->child_count && !rc && found == SPL_SELECT_YES; i++) {
         struct spl_view_box box = spl_walk_node_box(w, children[i].node);
-        if (!is_seen(w, &children[i], &box))
+        if (!is_seen(w, &children[i], &box) || spl_walk_drops_node(w, children[i].node, &box))
             continue;
         enum spl_select_answer answer = w->params->resident(w->params->context, children[i].node->page);
         if (answer == SPL_SELECT_NO)
@@ -114,7 +114,7 @@ static int walk_tree(struct spl_walk *w, struct spl_error *err)
         struct spl_view_box box = spl_walk_node_box(w, found.node);
         bool pushed = false;
         int rc = SPL_OK;
-        if (!is_seen(w, &found, &box))
+        if (!is_seen(w, &found, &box) || spl_walk_drops_node(w, found.node, &box))
             continue;
         if (!is_drawn(w, found.node, &box) && depth + 8 <= stack_max) {
             rc = push_children(w, found.node, stack, &depth, &pushed, err);

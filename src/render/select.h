@@ -47,6 +47,7 @@ struct spl_select_params {
                                                                           NULL where maps is 0 */
     const struct spl_marks *marks; /* what is soft; NULL = nothing */
     bool draws_soft;               /* it is listed, too */
+    const struct spl_marks *clip;  /* what is drawn; NULL = all */
     const struct spl_paint *paint; /* what colours show; NULL = the splats' own */
     uint32_t share_from;           /* drawn chunks from which on several cores list them; 0 = as pays */
     void *context;

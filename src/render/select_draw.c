@@ -93,6 +93,8 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     if (!spl_view_box_visible(camera, w->params->marks ? &spheres : &box, w->params->low_pass))
         return SPL_OK;
     spl_walk_judge(w, chunk, &centers);
+    if (!spl_walk_clip(w, chunk, w->params->discs ? &box : &centers))
+        return SPL_OK;
     if (!w->judged.solid && (w->covered || !w->params->draws_soft))
         return SPL_OK;
     if (w->covered) {
@@ -124,11 +126,11 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     if (rc || !w->judged.solid)
         return rc;
     out.texture = drawn_texture(w, chunk, page, reach.near);
-    int trims = spl_walk_add_map_cells(w, chunk, &box, whole, err);
-    if (trims < 0)
-        return trims;
+    int trims = spl_walk_add_map_cells(w, chunk, &box, whole, err), cut = spl_walk_get_cut(w, err);
+    if (trims < 0 || cut < 0)
+        return trims < 0 ? trims : cut;
     const struct spl_draw_origin from = {
-        .page = page, .kind = SPL_CHUNK_DISCS, .trims = (uint16_t)trims, .lined = lined};
+        .page = page, .kind = SPL_CHUNK_DISCS, .trims = (uint16_t)trims, .lined = lined, .cut = (uint16_t)cut};
     return spl_walk_list(w, &from, &out, &(struct spl_walk_pieces){1, radius, 0}, &reach, radius, SPL_WINDOW, err);
 }
 
@@ -153,13 +155,19 @@ static int draw_lines(struct spl_walk *w, const double node_to_eye[3], const str
                       const struct spl_chunk *chunk, uint32_t page, struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    const struct spl_draw_origin from = {.page = page, .kind = SPL_CHUNK_LINES};
+    struct spl_draw_origin from = {.page = page, .kind = SPL_CHUNK_LINES};
     double origin[3], half = w->params->discs ? spl_chunk_line_width(chunk) / 2 : 0;
     struct spl_view_box box = spl_walk_chunk_box(w, node_to_eye, chunk, origin);
     box = spl_view_box_grown(box, half);
     if (w->covered || !w->params->lines || w->unlined || (w->params->discs && half == 0) ||
-        !spl_view_box_visible(camera, &box, w->params->low_pass))
+        !spl_view_box_visible(camera, &box, w->params->low_pass) || !spl_walk_clip(w, chunk, &box))
         return SPL_OK;
+    if (!w->params->discs && w->params->clip && w->clipped.at_center) /* its points are there as ever */
+        return SPL_OK;
+    int cut = spl_walk_get_cut(w, err);
+    if (cut < 0)
+        return cut;
+    from.cut = (uint16_t)cut;
     struct spl_draw_chunk out = spl_walk_begin(w, chunk, origin);
     w->list->drawn[SPL_CHUNK_LINES] += spl_chunk_count_pieces(chunk);
     if (!w->params->discs)
@@ -236,7 +244,7 @@ static int draw_panels(struct spl_walk *w, const struct spl_node *node, const do
     spl_walk_judge(w, chunk, &box);
     const bool whole = as_such && !(w->judged.by_cells && w->judged.solid);
     box = whole && !w->judged.soft ? box : cells_box;
-    if (!spl_view_box_visible(camera, &box, w->params->low_pass))
+    if (!spl_view_box_visible(camera, &box, w->params->low_pass) || !spl_walk_clip(w, chunk, &box))
         return SPL_OK;
     if (!w->judged.solid && (w->covered || !w->params->draws_soft))
         return SPL_OK;
@@ -272,11 +280,14 @@ static int draw_panels(struct spl_walk *w, const struct spl_node *node, const do
         rc = spl_walk_list_soft(w, &(struct spl_draw_origin){.page = page, .kind = kind}, &out, &cells_box, disc, err);
     if (rc || !w->judged.solid)
         return rc;
-    int trims = spl_walk_add_map_cells(w, chunk, &box, node_box, err);
-    if (trims < 0)
-        return trims;
-    const struct spl_draw_origin from = {
-        .page = page, .kind = kind, .trims = (uint16_t)trims, .cells = as_such && !whole};
+    int trims = spl_walk_add_map_cells(w, chunk, &box, node_box, err), cut = spl_walk_get_cut(w, err);
+    if (trims < 0 || cut < 0)
+        return trims < 0 ? trims : cut;
+    const struct spl_draw_origin from = {.page = page,
+                                         .kind = kind,
+                                         .trims = (uint16_t)trims,
+                                         .cells = as_such && !whole,
+                                         .cut = (uint16_t)cut};
     if (!whole)
         return spl_walk_list(w, &from, &out, &(struct spl_walk_pieces){cells, disc, 0}, &reach, disc, SPL_WINDOW, err);
     const unsigned level = spl_panels_get_level(chunk);

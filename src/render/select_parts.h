@@ -16,10 +16,12 @@ struct spl_walk {
     double focal;                        /* larger of fx, fy */
     struct spl_occupancy splats, panels; /* the latter once there are any */
     struct spl_map_cells cells;
-    struct spl_marks_view shapes;  /* of params->marks */
+    struct spl_marks_view shapes, clip_shapes; /* of params->marks, of params->clip */
     struct spl_marks_chunk judged; /* of the chunk being listed */
+    struct spl_clip_chunk clipped; /* the same; nothing where there is no clip */
+    uint32_t soft_marks; /* where its marks as soft are, if they are not those as solid */
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
-    bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft */
+    bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft, or dropped by values */
     double line_width; /* of its lines, the largest; 0 = not known, or nothing is soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
     struct spl_walk_found *found; /* nodes that are drawn once all are known (select_share.c); NULL = at once */
@@ -72,16 +74,23 @@ bool spl_walk_may_share(const struct spl_walk *w);
 int spl_walk_find(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err);
 int spl_walk_draw_found(struct spl_walk *w, struct spl_error *err);
 
-/* What is soft (select_soft.c). Shapes become tests, before anything is listed. */
+/* What is soft, and what is drawn (select_soft.c). Shapes become tests, before anything is listed. */
 int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);
 /* Fills in `judged`: of a chunk whose positions lie in `box`, view space. */
 void spl_walk_judge(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
-/* May any linear splat of the node be soft? */
+/* Fills in `clipped`: of a chunk all of which lies in `box`, discs and all where these are cut. False where nothing of it
+ * is drawn. */
+bool spl_walk_clip(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
+/* Is nothing of the node and of those below drawn? `box` is spl_walk_node_box(). */
+bool spl_walk_drops_node(const struct spl_walk *w, const struct spl_node *node, const struct spl_view_box *box);
+/* The shapes that cut the chunk's samples, as its origin says them: 0 where methods draw centres. SPL_E_NOMEM below 0. */
+int spl_walk_get_cut(struct spl_walk *w, struct spl_error *err);
+/* May any linear splat of the node be soft, or dropped by its values? */
 bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3]);
 /* How wide the node's lines are, at most, where anything may be soft. */
 double spl_walk_line_width(const struct spl_walk *w, const struct spl_node *node);
-/* Where `judged` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is listed
- * otherwise. */
+/* Where `judged` or `clipped` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is
+ * listed otherwise. */
 int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,
                         struct spl_error *err);
 /* Where it has soft cells of panels: says in it where the cube of its node is, to which they are held along the plane of

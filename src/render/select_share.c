@@ -32,7 +32,7 @@ bool spl_walk_may_share(const struct spl_walk *w)
 {
     const struct spl_select_params *params = w->params;
     const bool textured = params->atoms && spl_dataset_get_info(params->dataset)->texture_size;
-    return !w->covered && !w->cells.count && !params->marks && !textured;
+    return !w->covered && !w->cells.count && !params->marks && !params->clip && !textured;
 }
 
 int spl_walk_find(struct spl_walk *w, const struct spl_found_node *found, struct spl_error *err)

@@ -176,6 +176,8 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc)
         rc = spl_marks_init(&steps->job.marks, &view->soft, dataset, err);
     if (!rc)
+        rc = spl_marks_init_clip(&steps->job.clip, &view->clip, dataset, err);
+    if (!rc)
         rc = spl_paint_init(&steps->job.paint, &view->color, info, err);
     if (!rc)
         spl_paint_set_stream(&steps->job.paint, spl_dataset_get_streams(dataset, &(uint32_t){0}));

@@ -12,7 +12,7 @@
 static uint32_t ends_of(const struct spl_draw_key *key)
 {
     return (key->apart ? SPL_ENDS_CLIPPED : 0) | (key->trims ? SPL_ENDS_TRIMMED : 0) |
-           (key->marked ? SPL_ENDS_MARKED : 0);
+           (key->marked ? SPL_ENDS_MARKED : 0) | (key->cut ? SPL_ENDS_CUT : 0);
 }
 
 /* Is a batch what is asked for? */
@@ -37,6 +37,7 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
         key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
+        key.constants[SPL_CONSTANT_CUT] = ends & SPL_ENDS_CUT ? r->list.cut_kinds : 0;
         key.trims = ends & SPL_ENDS_TRIMMED;
         if (needed >> ends & 1)
             rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
@@ -56,6 +57,7 @@ int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key,
     *out = (struct spl_disc_kernels){0};
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
+        key.constants[SPL_CONSTANT_CUT] = ends & SPL_ENDS_CUT ? r->list.cut_kinds : 0;
         key.trims = ends & SPL_ENDS_TRIMMED;
         if (needed >> ends & 1)
             rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
@@ -63,13 +65,13 @@ int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key,
     return rc;
 }
 
-/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks. */
+/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks or cuts. */
 static struct spl_gpu_kernel *kernel_of(const struct spl_disc_kernels *kernels, uint32_t ends)
 {
     if (!kernels->of[ends])
         ends &= ~(uint32_t)SPL_ENDS_CLIPPED;
     if (!kernels->of[ends])
-        ends &= SPL_ENDS_MARKED;
+        ends &= SPL_ENDS_MARKED | SPL_ENDS_CUT;
     spl_assert(kernels->of[ends]);
     return kernels->of[ends];
 }
@@ -186,6 +188,8 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             uint32_t left = batch->entries - done;
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
+            if (batch->key.cut)
+                params.fill_from = spl_draw_list_find_cut(list, batch->key.cut)->word;
             params.entries = left < batch->round_entries ? left : batch->round_entries;
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
             uint64_t sums = what->sum ? spl_tile_get_sum_work(tile, what->planes, params.entries) : 0;
@@ -203,14 +207,12 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
 int spl_tile_dispatch_lines(struct spl_tile *tile, struct spl_kernel_key key, enum spl_phase phases,
                             struct spl_error *err)
 {
-    struct spl_disc_kernels kernel = {0};
+    struct spl_disc_kernels kernels = {0};
+    const struct spl_dispatch what = {.phases = phases, .kind = SPL_CHUNK_LINES};
     if (!spl_draw_list_has(&tile->renderer->list, SPL_CHUNK_LINES, SPL_ROLE_SOLID))
         return SPL_OK;
-    int rc = spl_kernels_get(&tile->renderer->kernels, tile->renderer->gpu, &key, &kernel.of[0], err);
-    if (!rc)
-        rc = spl_tile_dispatch_splats(tile, &kernel,
-                                      &(struct spl_dispatch){.phases = phases, .kind = SPL_CHUNK_LINES}, err);
-    return rc;
+    int rc = spl_tile_get_plain_kernels(tile, key, &what, &kernels, err);
+    return rc ? rc : spl_tile_dispatch_splats(tile, &kernels, &what, err);
 }
 
 int spl_tile_dispatch_items(struct spl_tile *tile, const struct spl_kernel_key *key,

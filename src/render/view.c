@@ -71,7 +71,8 @@ static int check(const struct spl_view *view, struct spl_error *err)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
     rc = rc ? rc : spl_shade_check(&view->shade, err);
     rc = rc ? rc : spl_color_check(&view->color, err);
-    return rc ? rc : spl_soft_check(&view->soft, err);
+    rc = rc ? rc : spl_soft_check(&view->soft, err);
+    return rc ? rc : spl_terms_check(&view->clip, "clip", err);
 }
 
 static int refuse_normals(const struct spl_dataset_info *info, const char *field, struct spl_error *err)
@@ -104,7 +105,7 @@ int spl_view_check_colors(const struct spl_view *view, const struct spl_dataset_
     if (lit && view->layers >> SPL_LAYER_COLOR & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, "shade", err);
     int rc = spl_paint_init(&paint, &view->color, info, err);
-    return rc ? rc : spl_marks_resolve(&view->soft, info, NULL, err);
+    return rc ? rc : spl_marks_check_view(view, info, err);
 }
 
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err)
@@ -123,7 +124,7 @@ int spl_view_check(const struct spl_view *view, struct spl_error *err)
 bool spl_view_shows_soft(const struct spl_view *view)
 {
     const uint32_t blended = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE;
-    return view->soft.count && view->soft.opacity > 0 &&
+    return view->soft.what.count && view->soft.opacity > 0 &&
            (view->layers & blended || view->soft.of != SPL_SOFT_OF_SOLID);
 }
 

@@ -17,7 +17,7 @@ void spl_headers_open(struct spl_headers *headers)
 
 void spl_headers_add(struct spl_headers *headers, const char *name, const char *format, ...)
 {
-    char text[SPL_SOFT_TEXT_MAX + 1024];
+    char text[SPL_TERMS_TEXT_MAX + 1024];
     if (!headers->stream)
         return;
     va_list args;
@@ -93,19 +93,35 @@ void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera
     spl_headers_add(headers, "Splatd-Camera", "%s", spl_decimal_shorten(text));
 }
 
-/* What is soft, as a body says it; its texts have nothing that JSON would escape. */
+/* Terms as an array, condition by condition or term by term; their texts have nothing that JSON would escape. */
+static void write_terms(const struct spl_terms *terms, bool conditions, char *out, size_t bytes)
+{
+    struct spl_terms one = *terms;
+    size_t used = 0;
+    for (uint32_t i = 0, next; i < one.count && used < bytes; i = next) {
+        char text[SPL_TERMS_TEXT_MAX];
+        for (uint32_t t = i + 1; t < one.count && !conditions; t++) /* what is outside a list stays one */
+            if (one.terms[t].joint == SPL_TERM_OR)
+                one.terms[t].joint = SPL_TERM_AND;
+        spl_terms_print_condition(&one, i, &next, text, sizeof text);
+        used += (size_t)snprintf(out + used, bytes - used, "%s\"%s\"", i ? "," : "", text);
+    }
+}
+
+/* What is drawn, as a body says it. */
+static void add_clip(struct spl_headers *headers, const struct spl_terms *clip)
+{
+    char terms[SPL_TERMS_TEXT_MAX + 3 * SPL_TERMS_MAX] = "";
+    write_terms(clip, true, terms, sizeof terms);
+    spl_headers_add(headers, "Splatd-Clip", "{\"clip\":[%s]}", terms);
+}
+
+/* What is soft, the same. */
 static void add_soft(struct spl_headers *headers, const struct spl_soft_params *soft)
 {
-    char terms[SPL_SOFT_TEXT_MAX + 3 * SPL_SOFT_TERMS_MAX] = "";
-    struct spl_soft_params one = {.count = 1};
+    char terms[SPL_TERMS_TEXT_MAX + 3 * SPL_TERMS_MAX] = "";
     char opacity[SPL_DECIMAL_MAX], cover[SPL_DECIMAL_MAX], blend[SPL_DECIMAL_MAX];
-    size_t used = 0;
-    for (uint32_t i = 0; i < soft->count && used < sizeof terms; i++) {
-        char text[SPL_SOFT_TEXT_MAX];
-        one.terms[0] = soft->terms[i];
-        spl_soft_print(&one, text, sizeof text);
-        used += (size_t)snprintf(terms + used, sizeof terms - used, "%s\"%s\"", i ? "," : "", text);
-    }
+    write_terms(&soft->what, false, terms, sizeof terms);
     spl_headers_add(headers, "Splatd-Soft",
                     "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%s,\"soft_cover\":%s,"
                     "\"soft_blend\":%s,\"of\":\"%s\"}",
@@ -125,6 +141,8 @@ void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_req
         spl_headers_add_layer(headers, request, request->layer, encoded);
     spl_headers_add(headers, "Splatd-Unit", "%s", request->encode.unit);
     spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
-    if (request->view.soft.count)
+    if (request->view.soft.what.count)
         add_soft(headers, &request->view.soft);
+    if (request->view.clip.count)
+        add_clip(headers, &request->view.clip);
 }

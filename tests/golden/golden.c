@@ -147,6 +147,8 @@ static struct spl_view make_view(const struct golden *golden)
     view.maps = golden->maps ? SPL_MAPS_ON : SPL_MAPS_OFF;
     if (golden->soft && spl_soft_parse(golden->soft, &view.soft, NULL))
         abort();
+    if (golden->clip && spl_terms_parse(golden->clip, "clip", &view.clip, NULL))
+        abort();
     if (golden->shade && spl_shade_parse(golden->shade, &view.shade, NULL))
         abort();
     if (golden->color_by && spl_color_parse(golden->color_by, &view.color, NULL))

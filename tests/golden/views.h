@@ -27,6 +27,7 @@ struct golden {
     const char *soft;         /* terms of what is drawn as soft spheres; NULL = nothing */
     enum spl_soft_model model;
     double opacity, blend;
+    const char *clip;         /* conditions of what is drawn; NULL = all */
     const char *shade, *color_by; /* NULL: none, rgb */
     double view_height;       /* of an orthographic view; 0 = fov */
 };
@@ -85,6 +86,12 @@ static const struct golden goldens[] = {
     /* cells of panels and meshes as spheres, some of a panel solid, method nearest */
     {"soft-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
      {1, 0.004}, .relief = true, .soft = "plane:0,0,0,1,0,0.2>0", .opacity = 0.2},
+    /* discs that end at a turned box and at a polygon's sides, not by their radius beyond: nothing else is there */
+    {"clip-splat", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {32, 64, 96, 255}, 0,
+     {1, 0.002}, .clip = "!box:-1,0,-1,4,6,3,25 and polygon:-9,-5,6,-5,2,2,7,9,-8,8@-1..3.1"},
+    /* panels and triangles cut at a plane, method nearest */
+    {"clip-relief", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0,
+     {1, 0.002}, .relief = true, .clip = "plane:0,0,0,1,0.5,0.2<=0 or axis:0.3,0.2,0,0,0,1<0.15"},
     /* eye-dome lighting, whose factor rounds by a level, and light from normals, at four samples a pixel under a
      * transparent sky: edges, specks, and what lies outside the image */
     {"shade-edl", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 2, {0, 0, 0, 0}, 0,

@@ -249,8 +249,8 @@ static double count_soft(const struct spl_dataset *dataset, enum spl_method meth
     struct spl_frame frame;
     double covered = 0;
     view.method = method;
-    view.soft.count = 1; /* whatever lies above -100 */
-    view.soft.terms[0] = (struct spl_soft_term){.measure = SPL_SOFT_PLANE, .least = -100, .most = INFINITY,
+    view.soft.what.count = 1; /* whatever lies above -100 */
+    view.soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = -100, .most = INFINITY,
                                                 .shape = {0, 0, 0, 0, 0, 1}};
     view.soft.opacity = 1;
     assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);

@@ -174,19 +174,19 @@ static unsigned compare_marks(const struct spl_dataset *dataset, const struct sp
     return kinds;
 }
 
-static struct spl_soft_term range(const char *name, double least, double most)
+static struct spl_term range(const char *name, double least, double most)
 {
-    struct spl_soft_term term = {.least = least, .most = most, .with_least = true};
+    struct spl_term term = {.least = least, .most = most, .with_least = true};
     strcpy(term.name, name);
     return term;
 }
 
-static struct spl_soft_term shape(enum spl_soft_measure measure, double least, double most)
+static struct spl_term shape(enum spl_term_measure measure, double least, double most)
 {
-    struct spl_soft_term term = {.measure = measure, .least = least, .most = most};
+    struct spl_term term = {.measure = measure, .least = least, .most = most};
     for (int i = 0; i < 3; i++) {
-        term.shape[i] = origin[i] - (measure == SPL_SOFT_BOX ? 0.3 * uniform() : 0);
-        term.shape[i + 3] = measure == SPL_SOFT_BOX ? term.shape[i] + uniform() : uniform() - 0.5;
+        term.shape[i] = origin[i] - (measure == SPL_TERM_BOX ? 0.3 * uniform() : 0);
+        term.shape[i + 3] = measure == SPL_TERM_BOX ? term.shape[i] + uniform() : uniform() - 0.5;
     }
     return term;
 }
@@ -199,11 +199,11 @@ static void compare_all(const struct spl_dataset *dataset, bool panels)
         char what[40];
         snprintf(what, sizeof what, "round %d", round);
         if (!panels && round % 3 != 2)
-            soft.terms[soft.count++] = range("uncertainty", 0.6 * uniform(), round % 4 ? INFINITY : 0.8);
+            soft.what.terms[soft.what.count++] = range("uncertainty", 0.6 * uniform(), round % 4 ? INFINITY : 0.8);
         if (round % 3 != 2)
-            soft.terms[soft.count++] = range("class", panels ? 1 : 3, panels ? 1.5 : 4 + 3 * uniform());
+            soft.what.terms[soft.what.count++] = range("class", panels ? 1 : 3, panels ? 1.5 : 4 + 3 * uniform());
         if (round % 3)
-            soft.terms[soft.count++] = shape(SPL_SOFT_AXIS + (enum spl_soft_measure)(round / 2 % 3), -1, 0.5 * uniform());
+            soft.what.terms[soft.what.count++] = shape(SPL_TERM_AXIS + (enum spl_term_measure)(round / 2 % 3), -1, 0.5 * uniform());
         kinds |= compare_marks(dataset, &soft, what);
     }
     assert_int_equal(kinds, 7);

@@ -20,29 +20,29 @@
 #include "support/reference_marks.h"
 #include "support/sanitised.h"
 
-static struct spl_soft_term class_of(double least, double most)
+static struct spl_term class_of(double least, double most)
 {
-    struct spl_soft_term term = {.least = least, .most = most, .with_least = true, .with_most = true};
+    struct spl_term term = {.least = least, .most = most, .with_least = true, .with_most = true};
     strcpy(term.name, "class");
     return term;
 }
 
-static struct spl_soft_term uncertain(double least, double most)
+static struct spl_term uncertain(double least, double most)
 {
-    struct spl_soft_term term = {.least = least, .most = most};
+    struct spl_term term = {.least = least, .most = most};
     strcpy(term.name, "uncertainty");
     return term;
 }
 
 /* Around `center`, of random form. */
-static struct spl_soft_term shape_of(enum spl_soft_measure measure, const double center[3])
+static struct spl_term shape_of(enum spl_term_measure measure, const double center[3])
 {
-    struct spl_soft_term term = {.measure = measure, .least = -INFINITY, .most = measure == SPL_SOFT_AXIS ? 0.5 : 0};
+    struct spl_term term = {.measure = measure, .least = -INFINITY, .most = measure == SPL_TERM_AXIS ? 0.5 : 0};
     for (int i = 0; i < 3; i++) {
         term.shape[i] = center[i] + 0.4 * uniform() - 0.2;
         term.shape[i + 3] = uniform() - 0.5;
     }
-    for (int i = 0; i < 3 && measure == SPL_SOFT_BOX; i++) {
+    for (int i = 0; i < 3 && measure == SPL_TERM_BOX; i++) {
         term.shape[i] -= 0.5;
         term.shape[i + 3] = term.shape[i] + 0.5 + uniform();
     }
@@ -81,11 +81,11 @@ static void attributes_filter(void **state)
         struct spl_dataset *dataset = mixed(3000, levels);
         struct spl_view view = looking(origin, 3.2, 160, 120);
         view.lod = levels == 1 ? 0 : 1;
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}}};
         same_by_all(dataset, &view, "classes 2, 3 and 7");
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {uncertain(0.4, INFINITY)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {uncertain(0.4, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty above 0.4");
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty from 0.1 to 0.3, or class from 5");
         done(dataset);
     }
@@ -97,10 +97,10 @@ static void shapes_filter(void **state)
     struct spl_dataset *dataset = mixed(2500, 1);
     struct spl_view view = looking(origin, 3.2, 160, 120);
     view.lod = 0;
-    for (int measure = SPL_SOFT_AXIS; measure <= SPL_SOFT_BOX; measure++) {
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {shape_of((enum spl_soft_measure)measure, origin)}};
-        same_by_all(dataset, &view, measure == SPL_SOFT_AXIS ? "axis" : measure == SPL_SOFT_PLANE ? "plane" : "box");
-        view.soft.terms[view.soft.count++] = class_of(0, 1);
+    for (int measure = SPL_TERM_AXIS; measure <= SPL_TERM_BOX; measure++) {
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of((enum spl_term_measure)measure, origin)}}};
+        same_by_all(dataset, &view, measure == SPL_TERM_AXIS ? "axis" : measure == SPL_TERM_PLANE ? "plane" : "box");
+        view.soft.what.terms[view.soft.what.count++] = class_of(0, 1);
         same_by_all(dataset, &view, "a shape or classes");
     }
     done(dataset);
@@ -115,12 +115,12 @@ static void cells_are_cut(void **state)
         struct spl_view view = looking(origin, 3, 160, 120);
         view.lod = 0;
         view.shapes = SPL_SHAPES_OFF;
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {shape_of(SPL_SOFT_PLANE, origin)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of(SPL_TERM_PLANE, origin)}}};
         same_by_all(dataset, &view, relief ? "meshes" : "panels");
         view.shapes = SPL_SHAPES_ALL;
-        view.soft.terms[0] = class_of(1, 1); /* some of a chunk, as such */
+        view.soft.what.terms[0] = class_of(1, 1); /* some of a chunk, as such */
         same_by_all(dataset, &view, relief ? "class of meshes" : "class of panels");
-        view.soft.terms[0] = class_of(0, 2); /* all of them */
+        view.soft.what.terms[0] = class_of(0, 2); /* all of them */
         same_by_all(dataset, &view, relief ? "all meshes" : "all panels");
         done(dataset);
     }
@@ -151,9 +151,9 @@ static void panels_end_where_they_are_cut(void **state)
         size_t beyond[2] = {0}, there = 0;
         view.lod = 0;
         view.method = methods[i % 2];
-        const struct spl_soft_term cut = shape_of(SPL_SOFT_PLANE, origin); /* soft below 0 */
+        const struct spl_term cut = shape_of(SPL_TERM_PLANE, origin); /* soft below 0 */
         for (int soft = 0; soft < 2; soft++) {
-            view.soft = (struct spl_soft_params){.count = (uint32_t)soft, .terms = {cut}};
+            view.soft = (struct spl_soft_params){.what = {.count = (uint32_t)soft, .terms = {cut}}};
             struct spl_frame frame = render(dataset, &view);
             const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
             for (uint32_t p = 0; p < 160 * 120; p++) {
@@ -207,7 +207,7 @@ static void mapped_splats_filter(void **state)
         assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
         struct spl_view view = looking(origin, 3.2, 160, 120);
         view.lod = 0;
-        view.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(2, 3), class_of(7, 7)}}};
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             view.method = (enum spl_method)method;
             if (spl_method_get_params(view.method) & SPL_PARAM_BIT(maps))
@@ -236,7 +236,7 @@ static void textured_splats_filter(void **state)
         view.lod = 0;
         view.layers = 1u << SPL_LAYER_COLOR;
         view.disc.atoms = 8;
-        view.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(1, 2)}};
+        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(1, 2)}}};
         struct spl_frame gpu = render(dataset, &view), cpu;
         assert_int_equal(reference_render(dataset, &view, &cpu, NULL), SPL_OK);
         const uint8_t *a = gpu.images[SPL_LAYER_COLOR].pixels, *b = cpu.images[SPL_LAYER_COLOR].pixels;
@@ -278,12 +278,12 @@ static void lines_give_way(void **state)
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     struct spl_view lined = looking(origin, 3, 160, 120), plain = lined, without;
     lined.lod = plain.lod = 0;
-    lined.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(1, 1)}};
+    lined.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(1, 1)}}};
     without = lined;
     without.shapes = SPL_SHAPES_OFF;
     equal_frames(dataset, &lined, &without);
     same_images(dataset, &without, "linear splats of which some are soft");
-    lined.soft.terms[0] = class_of(99, 99);
+    lined.soft.what.terms[0] = class_of(99, 99);
     equal_frames(dataset, &lined, &plain);
     done(dataset);
 }
@@ -298,12 +298,12 @@ static void nothing_and_everything(void **state)
         for (int method = 0; method < SPL_METHOD_COUNT; method++) {
             plain.method = (enum spl_method)method;
             struct spl_view soft = plain, all = plain;
-            soft.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(200, 255)}};
+            soft.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(200, 255)}}};
             equal_frames(i ? panels : dataset, &plain, &soft);
-            soft.soft.terms[0] = shape_of(SPL_SOFT_BOX, (const double[3]){50, 50, 50}); /* far away */
+            soft.soft.what.terms[0] = shape_of(SPL_TERM_BOX, (const double[3]){50, 50, 50}); /* far away */
             equal_frames(i ? panels : dataset, &plain, &soft);
-            soft.soft = (struct spl_soft_params){.count = 1, .terms = {class_of(0, 255)}};
-            all.soft = (struct spl_soft_params){.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}; /* by marks */
+            soft.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(0, 255)}}};
+            all.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}}; /* by marks */
             equal_frames(i ? panels : dataset, &soft, &all);
             struct spl_frame frame = render(i ? panels : dataset, &all);
             const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;

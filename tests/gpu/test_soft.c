@@ -22,8 +22,8 @@
 /* What lies on one side of a plane through the origin is soft. */
 static void soften(struct spl_view *view, double nx, double from, double opacity)
 {
-    view->soft.count = 1;
-    view->soft.terms[0] = (struct spl_soft_term){.measure = SPL_SOFT_PLANE, .least = from, .most = INFINITY,
+    view->soft.what.count = 1;
+    view->soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = from, .most = INFINITY,
                                                  .shape = {0, 0, 0, nx, 1 - nx, 0}};
     view->soft.opacity = opacity;
 }
@@ -516,7 +516,7 @@ static void what_is_hidden_leaves_nothing(void **state)
     view.camera.far = 4; // not the corners
     struct spl_dataset *bare = wall_of_two(0, 0, 2, false), *covered = wall_of_two(0, 0, 2, true);
     soften(&view, 0, -0.6, 0.3);
-    view.soft.terms[0].shape[4] = -1; // y < 0.6
+    view.soft.what.terms[0].shape[4] = -1; // y < 0.6
     struct spl_frame seen = draw(renderer, bare, &view), hidden = draw(renderer, covered, &view);
     assert_int_equal(seen.stats.soft_drawn, 2 * SPL_PANEL_SIDE * SPL_PANEL_SIDE);
     assert_int_equal(hidden.stats.soft_drawn, 0);

@@ -203,8 +203,8 @@ static void kernels_match(void **state)
 
 static void soften(struct spl_view *view, double from, double opacity, enum spl_soft_of of)
 {
-    view->soft.count = 1;
-    view->soft.terms[0] = (struct spl_soft_term){.measure = SPL_SOFT_PLANE, .least = from, .most = INFINITY,
+    view->soft.what.count = 1;
+    view->soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = from, .most = INFINITY,
                                                  .shape = {0, 0, 0, 1, 0, 0}};
     view->soft.opacity = opacity;
     view->soft.of = of;

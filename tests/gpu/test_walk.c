@@ -79,9 +79,9 @@ static struct spl_view colors(double distance)
 static struct spl_view without(const struct spl_view *from)
 {
     struct spl_view view = *from;
-    view.soft.count = 1;
-    view.soft.terms[0] = (struct spl_soft_term){.least = 1, .most = 1, .with_least = true, .with_most = true};
-    strcpy(view.soft.terms[0].name, "class");
+    view.soft.what.count = 1;
+    view.soft.what.terms[0] = (struct spl_term){.least = 1, .most = 1, .with_least = true, .with_most = true};
+    strcpy(view.soft.what.terms[0].name, "class");
     return view;
 }
 

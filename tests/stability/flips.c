@@ -75,9 +75,9 @@ static struct spl_view look(const struct world *world, struct ball balls[SPHERES
     view.layers = 1u << SPL_LAYER_COLOR;
     view.lod = 0;
     view.background[3] = 255;
-    view.soft = (struct spl_soft_params){.count = 1, .model = SPL_SOFT_MODEL_EXPRESS, .opacity = opacity, .cover = 1};
-    view.soft.terms[0] = (struct spl_soft_term){
-        .measure = SPL_SOFT_PLANE, .least = -100, .most = INFINITY, .shape = {0, 0, 0, 0, 0, 1}};
+    view.soft = (struct spl_soft_params){.what.count = 1, .model = SPL_SOFT_MODEL_EXPRESS, .opacity = opacity, .cover = 1};
+    view.soft.what.terms[0] = (struct spl_term){
+        .measure = SPL_TERM_PLANE, .least = -100, .most = INFINITY, .shape = {0, 0, 0, 0, 0, 1}};
     return view;
 }
 

@@ -49,9 +49,9 @@ static struct spl_view look(const struct world *world, enum spl_soft_model model
     view.background[3] = 255;
     memset(view.background, 0, 3);
     view.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE | 1u << SPL_LAYER_DEPTH;
-    view.soft.count = 1;
-    view.soft.terms[0] = (struct spl_soft_term){
-        .measure = SPL_SOFT_ATTRIBUTE, .name = "class", .least = SOFT, .most = SOFT, .with_least = true,
+    view.soft.what.count = 1;
+    view.soft.what.terms[0] = (struct spl_term){
+        .measure = SPL_TERM_ATTRIBUTE, .name = "class", .least = SOFT, .most = SOFT, .with_least = true,
         .with_most = true};
     view.soft.model = model;
     view.soft.opacity = opacity;
@@ -193,8 +193,8 @@ static void none_soft(struct suite *suite)
         struct place place = {world.name, NULL, spl_method_name((enum spl_method)method), NULL};
         struct spl_frame a, b;
         view.method = plain.method = (enum spl_method)method;
-        view.soft.terms[0].least = view.soft.terms[0].most = SOFT + 1;
-        plain.soft.count = 0;
+        view.soft.what.terms[0].least = view.soft.what.terms[0].most = SOFT + 1;
+        plain.soft.what.count = 0;
         if (!world_render(suite, &world, &place, &view, &a))
             continue;
         if (world_render(suite, &world, &place, &plain, &b)) {
@@ -317,8 +317,8 @@ static void borders(struct suite *suite)
         struct spl_frame frame;
         view.background[3] = 0;
         view.soft.blend = blend ? 0.6 : 0;
-        view.soft.terms[0] = (struct spl_soft_term){
-            .measure = SPL_SOFT_PLANE, .least = 0, .most = INFINITY, .shape = {0, 0, 0, 1, 0, 0}};
+        view.soft.what.terms[0] = (struct spl_term){
+            .measure = SPL_TERM_PLANE, .least = 0, .most = INFINITY, .shape = {0, 0, 0, 1, 0, 0}};
         if (!world_render(suite, &world, &place, &view, &frame))
             continue;
         const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;

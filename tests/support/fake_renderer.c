@@ -147,7 +147,7 @@ static double samples_of(const struct spl_view *view)
 /* FAKE_SOFT_MS a megapixel of what is soft, at lod=1, whatever the method. */
 static double soft_ms(const struct spl_view *view)
 {
-    bool soft = view->soft.count && view->soft.opacity > 0;
+    bool soft = view->soft.what.count && view->soft.opacity > 0;
     return soft ? (double)setting("FAKE_SOFT_MS", 0) * samples_of(view) / (view->lod > 1 ? view->lod : 1) : 0;
 }
 

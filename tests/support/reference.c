@@ -243,6 +243,35 @@ static float margin_of(const struct scene *s, float radius, float z, float slant
     return s->margin * (radius > pixel ? radius : pixel) * slant;
 }
 
+static void to_world(const struct scene *s, const float p[3], double world[3])
+{
+    for (int a = 0; a < 3; a++) {
+        world[a] = s->camera.eye[a];
+        for (int i = 0; i < 3; i++)
+            world[a] += s->camera.rotation[3 * i + a] * (double)p[i];
+    }
+}
+
+/* Is what lies at `p`, view space, left out? Discs are asked of their samples. */
+static bool is_dropped(const struct scene *s, uint64_t id, const float p[3])
+{
+    double world[3];
+    if (!s->view->clip.count)
+        return false;
+    to_world(s, p, world);
+    return !reference_is_drawn(s->dataset, &s->view->clip, id, world);
+}
+
+/* Of a disc at a sample that lies `offset` off its centre, within its rim. */
+static bool is_cut(const struct scene *s, const struct disc *d, const float offset[3])
+{
+    const float off = sqrtf(offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]);
+    float p[3];
+    for (int i = 0; i < 3; i++)
+        p[i] = d->p[i] + d->radius / fmaxf(off, 1) * offset[i];
+    return is_dropped(s, d->id, p);
+}
+
 static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 {
     int first[2], last[2];
@@ -258,7 +287,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {
             f.distance = coverage(s, d, center, x, y, &f.z, f.offset);
-            if (!(f.distance < 1))
+            if (!(f.distance < 1) || is_cut(s, d, f.offset))
                 continue;
             view_point(s, x, y, f.z, p);
             if (!(sums(s) && shade) && d->trims && reference_map_trims(d->trims, p, d->n, d->radius))
@@ -272,13 +301,9 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
 static bool is_soft(const struct scene *s, uint64_t id, const float p[3])
 {
     double world[3];
-    if (!s->view->soft.count)
+    if (!s->view->soft.what.count)
         return false;
-    for (int a = 0; a < 3; a++) {
-        world[a] = s->camera.eye[a];
-        for (int i = 0; i < 3; i++)
-            world[a] += s->camera.rotation[3 * i + a] * (double)p[i];
-    }
+    to_world(s, p, world);
     return reference_is_soft(s->dataset, &s->view->soft, id, world);
 }
 
@@ -303,6 +328,8 @@ static void draw_fragment(void *context, const struct reference_fragment *from)
     memcpy(d.color, sums(s) ? from->smooth : from->color, sizeof d.color);
     float p[3];
     view_point(s, from->x, from->y, from->z, p);
+    if (is_dropped(s, from->id, from->middle ? from->middle : p))
+        return;
     if (!(sums(s) && panels->shade) && panels->trims && reference_map_trims(panels->trims, p, d.n, radius))
         return;
     struct fragment f = {.z = from->z,
@@ -322,7 +349,9 @@ static void wide_piece(struct scene *s, const struct disc ends[2], const struct 
             bool second;
             f.distance = reference_capsule_sample(&c, (int)x, (int)y, &f.z, &second);
             f.margin = margin_of(s, cut->half, f.z, 1);
-            if (f.distance < 1)
+            float p[3];
+            view_point(s, (int)x, (int)y, f.z, p);
+            if (f.distance < 1 && !is_dropped(s, UINT64_MAX, p))
                 draw(s, &ends[second], sample_of(s, x, y), &f, shade);
         }
 }
@@ -495,7 +524,8 @@ static void draw_panels(struct scene *s, const struct naive_chunk *drawn, bool s
         struct disc d = {
             .radius = SPL_RADIUS_SPACING * chunk->step, .end = 1, .texture_scale = 1, .trims = panels.trims};
         if (!reference_panel_cell(&panels.plane, i, &cell) || cell.p[2] < (float)s->camera.near ||
-            cell.p[2] > (float)s->camera.far || is_soft(s, cell.id, cell.p))
+            cell.p[2] > (float)s->camera.far || is_soft(s, cell.id, cell.p) ||
+            (!draws_discs(s->view) && is_dropped(s, cell.id, cell.p)))
             continue;
         d.id = cell.id;
         memcpy(d.p, cell.p, sizeof d.p);
@@ -518,7 +548,8 @@ static void for_each_disc(struct scene *s, bool shade)
         for (uint32_t index = 0; !s->chunks[c].lines && index < s->chunks[c].count; index++) {
             struct disc d;
             uint32_t low_bits;
-            if (!load_disc(s, &s->chunks[c], index, &d, &low_bits) || is_soft(s, d.id, d.p))
+            if (!load_disc(s, &s->chunks[c], index, &d, &low_bits) || is_soft(s, d.id, d.p) ||
+                (!draws_discs(s->view) && is_dropped(s, d.id, d.p)))
                 continue;
             if (!draws_discs(s->view))
                 point(s, &d, low_bits);

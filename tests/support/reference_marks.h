@@ -11,11 +11,22 @@
 #include <splatd/soft.h>
 
 /* The distance that a term of a shape measures at `p`, world. */
-double reference_distance(const struct spl_soft_term *term, const double p[3]);
+double reference_distance(const struct spl_term *term, const double p[3]);
+
+/* The same of any shape of `terms`. */
+double reference_distance_of(const struct spl_terms *terms, const struct spl_term *term, const double p[3]);
+
+/* Does a view's clip leave what lies at `p`, world, of splat, panel or mesh `id` (UINT64_MAX: it has no attributes)? Opens
+ * quantiles as little as the next. */
+bool reference_is_drawn(const struct spl_dataset *dataset, const struct spl_terms *clip, uint64_t id,
+                        const double p[3]);
+
+/* As cut.glsl, of the words from `first` on, at `p`, view space. */
+bool reference_is_kept(const uint32_t *tests, uint32_t first, uint32_t known, const float p[3]);
 
 /* W of eq. 22 of what measures `value` in a term whose range is blended over `blend`: 0 to 1; negative where it is not
  * soft. NaN is no value. */
-double reference_share(const struct spl_soft_term *term, double blend, double value);
+double reference_share(const struct spl_term *term, double blend, double value);
 
 /* Is splat, panel or mesh `id`, at `p`, soft? Opens no quantiles: of terms by value alone, `p99` that of uncertainty. */
 bool reference_is_soft(const struct spl_dataset *dataset, const struct spl_soft_params *soft, uint64_t id,

@@ -46,6 +46,7 @@ struct reference_fragment {
     int64_t x, y;
     float z, slant; /* slant: of the blend margin, 1 to SPL_MARGIN_SLANT */
     bool light;     /* of weight 1, else of the largest */
+    const float *middle; /* of the cell that stands for the panel where it is thin, view space; else NULL */
     bool behind;    /* it turns its back to the eye */
     float normal[3]; /* view space */
     uint8_t color[3], smooth[3]; /* of the cell; between the middles of those around */

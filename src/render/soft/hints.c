@@ -93,7 +93,7 @@ static int axis_of(const char *name)
     return -1;
 }
 
-bool spl_soft_hint_name(const struct spl_soft_term *term, const struct spl_dataset_info *info,
+bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_info *info,
                         char hint[SPL_SOFT_HINT_MAX])
 {
     const char *near = find_near(term->name, info);
@@ -102,10 +102,8 @@ bool spl_soft_hint_name(const struct spl_soft_term *term, const struct spl_datas
     if (axis >= 0) {
         const bool above = isfinite(term->least) || !isfinite(term->most);
         const double end = above ? term->least : term->most;
-        spl_decimal_print(isfinite(end) && term->measure == SPL_SOFT_ATTRIBUTE ? end : 0, at);
-        snprintf(hint, SPL_SOFT_HINT_MAX, "a coordinate is measured from a plane: write 'plane:%s,%s,%s,%d,%d,%d%c0'",
-                 axis ? "0" : at, axis == 1 ? at : "0", axis == 2 ? at : "0", !axis, axis == 1, axis == 2,
-                 above ? '>' : '<');
+        spl_decimal_print(isfinite(end) && term->measure == SPL_TERM_ATTRIBUTE ? end : 0, at);
+        snprintf(hint, SPL_SOFT_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<', at);
         return true;
     }
     if (near)

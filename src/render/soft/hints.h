@@ -14,8 +14,8 @@ bool spl_soft_hint_sign(const char *name, const char *at, char hint[SPL_SOFT_HIN
 /* The same of a list, behind ':': which numbers classes have. */
 bool spl_soft_hint_list(const char *name, const char *at, char hint[SPL_SOFT_HINT_MAX]);
 
-/* Of a term of an attribute that the dataset does not have: the one that may be meant, or a plane in place of a height. */
-bool spl_soft_hint_name(const struct spl_soft_term *term, const struct spl_dataset_info *info,
+/* Of a term of an attribute that the dataset does not have: the one that may be meant, or z in place of a height. */
+bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_info *info,
                         char hint[SPL_SOFT_HINT_MAX]);
 
 #endif

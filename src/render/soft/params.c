@@ -1,9 +1,8 @@
-/* What a view says of soft transparency: names of its choices, and checks. Pure; any thread. */
-#include "render/soft_params.h"
-
+/* What a view says of soft transparency: names of its choices, and checks of what is no term. Pure; any thread. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
+
+#include <splatd/soft.h>
 
 #include "base/decimal.h"
 #include "base/error.h"
@@ -47,56 +46,9 @@ int spl_soft_of_from_name(const char *name)
     return -1;
 }
 
-static bool check_shape(const struct spl_soft_term *term, char fault[SPL_SOFT_FAULT_MAX])
-{
-    const double *s = term->shape, length = hypot(hypot(s[3], s[4]), s[5]);
-    const char *what = NULL;
-    for (int i = 0; i < 6; i++)
-        if (!isfinite(s[i]))
-            what = "has a number that is not finite";
-    if (!what && term->measure != SPL_SOFT_BOX && !(length > 0 && isfinite(length)))
-        what = "has a direction without length";
-    snprintf(fault, SPL_SOFT_FAULT_MAX, "%s", what ? what : "");
-    for (int i = 0; i < 3 && !what && term->measure == SPL_SOFT_BOX; i++)
-        if (s[i] > s[i + 3]) {
-            snprintf(fault, SPL_SOFT_FAULT_MAX, "has a box that ends at %.9g before it begins at %.9g", s[i + 3], s[i]);
-            return false;
-        }
-    return !what;
-}
-
-static bool is_share(double end)
-{
-    return isinf(end) || (end >= 0 && end <= 1);
-}
-
-bool spl_soft_check_term(const struct spl_soft_term *term, char fault[SPL_SOFT_FAULT_MAX])
-{
-    const char *what = NULL;
-    if ((unsigned)term->measure > SPL_SOFT_BOX)
-        what = "measures nothing that exists";
-    else if (isnan(term->least) || isnan(term->most) || term->least > term->most || term->least == INFINITY ||
-             term->most == -INFINITY) {
-        snprintf(fault, SPL_SOFT_FAULT_MAX, "ends at %.9g before it begins at %.9g", term->most, term->least);
-        return false;
-    } else if (term->measure >= SPL_SOFT_AXIS)
-        return check_shape(term, fault);
-    else if (!term->name[0] || !memchr(term->name, 0, sizeof term->name))
-        what = "names no attribute";
-    else if (term->measure == SPL_SOFT_QUANTILE && !(is_share(term->least) && is_share(term->most))) {
-        snprintf(fault, SPL_SOFT_FAULT_MAX, "has quantile %.9g, which is not within 0 and 1",
-                 is_share(term->least) ? term->most : term->least);
-        return false;
-    }
-    snprintf(fault, SPL_SOFT_FAULT_MAX, "%s", what ? what : "");
-    return !what;
-}
-
 int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
 {
-    char fault[SPL_SOFT_FAULT_MAX], number[SPL_DECIMAL_MAX];
-    if (soft->count > SPL_SOFT_TERMS_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "soft", "%u terms are more than %d", soft->count, SPL_SOFT_TERMS_MAX);
+    char number[SPL_DECIMAL_MAX];
     if ((unsigned)soft->model >= SPL_SOFT_MODEL_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "soft_model", "soft_model %d does not exist", (int)soft->model);
     if (!(soft->opacity >= 0 && soft->opacity <= 1))
@@ -109,8 +61,5 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "soft_blend", "soft_blend %g is not 0 or more", soft->blend);
     if ((unsigned)soft->of >= SPL_SOFT_OF_COUNT)
         return spl_fail_field(err, SPL_E_USAGE, "of", "of %d does not exist", (int)soft->of);
-    for (uint32_t i = 0; i < soft->count; i++)
-        if (!spl_soft_check_term(&soft->terms[i], fault))
-            return spl_fail_field(err, SPL_E_USAGE, "soft", "term %u of soft %s", i + 1, fault);
-    return SPL_OK;
+    return spl_terms_check(&soft->what, "soft", err);
 }

@@ -40,11 +40,14 @@ static double share_of_values(const struct spl_marks_term *term, const struct sp
     return fmax(share, 0.5 / SPL_VALUES_QUANTILES); /* some are there: less than a quantile tells */
 }
 
-/* How far the bounds lie from a shape: 0 where it is not known that they do. */
+/* How far the bounds lie from a shape, as its term measures it: of a box that they reach, of one that is turned and of a
+ * polygon, anything. Coordinates are measured from a plane through the origin. */
 static void measure_bounds(const struct spl_marks_term *term, const struct spl_dataset_info *info, double *low,
                            double *high)
 {
     const double *s = term->shape;
+    const bool flat = term->measure == SPL_TERM_PLANE || term->measure == SPL_TERM_COORDINATE;
+    const bool turned = s[6] != 0 || s[7] != 0 || s[8] != 0;
     double middle = 0, reach = 0, from_axis = 0, radius = 0, outside = 0, length = hypot(hypot(s[3], s[4]), s[5]);
     for (int i = 0; i < 3; i++) {
         const double half = (info->bounds_max[i] - info->bounds_min[i]) / 2, at = info->bounds_min[i] + half - s[i];
@@ -57,16 +60,18 @@ static void measure_bounds(const struct spl_marks_term *term, const struct spl_d
     }
     from_axis = sqrt(fmax(from_axis - middle * middle, 0));
     radius = sqrt(radius);
-    *low = term->measure == SPL_SOFT_PLANE  ? middle - reach
-           : term->measure == SPL_SOFT_AXIS ? fmax(from_axis - radius, 0)
-                                            : sqrt(outside);
-    *high = term->measure == SPL_SOFT_PLANE  ? middle + reach
-            : term->measure == SPL_SOFT_AXIS ? from_axis + radius
-                                             : INFINITY;
+    const bool apart = term->measure == SPL_TERM_BOX && !turned && outside > 0;
+    *low = flat                             ? middle - reach
+           : term->measure == SPL_TERM_AXIS ? fmax(from_axis - radius, 0)
+           : apart                          ? sqrt(outside)
+                                            : -INFINITY;
+    *high = flat ? middle + reach : term->measure == SPL_TERM_AXIS ? from_axis + radius : INFINITY;
 }
 
 double spl_soft_share(const struct spl_marks_term *term, const struct spl_dataset_info *info)
 {
+    if (term->outside) /* of all terms of its list */
+        return NAN;
     if (term->stream >= 0) {
         const struct spl_stream_values *values = spl_dataset_info_get_values(info, (uint32_t)term->stream);
         if (!values || !info->leaf_splats)
@@ -75,7 +80,7 @@ double spl_soft_share(const struct spl_marks_term *term, const struct spl_datase
     }
     double low, high;
     measure_bounds(term, info, &low, &high);
-    const double slack = 1e-9 * (1 + fabs(low)); /* of rounding */
+    const double slack = isfinite(low) ? 1e-9 * (1 + fabs(low)) : 0; /* of rounding */
     if (low - slack > term->most || high + slack < term->least)
         return 0;
     return low - slack > term->least && high + slack < term->most ? 1 : NAN;
@@ -83,12 +88,12 @@ double spl_soft_share(const struct spl_marks_term *term, const struct spl_datase
 
 double spl_soft_share_of_all(const struct spl_soft_params *soft, const struct spl_dataset_info *info)
 {
-    struct spl_marks_term ends[SPL_SOFT_TERMS_MAX];
+    struct spl_marks_term ends[SPL_TERMS_MAX];
     struct spl_error ignored = {0};
     double sum = 0;
     if (spl_marks_resolve(soft, info, ends, &ignored))
         return NAN;
-    for (uint32_t i = 0; i < soft->count; i++)
+    for (uint32_t i = 0; i < soft->what.count; i++)
         sum += spl_soft_share(&ends[i], info);
     return fmin(sum, 1) + (isnan(sum) ? sum : 0);
 }
@@ -100,10 +105,10 @@ static void say(char reason[SPL_SOFT_REASON_MAX], size_t *used, const char *text
     *used += length < 0 ? 0 : (size_t)length < room ? (size_t)length : room - 1;
 }
 
-void spl_soft_explain(const struct spl_soft_term *term, const struct spl_dataset_info *info,
+void spl_soft_explain(const struct spl_term *term, const struct spl_dataset_info *info,
                       char reason[SPL_SOFT_REASON_MAX])
 {
-    const struct spl_soft_params one = {.count = 1, .terms = {*term}};
+    const struct spl_soft_params one = {.what = {.count = 1, .terms = {*term}}};
     struct spl_marks_term ends;
     struct spl_error ignored = {0};
     char text[96];

@@ -14,7 +14,7 @@ double spl_soft_share_of_all(const struct spl_soft_params *soft, const struct sp
 
 /* Why no splat of the dataset is soft by the term: "class is 2, 5 or 6 in 'hall'". Empty where some may be. */
 enum { SPL_SOFT_REASON_MAX = 512 };
-void spl_soft_explain(const struct spl_soft_term *term, const struct spl_dataset_info *info,
+void spl_soft_explain(const struct spl_term *term, const struct spl_dataset_info *info,
                       char reason[SPL_SOFT_REASON_MAX]);
 
 #endif

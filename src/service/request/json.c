@@ -60,8 +60,8 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
         if (param == PARAM_COUNT)
             return SPL_E_INPUT;
         int kind = spl_params[param].kind;
-        if (kind == SPL_KIND_SOFT) {
-            if ((rc = spl_values_add_soft_json(values, json, err)))
+        if (kind == SPL_KIND_TERMS) {
+            if ((rc = spl_values_add_terms_json(values, (int)param, json, err)))
                 return rc;
             continue;
         }

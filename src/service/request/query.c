@@ -92,13 +92,13 @@ static void read_blanks(char *text)
 }
 
 /* May be given several times, and is longer than others. */
-static int parse_soft(struct values *values, const char *text, size_t length, struct spl_error *err)
+static int parse_terms(struct values *values, enum param param, const char *text, size_t length, struct spl_error *err)
 {
-    char decoded[SPL_SOFT_TEXT_MAX + 1];
-    int rc = spl_percent_decode(text, length, decoded, sizeof decoded, "soft", err);
+    char decoded[SPL_TERMS_TEXT_MAX + 1];
+    int rc = spl_percent_decode(text, length, decoded, sizeof decoded, spl_params[param].name, err);
     if (!rc)
         read_blanks(decoded);
-    return rc ? rc : spl_values_add_soft(values, decoded, err);
+    return rc ? rc : spl_values_add_terms(values, param, decoded, err);
 }
 
 static int parse_pair(struct values *values, const char *pair, size_t length, enum spl_value_place place,
@@ -116,8 +116,8 @@ static int parse_pair(struct values *values, const char *pair, size_t length, en
     if (!equals)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s has no value; write %s=…", name, name);
     struct spl_value *value = &values->v[param];
-    if (spl_params[param].kind == SPL_KIND_SOFT)
-        return parse_soft(values, equals + 1, length - name_length - 1, err);
+    if (spl_params[param].kind == SPL_KIND_TERMS)
+        return parse_terms(values, param, equals + 1, length - name_length - 1, err);
     if (spl_params[param].kind == SPL_KIND_COLOR_BY)
         return parse_color(values, equals + 1, length - name_length - 1, err);
     if ((rc = spl_value_claim(&values->v[param], name, err)))

@@ -208,7 +208,7 @@ int spl_values_resolve(const struct values *values, const struct spl_camera_defa
     if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
         (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
         (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_soft(values, defaults, &out->view, err)) ||
+        (rc = spl_values_resolve_terms(values, defaults, &out->view, err)) ||
         (rc = spl_values_resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;

@@ -85,10 +85,10 @@ int spl_views_request_from_json(const char *body, size_t length, const struct sp
 void spl_views_request_finish(struct spl_views_request *request);
 
 /* Points of shapes from EPSG:`crs` to the world; directions are of the world's axes, as up is, and distances in its unit.
- * A box, which would not be one there, is refused. Errors are those of places->to_world(), or SPL_E_INPUT, field "soft".
- */
-int spl_soft_to_world(struct spl_soft_params *soft, uint32_t crs, const struct spl_camera_places *places,
-                      struct spl_error *err);
+ * A box, which would not be one there, is refused, as x, y and z are. Errors are those of places->to_world(), or
+ * SPL_E_INPUT, of `field`. */
+int spl_terms_to_world(struct spl_terms *terms, const char *field, uint32_t crs, const struct spl_camera_places *places,
+                       struct spl_error *err);
 
 /* How `layer`, a bit of view.layers, is encoded. */
 struct spl_encode_options spl_view_get_encoding(const struct spl_view_request *request, enum spl_layer layer);

@@ -26,7 +26,7 @@ enum {
     SPL_KIND_SHADE,    /* kinds, azimuth and elevation of the sun */
     SPL_KIND_RANGE,    /* ends; bit per end that is a quantile */
     SPL_KIND_COLOR_BY, /* what colours show, which is kept beside the numbers */
-    SPL_KIND_SOFT,     /* terms, which are kept beside the numbers */
+    SPL_KIND_TERMS,    /* which are kept beside the numbers */
 };
 
 enum param {
@@ -47,6 +47,7 @@ extern const struct param_info spl_params[PARAM_COUNT];
 struct values {
     struct spl_value v[PARAM_COUNT]; /* colours: R, G, B, A */
     struct spl_soft_params soft;     /* terms alone, of PARAM_soft */
+    struct spl_terms clip, classes;  /* of PARAM_clip, PARAM_class */
     struct spl_color_params color;   /* what they show alone, of PARAM_color_by */
 };
 
@@ -77,16 +78,18 @@ int spl_values_from_body(struct values *values, const char *body, size_t length,
 int spl_values_set_color(struct values *values, const char *text, struct spl_error *err);
 void spl_values_resolve_colors(const struct values *values, struct spl_view *view);
 
-/* soft.c: more terms, as text, or as JSON: text, or an array of such, which may be empty and then says that nothing is
- * soft. */
-int spl_values_add_soft(struct values *values, const char *text, struct spl_error *err);
-int spl_values_add_soft_json(struct values *values, const json_t *json, struct spl_error *err);
+/* terms.c: more terms of PARAM_soft, _clip or _class, as text, or as JSON: text, or an array of such, which may be empty
+ * and then says nothing. */
+int spl_values_add_terms(struct values *values, int param, const char *text, struct spl_error *err);
+int spl_values_add_terms_json(struct values *values, int param, const json_t *json, struct spl_error *err);
+/* Those of `common` where it has none of its own. */
+void spl_values_inherit_terms(struct values *values, const struct values *common);
 /* `defaults`, or with `view` those of that view, in *own. SPL_E_INPUT, field "view". */
 int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
                            struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */
-int spl_values_resolve_soft(const struct values *values, const struct spl_camera_defaults *defaults,
-                            struct spl_view *view, struct spl_error *err);
+int spl_values_resolve_terms(const struct values *values, const struct spl_camera_defaults *defaults,
+                             struct spl_view *view, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,

@@ -21,12 +21,10 @@ static int resolve_view(const struct values *common, json_t *json, const struct 
     int rc = spl_values_from_object(&own, json, SPL_BODY, err);
     if (!own.v[PARAM_color_by].given)
         own.color = common->color;
-    bool own_soft = own.v[PARAM_soft].given;
+    spl_values_inherit_terms(&own, common);
     for (int i = 0; i < PARAM_COUNT; i++)
         if (!own.v[i].given)
             own.v[i] = common->v[i];
-    if (common->v[PARAM_soft].given && !own_soft)
-        own.soft = common->soft;
     if (rc || (rc = spl_values_resolve(&own, defaults, limits, out, err)))
         return rc;
     if (out->container)

@@ -160,7 +160,7 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
 /* What fades along a path, but is nowhere, would be taken for done. */
 static int check_fades(const struct spl_camera_path *path, const struct spl_view *settings, struct spl_error *err)
 {
-    if (!path->values || settings->soft.count)
+    if (!path->values || settings->soft.what.count)
         return 0;
     return spl_fail_field(err, SPL_E_INPUT, "settings.soft",
                           "the path changes soft_opacity, soft_cover or soft_blend, and nothing is soft: say what, as "

@@ -72,13 +72,13 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
     add(form, (uint64_t)camera->projection);
 }
 
-/* Their one text stands for what is soft; another order of terms is another key. */
-static void add_terms(struct form *form, const struct spl_soft_params *soft)
+/* Their one text stands for what is soft, or drawn; another order of terms is another key. */
+static void add_terms(struct form *form, const struct spl_terms *terms)
 {
-    char text[SPL_SOFT_TEXT_MAX + 1];
+    char text[SPL_TERMS_TEXT_MAX + 1];
     XXH128_hash_t hash = {0};
-    if (soft->count)
-        hash = XXH3_128bits(text, (size_t)spl_soft_print(soft, text, sizeof text));
+    if (terms->count)
+        hash = XXH3_128bits(text, (size_t)spl_terms_print(terms, text, sizeof text));
     add(form, hash.high64);
     add(form, hash.low64);
 }
@@ -140,10 +140,10 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
                       (colored || param->changes != SPL_CHANGES_TEXTURES) &&
                       (shades & SPL_SHADE_EDL || param->changes != SPL_CHANGES_SHADE) &&
                       (painted || param->changes != SPL_CHANGES_COLORS) &&
-                      (view->soft.count || param->changes != SPL_CHANGES_SOFT);
+                      (view->soft.what.count || param->changes != SPL_CHANGES_SOFT);
         add_number(&form, counts ? spl_view_get_param(view, i) : 0);
     }
-    add_terms(&form, &view->soft);
+    add_terms(&form, &view->soft.what);
     add_shade(&form, &view->shade, shades);
     add_color(&form, &view->color, painted);
     add(&form, colored ? background : 0);
@@ -157,6 +157,10 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     for (unsigned layer = 0; layer < SPL_LAYER_COUNT && !request->picks; layer++)
         if (view->layers >> layer & 1)
             add_encoding(&form, request, (enum spl_layer)layer);
+    if (view->clip.count) { // behind all else, so that keys without are those of before
+        add(&form, UINT64_MAX);
+        add_terms(&form, &view->clip);
+    }
     XXH128_hash_t hash = XXH3_128bits(form.words, form.count * sizeof *form.words);
     return (struct spl_key){.words = {hash.high64, hash.low64}};
 }

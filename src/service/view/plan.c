@@ -180,7 +180,7 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
                                   : view->maps == SPL_MAPS_ON ? SPL_SETTING_MAPS_ON
                                                               : SPL_SETTING_MAPS_OFF};
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
-    if (index >= 0 && view->soft.count)
+    if (index >= 0 && view->soft.what.count)
         spl_planner_learn_soft(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer,
                                &view->soft, ms, soft_ms);
     else if (index >= 0)

@@ -322,9 +322,9 @@ static void test_soft(void **state)
     struct spl_profile *both[] = {&profile, &again};
     for (int i = 0; i < 2; i++) {
         const struct spl_profile_point *p = both[i]->points;
-        assert_true(both[i]->count == 3 && both[i]->soft.count == 1 && both[i]->soft.blend == 0.5 &&
+        assert_true(both[i]->count == 3 && both[i]->soft.what.count == 1 && both[i]->soft.blend == 0.5 &&
                     both[i]->soft.cover == 1); /* which the text does not say */
-        assert_string_equal(both[i]->soft.terms[0].name, "class");
+        assert_string_equal(both[i]->soft.what.terms[0].name, "class");
         assert_true(!p[0].setting.soft && isnan(p[0].soft_ms) && p[1].soft_ms == 20);
         assert_string_equal(spl_setting_soft_name(p[1].setting.soft), "express");
         assert_string_equal(spl_setting_soft_name(p[2].setting.soft), "base");
@@ -333,9 +333,9 @@ static void test_soft(void **state)
     struct spl_view view;
     spl_view_init(&view);
     spl_setting_apply_soft(&profile.points[2].setting, &profile.soft, &view);
-    assert_true(view.soft.count == 1 && view.soft.model == SPL_SOFT_MODEL_BASE && view.soft.opacity == 0.3);
+    assert_true(view.soft.what.count == 1 && view.soft.model == SPL_SOFT_MODEL_BASE && view.soft.opacity == 0.3);
     spl_setting_apply_soft(&profile.points[0].setting, &profile.soft, &view);
-    assert_int_equal(view.soft.count, 0);
+    assert_int_equal(view.soft.what.count, 0);
     spl_profile_finish(&profile);
     spl_profile_finish(&again);
     unlink(path);

@@ -61,9 +61,9 @@ static struct spl_dataset_info describe(void)
     return info;
 }
 
-static struct spl_soft_term term_of(const char *name, double least, double most)
+static struct spl_term term_of(const char *name, double least, double most)
 {
-    struct spl_soft_term term = {.least = least, .most = most, .with_least = uniform() < 0.5,
+    struct spl_term term = {.least = least, .most = most, .with_least = uniform() < 0.5,
                                  .with_most = uniform() < 0.5};
     snprintf(term.name, sizeof term.name, "%s", name);
     return term;
@@ -128,13 +128,13 @@ static void numbers_are_as_they_decode(void **state)
         if (uniform() < 0.2)
             ends[0] = -INFINITY;
         double blend = uniform() < 0.5 ? 0 : 30 * uniform();
-        struct spl_soft_params soft = {.count = 1, .blend = blend};
-        soft.terms[0] = term_of(info.streams[s].name, fmin(ends[0], ends[1]), fmax(ends[0], ends[1]));
+        struct spl_soft_params soft = {.what.count = 1, .blend = blend};
+        soft.what.terms[0] = term_of(info.streams[s].name, fmin(ends[0], ends[1]), fmax(ends[0], ends[1]));
         struct spl_marks marks = {.count = 1, .streams = streams};
         assert_int_equal(spl_marks_resolve(&soft, &info, marks.terms, NULL), SPL_OK);
         if (s == 2) /* shares of the 99th percentile */
             for (int e = 0; e < 2; e++)
-                *(e ? &soft.terms[0].most : &soft.terms[0].least) *= 63.5;
+                *(e ? &soft.what.terms[0].most : &soft.what.terms[0].least) *= 63.5;
         spl_marks_find_numbers(&marks);
         double used = s == 0 ? 0 : s == 2 ? blend * 63.5 : blend;
 
@@ -152,13 +152,13 @@ static void numbers_are_as_they_decode(void **state)
         spl_marks_judge(&marks, NULL, &tables, 0, NULL, &judged);
         for (uint32_t i = 0; i < c.chunk.count; i++) {
             double value = spl_stream_decode(&streams[s], (struct spl_stream_code){c.base, c.width}, c.words, i);
-            double share = reference_share(&soft.terms[0], used, value);
+            double share = reference_share(&soft.what.terms[0], used, value);
             uint32_t mark = mark_of(&judged, &c, i, (float[3]){0});
             if ((share >= 0) != (mark > 0) || (mark && fabs(share * SPL_MARK_MOST - (mark - 1.0)) > 0.6))
                 fail_msg("round %d, %s, base %u, width %u: value %.17g, of %.17g%s to %.17g%s, is %g and has mark %u", round,
-                         streams[s].type, c.base, c.width, value, soft.terms[0].least,
-                         soft.terms[0].with_least ? " (with it)" : "", soft.terms[0].most,
-                         soft.terms[0].with_most ? " (with it)" : "", share, mark);
+                         streams[s].type, c.base, c.width, value, soft.what.terms[0].least,
+                         soft.what.terms[0].with_least ? " (with it)" : "", soft.what.terms[0].most,
+                         soft.what.terms[0].with_most ? " (with it)" : "", share, mark);
             assert_true(judged.soft || share < 0);
             assert_true(judged.solid || share >= 0);
         }
@@ -187,15 +187,15 @@ static void shapes_are_as_far_as_they_are(void **state)
             target[i] = far_away + 20 * uniform();
         }
         assert_int_equal(spl_camera_look_at(&camera, eye, target, (const double[3]){0.1, 0.2, 1}, NULL), SPL_OK);
-        struct spl_soft_params soft = {.count = 1, .blend = uniform() < 0.5 ? 0 : 4 * uniform()};
-        struct spl_soft_term *term = &soft.terms[0];
+        struct spl_soft_params soft = {.what.count = 1, .blend = uniform() < 0.5 ? 0 : 4 * uniform()};
+        struct spl_term *term = &soft.what.terms[0];
         *term = term_of("", uniform() < 0.5 ? -INFINITY : 12 * uniform() - 4, INFINITY);
-        term->measure = SPL_SOFT_AXIS + round % 3;
+        term->measure = SPL_TERM_AXIS + round % 3;
         if (uniform() < 0.7)
             term->most = fmax(term->least, -3) + 8 * uniform();
         for (int i = 0; i < 3; i++) {
             term->shape[i] = far_away + 20 * uniform();
-            term->shape[i + 3] = term->measure == SPL_SOFT_BOX ? term->shape[i] + 8 * uniform() : uniform() - 0.5;
+            term->shape[i + 3] = term->measure == SPL_TERM_BOX ? term->shape[i] + 8 * uniform() : uniform() - 0.5;
         }
         struct spl_marks marks = {.count = 1, .streams = streams};
         struct spl_marks_view view;
@@ -258,12 +258,12 @@ static void any_term_will_do(void **state)
         c[0].chunk.geometry_word = (uint32_t)-(int32_t)spl_chunk_words(&c[0].chunk);
         memcpy(page, c[0].words, count * sizeof *page);
         memcpy(page + count, c[1].words, spl_stream_words(c[1].width, 60) * sizeof *page);
-        struct spl_soft_params soft = {.count = 1 + (uint32_t)(uniform() * SPL_SOFT_TERMS_MAX)};
-        for (uint32_t t = 0; t < soft.count; t++) {
+        struct spl_soft_params soft = {.what.count = 1 + (uint32_t)(uniform() * SPL_TERMS_MAX)};
+        for (uint32_t t = 0; t < soft.what.count; t++) {
             double at = (t % 2 ? 100 : 40) * (uniform() - 0.5);
-            soft.terms[t] = term_of(info.streams[t % 2].name, at, at + 12 * uniform());
+            soft.what.terms[t] = term_of(info.streams[t % 2].name, at, at + 12 * uniform());
         }
-        struct spl_marks marks = {.count = soft.count, .streams = streams};
+        struct spl_marks marks = {.count = soft.what.count, .streams = streams};
         assert_int_equal(spl_marks_resolve(&soft, &info, marks.terms, NULL), SPL_OK);
         spl_marks_find_numbers(&marks);
         uint32_t bases[2] = {c[0].base, c[1].base};
@@ -277,11 +277,11 @@ static void any_term_will_do(void **state)
         spl_marks_judge(&marks, NULL, &tables, 0, NULL, &judged);
         for (uint32_t i = 0; i < 60; i++) {
             bool soft_one = false;
-            for (uint32_t t = 0; t < soft.count; t++) {
+            for (uint32_t t = 0; t < soft.what.count; t++) {
                 uint32_t s = t % 2;
                 double value =
                     spl_stream_decode(&streams[s], (struct spl_stream_code){bases[s], widths[s]}, c[s].words, i);
-                soft_one |= reference_share(&soft.terms[t], 0, value) >= 0;
+                soft_one |= reference_share(&soft.what.terms[t], 0, value) >= 0;
             }
             uint32_t mark = judged.test_words ? reference_mark(judged.tests, 0, page, i, (float[3]){0})
                             : judged.soft     ? SPL_MARK_WHOLE
@@ -298,30 +298,30 @@ static void any_term_will_do(void **state)
 static void terms_meet_their_dataset(void **state)
 {
     struct spl_dataset_info info = describe(), bare = {.id = "bare"};
-    struct spl_marks_term ends[SPL_SOFT_TERMS_MAX];
-    struct spl_soft_params soft = {.count = 1, .blend = 0.125};
+    struct spl_marks_term ends[SPL_TERMS_MAX];
+    struct spl_soft_params soft = {.what.count = 1, .blend = 0.125};
     struct spl_error err = {0};
     (void)state;
-    soft.terms[0] = term_of("height", 0.5, 0.995);
-    soft.terms[0].measure = SPL_SOFT_QUANTILE;
+    soft.what.terms[0] = term_of("height", 0.5, 0.995);
+    soft.what.terms[0].measure = SPL_TERM_QUANTILE;
     assert_int_equal(spl_marks_resolve(&soft, &info, ends, &err), SPL_OK);
     assert_true(ends[0].least == 32 && fabs(ends[0].most - (63.5 + 36.5 / 2)) < 1e-9);
     assert_true(ends[0].blend_least == 8 && fabs(ends[0].blend_most - (ends[0].most - 0.87 * 64)) < 1e-9);
-    soft.terms[0] = term_of("uncertainty", 0.4, INFINITY);
+    soft.what.terms[0] = term_of("uncertainty", 0.4, INFINITY);
     assert_int_equal(spl_marks_resolve(&soft, &info, ends, &err), SPL_OK);
     assert_true(ends[0].least == 0.4 * 63.5 && isinf(ends[0].most) && ends[0].blend_least == 0.125 * 63.5);
     info.stream_values = NULL; /* as of a file of before: plain values are left */
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "soft");
     assert_non_null(strstr(err.message, "uncertainty"));
-    soft.terms[0].measure = SPL_SOFT_QUANTILE;
-    snprintf(soft.terms[0].name, sizeof soft.terms[0].name, "height");
+    soft.what.terms[0].measure = SPL_TERM_QUANTILE;
+    snprintf(soft.what.terms[0].name, sizeof soft.what.terms[0].name, "height");
     err = (struct spl_error){0};
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "'height'"));
-    soft.terms[0].measure = SPL_SOFT_ATTRIBUTE;
+    soft.what.terms[0].measure = SPL_TERM_ATTRIBUTE;
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, NULL), SPL_OK);
-    snprintf(soft.terms[0].name, sizeof soft.terms[0].name, "depth");
+    snprintf(soft.what.terms[0].name, sizeof soft.what.terms[0].name, "depth");
     err = (struct spl_error){0};
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "soft");
@@ -330,7 +330,7 @@ static void terms_meet_their_dataset(void **state)
     assert_int_equal(spl_marks_resolve(&soft, &bare, NULL, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "it has none"));
     snprintf(info.streams[1].type, sizeof info.streams[1].type, "later"); /* a type that nobody knows yet */
-    soft.terms[0] = term_of("height", 0, 1);
+    soft.what.terms[0] = term_of("height", 0, 1);
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, NULL), SPL_E_INPUT);
 }
 

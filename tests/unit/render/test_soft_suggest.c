@@ -118,7 +118,7 @@ static void test_nothing_has_a_reason(void **state)
     struct spl_dataset_info info = make_hall();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char reason[SPL_SOFT_REASON_MAX];
-        spl_soft_explain(&read_terms(rows[i].terms).terms[0], &info, reason);
+        spl_soft_explain(&read_terms(rows[i].terms).what.terms[0], &info, reason);
         if (strncmp(reason, rows[i].says, strlen(rows[i].says)) || (!*rows[i].says && *reason))
             fail_msg("%s: %s", rows[i].terms, reason);
     }
@@ -204,10 +204,10 @@ static void test_names_are_guessed(void **state)
         {"clas:5", "did you mean 'class'?"},
         {"int>5", "did you mean 'intensity'?"},
         {"smell>1", NULL},
-        {"z>20.5", "a coordinate is measured from a plane: write 'plane:0,0,20.5,0,0,1>0'"},
-        {"height<2", "a coordinate is measured from a plane: write 'plane:0,0,2,0,0,1<0'"},
-        {"X:1..2", "a coordinate is measured from a plane: write 'plane:1,0,0,1,0,0>0'"},
-        {"y<q0.5", "a coordinate is measured from a plane: write 'plane:0,0,0,0,1,0<0'"},
+        {"elevation>20.5", "coordinates are x, y and z: write 'z>20.5'"},
+        {"height<2", "coordinates are x, y and z: write 'z<2'"},
+        {"X:1..2", "coordinates are x, y and z: write 'x>1'"},
+        {"Y<q0.5", "coordinates are x, y and z: write 'y<0'"},
     };
     struct spl_dataset_info info = make_hall();
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -26,37 +26,37 @@ static void test_each_form_means_what_it_says(void **state)
     (void)state;
     static const struct {
         const char *text;
-        enum spl_soft_measure measure;
+        enum spl_term_measure measure;
         const char *name;
         double least, most;
         bool with_least, with_most;
     } cases[] = {
-        {"uncertainty>0.4", SPL_SOFT_ATTRIBUTE, "uncertainty", 0.4, INFINITY, false, false},
-        {" uncertainty >= 0.4 ", SPL_SOFT_ATTRIBUTE, "uncertainty", 0.4, INFINITY, true, false},
-        {"uncertainty>q0.9", SPL_SOFT_QUANTILE, "uncertainty", 0.9, INFINITY, false, false},
-        {"intensity<=300", SPL_SOFT_ATTRIBUTE, "intensity", -INFINITY, 300, false, true},
-        {"class:3", SPL_SOFT_ATTRIBUTE, "class", 3, 3, true, true},
-        {"class:3-5", SPL_SOFT_ATTRIBUTE, "class", 3, 5, true, true},
-        {"class:3..5", SPL_SOFT_ATTRIBUTE, "class", 3, 5, true, true},
-        {"angle:-5--2", SPL_SOFT_ATTRIBUTE, "angle", -5, -2, true, true},
-        {"angle:-5..-2.5", SPL_SOFT_ATTRIBUTE, "angle", -5, -2.5, true, true},
-        {"gps_time:1.5..1e9", SPL_SOFT_ATTRIBUTE, "gps_time", 1.5, 1e9, true, true},
-        {"x1:-1...5", SPL_SOFT_ATTRIBUTE, "x1", -1, 0.5, true, true}, /* -1, two dots, .5 */
-        {"red:q0.5..q0.75", SPL_SOFT_QUANTILE, "red", 0.5, 0.75, true, true},
-        {"0.2<uncertainty<=0.4", SPL_SOFT_ATTRIBUTE, "uncertainty", 0.2, 0.4, false, true},
-        {"0.4>=uncertainty>0.2", SPL_SOFT_ATTRIBUTE, "uncertainty", 0.2, 0.4, false, true},
-        {"q0.5<uncertainty", SPL_SOFT_QUANTILE, "uncertainty", 0.5, INFINITY, false, false},
-        {"intensity:*", SPL_SOFT_ATTRIBUTE, "intensity", -INFINITY, INFINITY, false, false},
-        {"axis:1,2,3,0,0,1<4", SPL_SOFT_AXIS, "", -INFINITY, 4, false, false},
-        {"1<axis:1,2,3,0,0,1<4", SPL_SOFT_AXIS, "", 1, 4, false, false},
-        {"plane:1,2,3,0,-1e-3,.5>0", SPL_SOFT_PLANE, "", 0, INFINITY, false, false},
-        {"box:1,2,3,4,5,6", SPL_SOFT_BOX, "", -INFINITY, 0, false, true},
-        {"box: 1, 2, 3, 4, 5, 6 < 2", SPL_SOFT_BOX, "", -INFINITY, 2, false, false},
+        {"uncertainty>0.4", SPL_TERM_ATTRIBUTE, "uncertainty", 0.4, INFINITY, false, false},
+        {" uncertainty >= 0.4 ", SPL_TERM_ATTRIBUTE, "uncertainty", 0.4, INFINITY, true, false},
+        {"uncertainty>q0.9", SPL_TERM_QUANTILE, "uncertainty", 0.9, INFINITY, false, false},
+        {"intensity<=300", SPL_TERM_ATTRIBUTE, "intensity", -INFINITY, 300, false, true},
+        {"class:3", SPL_TERM_ATTRIBUTE, "class", 3, 3, true, true},
+        {"class:3-5", SPL_TERM_ATTRIBUTE, "class", 3, 5, true, true},
+        {"class:3..5", SPL_TERM_ATTRIBUTE, "class", 3, 5, true, true},
+        {"angle:-5--2", SPL_TERM_ATTRIBUTE, "angle", -5, -2, true, true},
+        {"angle:-5..-2.5", SPL_TERM_ATTRIBUTE, "angle", -5, -2.5, true, true},
+        {"gps_time:1.5..1e9", SPL_TERM_ATTRIBUTE, "gps_time", 1.5, 1e9, true, true},
+        {"x1:-1...5", SPL_TERM_ATTRIBUTE, "x1", -1, 0.5, true, true}, /* -1, two dots, .5 */
+        {"red:q0.5..q0.75", SPL_TERM_QUANTILE, "red", 0.5, 0.75, true, true},
+        {"0.2<uncertainty<=0.4", SPL_TERM_ATTRIBUTE, "uncertainty", 0.2, 0.4, false, true},
+        {"0.4>=uncertainty>0.2", SPL_TERM_ATTRIBUTE, "uncertainty", 0.2, 0.4, false, true},
+        {"q0.5<uncertainty", SPL_TERM_QUANTILE, "uncertainty", 0.5, INFINITY, false, false},
+        {"intensity:*", SPL_TERM_ATTRIBUTE, "intensity", -INFINITY, INFINITY, false, false},
+        {"axis:1,2,3,0,0,1<4", SPL_TERM_AXIS, "", -INFINITY, 4, false, false},
+        {"1<axis:1,2,3,0,0,1<4", SPL_TERM_AXIS, "", 1, 4, false, false},
+        {"plane:1,2,3,0,-1e-3,.5>0", SPL_TERM_PLANE, "", 0, INFINITY, false, false},
+        {"box:1,2,3,4,5,6", SPL_TERM_BOX, "", -INFINITY, 0, false, true},
+        {"box: 1, 2, 3, 4, 5, 6 < 2", SPL_TERM_BOX, "", -INFINITY, 2, false, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_soft_params soft = read_terms(cases[i].text);
-        const struct spl_soft_term *term = soft.terms;
-        assert_int_equal(soft.count, 1);
+        const struct spl_term *term = soft.what.terms;
+        assert_int_equal(soft.what.count, 1);
         assert_int_equal(term->measure, cases[i].measure);
         assert_string_equal(term->name, cases[i].name);
         assert_true(term->least == cases[i].least && term->most == cases[i].most);
@@ -69,30 +69,30 @@ static void test_shapes_have_their_numbers(void **state)
     (void)state;
     static const double wanted[6] = {1.5, -2e6, 3, 0, 0.1, 1};
     struct spl_soft_params soft = read_terms("plane:1.5,-2e6,3,0,0.1,1>0");
-    assert_memory_equal(soft.terms[0].shape, wanted, sizeof wanted);
+    assert_memory_equal(soft.what.terms[0].shape, wanted, sizeof wanted);
 }
 
 static void test_lists_and_or_add_terms(void **state)
 {
     (void)state;
     struct spl_soft_params soft = read_terms("class:3-5,9 or uncertainty>q0.9  or  box:0,0,0,1,1,1");
-    assert_int_equal(soft.count, 4);
-    assert_true(soft.terms[1].least == 9 && soft.terms[1].most == 9);
-    assert_int_equal(soft.terms[2].measure, SPL_SOFT_QUANTILE);
+    assert_int_equal(soft.what.count, 4);
+    assert_true(soft.what.terms[1].least == 9 && soft.what.terms[1].most == 9);
+    assert_int_equal(soft.what.terms[2].measure, SPL_TERM_QUANTILE);
     assert_int_equal(spl_soft_parse("class:7+or+class:8", &soft, NULL), SPL_OK); /* as forms write blanks */
-    assert_int_equal(soft.count, 6);
-    assert_true(soft.terms[5].least == 8);
-    assert_string_equal(soft.terms[3].name, "");
+    assert_int_equal(soft.what.count, 6);
+    assert_true(soft.what.terms[5].least == 8);
+    assert_string_equal(soft.what.terms[3].name, "");
 }
 
 static void expect_same(const struct spl_soft_params *soft)
 {
-    char text[SPL_SOFT_TEXT_MAX + 1];
+    char text[SPL_TERMS_TEXT_MAX + 1];
     int length = spl_soft_print(soft, text, sizeof text);
     assert_true(length > 0 && length < (int)sizeof text && strlen(text) == (size_t)length);
     struct spl_soft_params back = read_terms(text);
-    assert_int_equal(back.count, soft->count);
-    if (memcmp(back.terms, soft->terms, sizeof soft->terms) != 0)
+    assert_int_equal(back.what.count, soft->what.count);
+    if (memcmp(back.what.terms, soft->what.terms, sizeof soft->what.terms) != 0)
         fail_msg("'%s' reads as something else", text);
 }
 
@@ -117,7 +117,7 @@ static void test_what_is_printed_reads_as_the_same(void **state)
         {"plane:0,0,0,0,0,1:1..2", "plane:0,0,0,0,0,1:1..2"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        char text[SPL_SOFT_TEXT_MAX + 1];
+        char text[SPL_TERMS_TEXT_MAX + 1];
         struct spl_soft_params soft = read_terms(cases[i].text);
         spl_soft_print(&soft, text, sizeof text);
         assert_string_equal(text, cases[i].printed);
@@ -132,9 +132,10 @@ static void test_sixteen_of_the_longest_fit(void **state)
     struct spl_soft_params soft;
     char small[8];
     memset(&soft, 0, sizeof soft);
-    for (soft.count = 0; soft.count < SPL_SOFT_TERMS_MAX; soft.count++) {
-        struct spl_soft_term *term = &soft.terms[soft.count];
-        term->measure = SPL_SOFT_PLANE;
+    for (soft.what.count = 0; soft.what.count < SPL_TERMS_MAX; soft.what.count++) {
+        struct spl_term *term = &soft.what.terms[soft.what.count];
+        term->measure = SPL_TERM_PLANE;
+        term->joint = SPL_TERM_OR;
         term->least = -1.2345678901234567e-300;
         term->most = 1.2345678901234567e-300;
         for (int i = 0; i < 6; i++)
@@ -212,7 +213,7 @@ static void test_what_is_wrong_is_named(void **state)
         {"axis:1,2,3,0,0,1<q0.5", "no shares of splats"},
         {"axis:1,2,3,0,0,1", "no <, >"},
         {"box:1,2,3,0,5,6", "ends at 0 before it begins at 1"},
-        {"box:1,2,3,4,5,6,7", "neither the end"},
+        {"box:1,2,3,4,5,6,7,8", "by three"},
         {"a_name_that_is_far_too_long_for_it>4", "more than 31 characters"},
         {"\xc3\xbc>1", "term 1, '', at character 1"},
     };
@@ -232,20 +233,20 @@ static void test_what_is_wrong_is_named(void **state)
 static void test_there_are_bounds(void **state)
 {
     (void)state;
-    static char text[SPL_SOFT_TEXT_MAX + 2];
+    static char text[SPL_TERMS_TEXT_MAX + 2];
     struct spl_soft_params soft;
     struct spl_error err = {0};
     memset(&soft, 0, sizeof soft);
     assert_int_equal(spl_soft_parse("class:1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16", &soft, NULL), SPL_OK);
     memset(&soft, 0, sizeof soft);
     assert_int_equal(spl_soft_parse("class:1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17", &soft, &err), SPL_E_LIMIT);
-    assert_int_equal(soft.count, 0);
+    assert_int_equal(soft.what.count, 0);
     memset(text, ' ', sizeof text - 1);
     memcpy(text, "class:1", 7);
     err = (struct spl_error){0};
     assert_int_equal(spl_soft_parse(text, &soft, &err), SPL_E_INPUT);
-    assert_non_null(strstr(err.message, "longer than 4096"));
-    text[SPL_SOFT_TEXT_MAX] = '\0';
+    assert_non_null(strstr(err.message, "longer than 8192"));
+    text[SPL_TERMS_TEXT_MAX] = '\0';
     assert_int_equal(spl_soft_parse(text, &soft, NULL), SPL_OK);
 }
 

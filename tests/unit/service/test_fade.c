@@ -95,7 +95,7 @@ static void what_no_key_says_is_of_the_settings(void **state)
                                ",\"frames\":3", &spec, &err), 0);
     struct spl_view view = spec.view.view;
     spl_fade_apply(spec.fades[1], &view);
-    assert_true(view.soft.blend == 3 && view.soft.cover == 0.75 && view.soft.opacity == 0.3 && view.soft.count == 1);
+    assert_true(view.soft.blend == 3 && view.soft.cover == 0.75 && view.soft.opacity == 0.3 && view.soft.what.count == 1);
     spl_tour_spec_finish(&spec);
 }
 

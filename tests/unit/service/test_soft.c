@@ -62,10 +62,10 @@ static void every_way_of_asking_means_the_same(void **state)
     };
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
         struct spl_soft_params soft = soft_asked(ways[i]);
-        assert_int_equal(soft.count, 2);
-        assert_true(soft.terms[0].least == 3 && soft.terms[0].most == 5);
-        assert_string_equal(soft.terms[1].name, "uncertainty");
-        assert_int_equal(soft.terms[1].measure, SPL_SOFT_QUANTILE);
+        assert_int_equal(soft.what.count, 2);
+        assert_true(soft.what.terms[0].least == 3 && soft.what.terms[0].most == 5);
+        assert_string_equal(soft.what.terms[1].name, "uncertainty");
+        assert_int_equal(soft.what.terms[1].measure, SPL_TERM_QUANTILE);
         assert_true(soft.model == SPL_SOFT_MODEL_BASE && soft.opacity == 0.7 && soft.cover == 0.25 && soft.blend == 2);
     }
 }
@@ -76,7 +76,7 @@ static void nothing_is_soft_by_itself(void **state)
     static const char *const ways[] = {"", "{}", "{\"soft\":[]}", "@x=1&y=1"};
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
         struct spl_soft_params soft = soft_asked(ways[i]);
-        assert_true(!soft.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && soft.cover == 1 && !soft.blend);
+        assert_true(!soft.what.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && soft.cover == 1 && !soft.blend);
     }
 }
 
@@ -88,13 +88,13 @@ static void shapes_are_moved_into_the_world(void **state)
     struct spl_error err;
     struct spl_soft_params soft =
         soft_asked("crs=EPSG:4326&eye=1,0,0&soft=axis:1,2,3,0,0,1<4&soft=class:2&soft=plane:4,5,6,1,0,0>0");
-    assert_memory_equal(soft.terms[0].shape, axis, sizeof axis);
-    assert_memory_equal(soft.terms[2].shape, plane, sizeof plane);
-    assert_true(soft.terms[0].most == 4);
+    assert_memory_equal(soft.what.terms[0].shape, axis, sizeof axis);
+    assert_memory_equal(soft.what.terms[2].shape, plane, sizeof plane);
+    assert_true(soft.what.terms[0].most == 4);
     soft = soft_asked("@{\"x\":1,\"y\":1,\"camera\":{\"crs\":\"EPSG:4326\"},\"soft\":\"axis:1,2,3,0,0,1<4\"}");
-    assert_memory_equal(soft.terms[0].shape, axis, sizeof axis);
+    assert_memory_equal(soft.what.terms[0].shape, axis, sizeof axis);
     soft = soft_asked("soft=box:1,2,3,4,5,6");
-    assert_true(soft.terms[0].shape[0] == 1 && soft.terms[0].shape[5] == 6);
+    assert_true(soft.what.terms[0].shape[0] == 1 && soft.what.terms[0].shape[5] == 6);
     assert_int_equal(ask("crs=EPSG:4326&soft=box:1,2,3,4,5,6", &r, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "soft");
     assert_non_null(strstr(err.message, "EPSG:4326"));
@@ -113,11 +113,11 @@ static void a_batch_shares_its_terms_unless_a_view_has_its_own(void **state)
     struct spl_views_request batch;
     struct spl_error err = {0};
     assert_int_equal(spl_views_request_from_json(body, strlen(body), &defaults, &limits, &batch, &err), 0);
-    assert_int_equal(batch.views[0].view.soft.count, 2);
-    assert_true(batch.views[0].view.soft.terms[1].least == 5 && batch.views[0].view.soft.opacity == 0.5);
-    assert_int_equal(batch.views[1].view.soft.count, 1);
-    assert_string_equal(batch.views[1].view.soft.terms[0].name, "u");
-    assert_int_equal(batch.views[2].view.soft.count, 0);
+    assert_int_equal(batch.views[0].view.soft.what.count, 2);
+    assert_true(batch.views[0].view.soft.what.terms[1].least == 5 && batch.views[0].view.soft.opacity == 0.5);
+    assert_int_equal(batch.views[1].view.soft.what.count, 1);
+    assert_string_equal(batch.views[1].view.soft.what.terms[0].name, "u");
+    assert_int_equal(batch.views[2].view.soft.what.count, 0);
     assert_true(batch.views[2].view.soft.opacity == 0.1);
     spl_views_request_finish(&batch);
     assert_int_equal(spl_views_request_from_json(wrong, strlen(wrong), &defaults, &limits, &batch, &err), SPL_E_INPUT);
@@ -144,7 +144,7 @@ static void headers_say_what_a_body_would(void **state)
     assert_string_equal(at, "{\"soft\":[\"u>0.5\",\"class:3..5\"],\"soft_model\":\"express\",\"soft_opacity\":0.1,"
                             "\"soft_cover\":1,\"soft_blend\":0,\"of\":\"solid\"}");
     struct spl_soft_params again = soft_asked(at);
-    assert_memory_equal(again.terms, r.view.soft.terms, sizeof again.terms);
+    assert_memory_equal(again.what.terms, r.view.soft.what.terms, sizeof again.what.terms);
     free(headers.text);
 }
 
