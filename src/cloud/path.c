@@ -137,7 +137,12 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
                               spl_json_type_name(list));
     reader->path->fps = json_number_value(json_object_get(json, "fps"));
     reader->path->closed = json_is_true(json_object_get(json, "closed"));
-    int rc = spl_path_set_size(reader, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT, err);
+    const json_t *camera = json_object_get(json_array_get(list, 0), "camera");
+    const char *named = json_string_value(json_object_get(camera, "projection"));
+    const int projection = named ? spl_projection_from_name(named) : -1;
+    double shape[2];
+    spl_size_of_projection(projection < 0 ? SPL_PERSPECTIVE : (enum spl_projection)projection, shape);
+    int rc = spl_path_set_size(reader, shape[0], shape[1], err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
         if ((rc = read_own_key(reader, json_array_get(list, i), json_object_get(json, "crs"), &why))) {

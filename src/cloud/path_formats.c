@@ -19,15 +19,17 @@ static int get_list(struct spl_path_reader *reader, const json_t *json, const ch
     return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array; it is %s", name, spl_json_type_name(*list));
 }
 
-static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *frame, struct spl_error *err)
+static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *frame, bool around, struct spl_error *err)
 {
-    double matrix[16], fov;
+    double matrix[16], fov = NAN;
     struct spl_camera camera;
     struct spl_error why = {0};
     int rc;
     if ((rc = spl_json_get_matrix(json_object_get(frame, "camera_to_world"), "camera_to_world", 4, 4, SPL_ROW_MAJOR,
                                   matrix, err)) ||
-        (rc = spl_json_get_number(frame, "fov", &fov, err)) || (rc = spl_path_set_fov(reader, fov, &camera, err)))
+        (!around && (rc = spl_json_get_number(frame, "fov", &fov, err))) ||
+        (rc = spl_path_set_fov(reader, fov, &camera, err)) ||
+        (around && (rc = spl_camera_set_around(&camera, SPL_EQUIRECTANGULAR, camera.width, camera.height, err))))
         return rc;
     if ((rc = spl_camera_set_matrix(&camera, matrix, SPL_AXES_OPENGL, &why)))
         return spl_fail_field(err, rc, "camera_to_world", "camera_to_world: %s", why.message);
@@ -38,11 +40,12 @@ static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *f
 int spl_path_read_nerfstudio(struct spl_path_reader *reader, const json_t *json, struct spl_error *err)
 {
     const json_t *list, *type = json_object_get(json, "camera_type");
+    const bool around = json_is_string(type) && !strcmp(json_string_value(type), "equirectangular");
     double width = 0, height = 0;
     int rc;
-    if (type && (!json_is_string(type) || strcmp(json_string_value(type), "perspective")))
+    if (type && !around && (!json_is_string(type) || strcmp(json_string_value(type), "perspective")))
         return spl_fail_field(err, SPL_E_UNSUPPORTED, "camera_type",
-                              "camera_type %.32s is not drawn; only perspective is",
+                              "camera_type %.32s is not drawn; perspective and equirectangular are",
                               json_is_string(type) ? json_string_value(type) : spl_json_type_name(type));
     if ((rc = get_list(reader, json, "camera_path", &list, err)) ||
         (rc = spl_json_get_number(json, "render_width", &width, err)) ||
@@ -54,7 +57,7 @@ int spl_path_read_nerfstudio(struct spl_path_reader *reader, const json_t *json,
     reader->path->closed = json_is_true(json_object_get(json, "is_cycle"));
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
-        if ((rc = read_nerfstudio_frame(reader, json_array_get(list, i), &why)))
+        if ((rc = read_nerfstudio_frame(reader, json_array_get(list, i), around, &why)))
             spl_path_fail(reader, i, rc, &why, err);
     }
     return rc;

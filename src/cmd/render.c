@@ -45,7 +45,8 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
     return rc ? SPL_E_USAGE : SPL_OK;
 }
 
-static const char *const projections[] = {"perspective", "orthographic", NULL};
+static const char *const projections[] = {"perspective", "orthographic", "equirectangular", "cube", "fisheye", NULL};
+_Static_assert(sizeof projections / sizeof *projections == SPL_PROJECTION_COUNT + 1, "its choices are numbered so");
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
@@ -55,19 +56,22 @@ static const struct spl_cmd_option options[] = {
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
     {"crs", "EPSG:N", "what --eye, --target and shapes of --soft and --clip are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
     {"up", "X,Y,Z", "what is up in the image", SPL_CMD_VECTOR(struct arguments, up)},
-    {"fov", "DEG", "vertical field of view; or a pinhole in pixels:", SPL_CMD_REAL(struct arguments, fov, 1e-6, 179)},
+    {"fov", "DEG", "vertical field of view, up to 179; of a fisheye's circle up to 360; or a pinhole in pixels:",
+     SPL_CMD_REAL(struct arguments, fov, 1e-6, 360)},
     {"fx", "F", "focal length", SPL_CMD_REAL(struct arguments, fx, 1e-6, 1e9)},
     {"fy", "F", "the same, downwards", .otherwise = "fx", SPL_CMD_REAL(struct arguments, fy, 1e-6, 1e9)},
     {"cx", "X", "principal point", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cx, -1e9, 1e9)},
     {"cy", "Y", "the same, downwards", .otherwise = "in the middle", SPL_CMD_REAL(struct arguments, cy, -1e9, 1e9)},
-    {"projection", "P", "perspective, or orthographic: a plan, an elevation, a section, whose scale is the same everywhere",
+    {"projection", "P", "perspective; orthographic: a plan, an elevation, a section, whose scale is the same everywhere; "
+     "equirectangular: all around, twice as wide as high; cube: the same as six squares, right, left, up, down, front, back; "
+     "fisheye: --fov across, 180 where it is not given",
      .otherwise = "perspective", SPL_CMD_CHOICE(struct arguments, projection, projections)},
     {"view-height", "H", "of an orthographic image, in the dataset's unit", .otherwise = "as high as the pinhole's where it looks",
      SPL_CMD_REAL(struct arguments, view_height, 1e-9, 1e12)},
     {"units-per-pixel", "U", "of an orthographic image, instead of its height",
      SPL_CMD_REAL(struct arguments, units_per_pixel, 1e-9, 1e9)},
-    {"size", "WxH", "pixels; W or xH alone: at 16:9", .otherwise = "1280x720",
-     SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
+    {"size", "WxH", "pixels; W or xH alone: at the ratio of the default", .otherwise = "1280x720, 1440x720 all around, "
+     "1920x320 of a cube, 720x720 of a fisheye", SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
     {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 0, 1e12)},
     {"far", "N", "and up to which", SPL_CMD_REAL(struct arguments, far, 1e-9, 1e12)},
     {.help = "Drawing:"},
@@ -102,6 +106,9 @@ static const struct spl_cmd_table table = {
         "The same as a GeoTIFF, colours and heights on the same pixels:\n"
         "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 -o ortho.tif\n"
         "  splatd render courtyard.spld --units-per-pixel 0.01 --eye 0,0,9 --target 0,0,0 --layer depth -o heights.tif\n"
+        "All around, upright, and how far everything is along its ray:\n"
+        "  splatd render courtyard.spld --projection equirectangular --size 2048 --eye 0,0,1.7 --target 5,0,1.7 -o around.jpg\n"
+        "  splatd render courtyard.spld --projection equirectangular --size 2048 --eye 0,0,1.7 --target 5,0,1.7 --layer range -o range.npy\n"
         "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
         "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
         "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
@@ -223,11 +230,26 @@ static int start_camera(const struct arguments *a, const struct spl_dataset *dat
     return spl_camera_look_at(camera, view->eye, view->target, view->up, err);
 }
 
+/* What is left out of --size. */
+static int resolve_size(struct arguments *a, struct spl_error *err)
+{
+    double size[2] = {a->drawing.size[0], a->drawing.size[1]}, shape[2];
+    spl_size_of_projection(a->projection < 0 ? SPL_PERSPECTIVE : (enum spl_projection)a->projection, shape);
+    spl_size_follow(size, shape);
+    for (int i = 0; i < 2; i++) {
+        if (size[i] > UINT32_MAX)
+            return spl_fail(err, SPL_E_USAGE, "--size makes an image of %.0f x %.0f pixels", size[0], size[1]);
+        a->drawing.size[i] = (uint32_t)size[i];
+    }
+    return SPL_OK;
+}
+
 static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_camera *camera = &a->drawing.view.camera;
     struct spl_saved_view from = {0};
-    int rc = start_camera(a, dataset, &from, camera, err);
+    int rc = resolve_size(a, err);
+    rc = rc ? rc : start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
     if (a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
@@ -367,7 +389,7 @@ int spl_cmd_render(int argc, char **argv)
         .near = NAN, .far = NAN, .projection = -1, .view_height = NAN, .units_per_pixel = NAN,
     };
     struct spl_error err = {0};
-    spl_cmd_drawing_init(&a.drawing, SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT);
+    spl_cmd_drawing_init(&a.drawing, 0, 0);
     int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
     if (rc == SPL_CMD_DONE)
         return 0;

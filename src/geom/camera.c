@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "geom/faces.h"
 
 /* Beyond this, neighbouring doubles are further apart than the points of any scan. */
 static const double coordinate_max = 1e12;
@@ -66,7 +67,8 @@ static int check_place(const double v[3], const char *field, struct spl_error *e
     return rc;
 }
 
-static const char *const projections[SPL_PROJECTION_COUNT] = {"perspective", "orthographic"};
+static const char *const projections[SPL_PROJECTION_COUNT] = {"perspective", "orthographic", "equirectangular", "cube",
+                                                               "fisheye"};
 
 const char *spl_projection_name(enum spl_projection projection)
 {
@@ -91,6 +93,7 @@ static void set_centered(struct spl_camera *camera, enum spl_projection projecti
     camera->cy = height / 2.0;
     camera->width = width;
     camera->height = height;
+    camera->lens = (struct spl_distortion){0};
 }
 
 int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
@@ -264,6 +267,8 @@ int spl_camera_check(const struct spl_camera *camera, struct spl_error *err)
     if (!camera->width || !camera->height)
         return spl_fail_field(err, SPL_E_INPUT, camera->width ? "height" : "width",
                               "an image of %u x %u pixels is empty", camera->width, camera->height);
+    if (spl_camera_is_bent(camera) && (rc = spl_camera_check_bent(camera, err)))
+        return rc;
     bool from_eye = camera->projection == SPL_ORTHOGRAPHIC && camera->near == 0; /* nothing is divided by depth */
     if (!(isfinite(camera->near) && camera->near > 0) && !from_eye)
         return spl_fail_field(err, SPL_E_INPUT, "near", "a near depth of %g is not a positive number", camera->near);
@@ -278,6 +283,13 @@ bool spl_camera_project(const struct spl_camera *camera, const double p[3], doub
     const double *r = camera->rotation;
     double ray[3] = {p[0] - camera->eye[0], p[1] - camera->eye[1], p[2] - camera->eye[2]};
     double z = dot(r + 6, ray);
+    if (spl_camera_is_bent(camera)) {
+        const double c[3] = {dot(r, ray), dot(r + 3, ray), z};
+        if (!spl_camera_place(camera, c, pixel))
+            return false;
+        *depth = sqrt(dot(ray, ray));
+        return true;
+    }
     if (!(z > 0))
         return false;
     double scale = camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;

@@ -3,7 +3,8 @@
  *
  * A form is turned into values of camera_params.def, each of which keeps the name of the member that said it; what
  * they mean together, and whether they can be, is camera_values.c's business, as for values that are given one by
- * one. What no camera of ours has (skew, distortion, a stereo baseline) is refused here, by name.
+ * one. A lens is COLMAP's of the same polynomial. What no camera of ours has (skew, a stereo baseline) is refused here, by
+ * name.
  * Pure functions, any thread. */
 #include <math.h>
 #include <stdio.h>
@@ -104,6 +105,19 @@ static int set_lens(struct spl_value *values, const char *source, const double l
     for (int i = 0; !rc && i < 4; i++)
         rc = set_number(values, (enum spl_camera_param)(SPL_CAMERA_fx + i), source, lens[i], err);
     return rc;
+}
+
+/* The same with coefficients in COLMAP's order: of OPENCV_FISHEYE four, else of FULL_OPENCV eight. */
+static int set_bent_lens(struct spl_value *values, const char *source, const double lens[4], const double bend[8],
+                         bool fisheye, struct spl_error *err)
+{
+    const unsigned count = fisheye ? 4 : 8;
+    double params[12];
+    memcpy(params, lens, 4 * sizeof *lens);
+    memcpy(params + 4, bend, count * sizeof *bend);
+    int rc = set_number(values, SPL_CAMERA_model, source,
+                        spl_colmap_model_from_name(fisheye ? "OPENCV_FISHEYE" : "FULL_OPENCV"), err);
+    return rc ? rc : set(values, SPL_CAMERA_params, source, params, 4 + count, err);
 }
 
 /* A row-major matrix, camera to world. */
@@ -275,40 +289,59 @@ static int read_ros_matrix(const json_t *json, const char *name, unsigned column
     return rc;
 }
 
-/* What bends the raw image's rays. */
-static int check_ros_distortion(const json_t *json, struct spl_error *err)
+/* What bends the raw image's rays: how many of its coefficients are there in *count, 0 where none bends. */
+static int read_ros_distortion(const json_t *json, double bend[8], unsigned *count, bool *fisheye, struct spl_error *err)
 {
+    static const struct {
+        const char *name;
+        size_t least, most; /* coefficients */
+    } models[] = {{"plumb_bob", 4, 5}, {"rational_polynomial", 8, 8}, {"equidistant", 4, 4}};
     const json_t *d = json_object_get(json, "d"), *model = json_object_get(json, "distortion_model");
     const char *name = model ? json_string_value(model) : "";
+    const size_t given = json_array_size(d);
+    int found = -1;
+    *count = 0;
     if (d && !json_is_array(d))
         return spl_fail_field(err, SPL_E_INPUT, "ros.d", "ros.d must be an array of numbers, not %s",
                               spl_json_type_name(d));
-    for (size_t i = 0; i < json_array_size(d); i++) {
+    for (int i = 0; name && i < 3; i++)
+        found = !strcmp(name, models[i].name) ? i : found;
+    if (!name || (*name && found < 0))
+        return spl_fail_field(err, SPL_E_INPUT, "ros.distortion_model",
+                              "ros.distortion_model must be plumb_bob, rational_polynomial or equidistant, not %.32s; "
+                              "rectify the image and give p alone",
+                              name ? name : spl_json_type_name(model));
+    bool bends = found == 2 && given;
+    for (size_t i = 0; i < given; i++) {
         const json_t *number = json_array_get(d, i);
         if (!json_is_number(number))
             return spl_fail_field(err, SPL_E_INPUT, "ros.d", "number %zu of ros.d is %s", i + 1,
                                   spl_json_type_name(number));
-        if (json_number_value(number) != 0)
-            return spl_fail_field(err, SPL_E_INPUT, "ros.d",
-                                  "ros.d has the distortion coefficient %g; only pinholes are drawn: rectify the image "
-                                  "and give p, without k and d",
-                                  json_number_value(number));
+        bends = bends || json_number_value(number) != 0;
+        if (i < 8)
+            bend[i] = json_number_value(number);
     }
-    if (!name || (*name && strcmp(name, "plumb_bob") && strcmp(name, "rational_polynomial")))
+    if (!bends)
+        return 0;
+    if (found < 0)
         return spl_fail_field(err, SPL_E_INPUT, "ros.distortion_model",
-                              "ros.distortion_model must be plumb_bob or rational_polynomial, not %.32s; rectify the "
-                              "image and give p alone",
-                              name ? name : spl_json_type_name(model));
+                              "ros.d bends, and ros.distortion_model is missing: plumb_bob, rational_polynomial or equidistant");
+    if (given < models[found].least || given > models[found].most)
+        return spl_fail_field(err, SPL_E_INPUT, "ros.d", "ros.d has %zu numbers; %s has %zu", given, name,
+                              models[found].most);
+    *count = (unsigned)given;
+    *fisheye = found == 2;
     return 0;
 }
 
 static int read_ros(const json_t *json, struct spl_value *values, struct spl_error *err)
 {
     static const char *const known[] = {"k", "p", "d", "distortion_model", "width", "height", NULL};
-    double size[2] = {0}, k[4] = {0}, p[4] = {0};
-    bool raw = json_object_get(json, "k"), rectified = json_object_get(json, "p");
+    double size[2] = {0}, k[4] = {0}, p[4] = {0}, bend[8] = {0};
+    bool raw = json_object_get(json, "k"), rectified = json_object_get(json, "p"), fisheye = false;
+    unsigned bends = 0;
     int rc;
-    if ((rc = check_object(json, "ros", known, err)) || (rc = check_ros_distortion(json, err)) ||
+    if ((rc = check_object(json, "ros", known, err)) || (rc = read_ros_distortion(json, bend, &bends, &fisheye, err)) ||
         (rc = spl_json_get_number(json, "ros.width", &size[0], err)) ||
         (rc = spl_json_get_number(json, "ros.height", &size[1], err)))
         return rc;
@@ -328,7 +361,12 @@ static int read_ros(const json_t *json, struct spl_value *values, struct spl_err
             (rc = spl_value_check(&values[side], SPL_KIND_COUNT, name, err)))
             return rc;
     }
-    return set_lens(values, raw ? "ros.k" : "ros.p", raw ? k : p, err);
+    if (!bends)
+        return set_lens(values, raw ? "ros.k" : "ros.p", raw ? k : p, err);
+    if (rectified)
+        return spl_fail_field(err, SPL_E_INPUT, "ros.p",
+                              "ros.p is the rectified image, which ros.d does not bend: give k and d, or p alone");
+    return set_bent_lens(values, "ros.d", k, bend, fisheye, err);
 }
 
 static int read_transform(const json_t *json, struct spl_value *values, struct spl_error *err)
@@ -339,12 +377,40 @@ static int read_transform(const json_t *json, struct spl_value *values, struct s
     return rc ? rc : set_pose(values, name, m, SPL_AXES_OPENGL, err);
 }
 
+/* k1 to k4, p1 and p2, in the order of FULL_OPENCV, or of OPENCV_FISHEYE. */
+static int read_bend(const json_t *json, bool fisheye, bool pinhole, double bend[8], bool *bends, struct spl_error *err)
+{
+    static const struct {
+        const char *name;
+        int radial, fisheye; /* places; -1 = the model has none */
+    } names[] = {{"k1", 0, 0}, {"k2", 1, 1}, {"k3", 4, 2}, {"k4", -1, 3}, {"p1", 2, -1}, {"p2", 3, -1}};
+    char field[64];
+    *bends = fisheye;
+    for (int i = 0; i < 6; i++) {
+        const int place = fisheye ? names[i].fisheye : names[i].radial;
+        double value = 0;
+        snprintf(field, sizeof field, "nerfstudio.%s", names[i].name);
+        int rc = get(json, field) ? spl_json_get_number(json, field, &value, err) : 0;
+        if (rc)
+            return rc;
+        if (value != 0 && (place < 0 || pinhole))
+            return spl_fail_field(err, SPL_E_INPUT, field, "%s must be 0: nerfstudio.camera_model has no such coefficient",
+                                  field);
+        if (place >= 0)
+            bend[place] = value;
+        *bends = *bends || value != 0;
+    }
+    return 0;
+}
+
 /* A frame with its own lens, as nerfstudio and instant-ngp know it; what stands beside `frames` is copied into it. */
 static int read_nerfstudio(const json_t *json, struct spl_value *values, struct spl_error *err)
 {
     static const char *const known[] = {"camera_model", "fl_x", "fl_y", "cx", "cy", "w",  "h",
                                         "k1",           "k2",   "k3",   "k4", "p1", "p2", "transform_matrix",
                                         "file_path",    NULL};
+    static const char *const models[] = {"OPENCV", "OPENCV_FISHEYE", "EQUIRECTANGULAR", "PINHOLE", "SIMPLE_PINHOLE"};
+    enum { fisheye = 1, around = 2, straight = 3, count = 5 };
     static const struct {
         const char *name;
         enum spl_camera_param param;
@@ -359,34 +425,44 @@ static int read_nerfstudio(const json_t *json, struct spl_value *values, struct 
         {"nerfstudio.cy", SPL_CAMERA_cy, SPL_KIND_NUMBER, false},
     };
     const json_t *model = json_object_get(json, "camera_model");
-    const char *kind = model ? json_string_value(model) : "OPENCV";
-    char field[64];
-    int rc = check_object(json, "nerfstudio", known, err);
+    const char *name = model ? json_string_value(model) : models[0];
+    double bend[8] = {0};
+    bool bends = false;
+    int rc = check_object(json, "nerfstudio", known, err), kind = 0;
     if (rc)
         return rc;
-    if (!kind || (strcmp(kind, "OPENCV") && strcmp(kind, "PINHOLE") && strcmp(kind, "SIMPLE_PINHOLE")))
+    while (name && kind < count && strcmp(name, models[kind]))
+        kind++;
+    if (!name || kind == count)
         return spl_fail_field(err, SPL_E_INPUT, "nerfstudio.camera_model",
-                              "nerfstudio.camera_model must be PINHOLE, SIMPLE_PINHOLE or OPENCV, not %.32s; undistort "
-                              "the images, only pinholes are drawn",
-                              kind ? kind : spl_json_type_name(model));
-    for (int i = 7; i < 13; i++) { /* k1 to p2 */
-        const json_t *bent = json_object_get(json, known[i]);
-        snprintf(field, sizeof field, "nerfstudio.%s", known[i]);
-        if (bent && !(json_is_number(bent) && json_number_value(bent) == 0))
-            return spl_fail_field(err, SPL_E_INPUT, field,
-                                  "%s must be 0: undistort the images, only pinholes are drawn", field);
-    }
-    for (size_t i = 0; i < sizeof lens / sizeof *lens; i++) {
-        struct spl_value *value = &values[lens[i].param];
+                              "nerfstudio.camera_model must be PINHOLE, SIMPLE_PINHOLE, OPENCV, OPENCV_FISHEYE or "
+                              "EQUIRECTANGULAR, not %.32s", name ? name : spl_json_type_name(model));
+    if ((rc = read_bend(json, kind == fisheye, kind >= around, bend, &bends, err)))
+        return rc;
+    struct spl_value own[SPL_CAMERA_PARAMS] = {0};
+    for (size_t i = 0; i < (kind == around ? 2 : sizeof lens / sizeof *lens); i++) {
+        struct spl_value *to = i < 2 ? values : own;
         double number = 0;
         if (!lens[i].needed && !get(json, lens[i].name))
             continue;
         if ((rc = spl_json_get_number(json, lens[i].name, &number, err)) ||
-            (rc = set_number(values, lens[i].param, lens[i].name, number, err)) ||
-            (rc = spl_value_check(value, lens[i].kind, lens[i].name, err)))
+            (rc = set_number(to, lens[i].param, lens[i].name, number, err)) ||
+            (rc = spl_value_check(&to[lens[i].param], lens[i].kind, lens[i].name, err)))
             return rc;
     }
-    return read_transform(json, values, err);
+    const double *fx = own[SPL_CAMERA_fx].n, *fy = own[SPL_CAMERA_fy].n;
+    const double straight_lens[4] = {
+        *fx, own[SPL_CAMERA_fy].given ? *fy : *fx,
+        own[SPL_CAMERA_cx].given ? *own[SPL_CAMERA_cx].n : *values[SPL_CAMERA_width].n / 2,
+        own[SPL_CAMERA_cy].given ? *own[SPL_CAMERA_cy].n : *values[SPL_CAMERA_height].n / 2};
+    if (kind == around)
+        rc = set_number(values, SPL_CAMERA_projection, "nerfstudio.camera_model", SPL_EQUIRECTANGULAR, err);
+    else if (bends)
+        rc = set_bent_lens(values, "nerfstudio.k1", straight_lens, bend, kind == fisheye, err);
+    for (int i = SPL_CAMERA_fx; !rc && !bends && i <= SPL_CAMERA_cy; i++)
+        if (own[i].given)
+            rc = set_number(values, (enum spl_camera_param)i, own[i].source, own[i].n[0], err);
+    return rc ? rc : read_transform(json, values, err);
 }
 
 int spl_camera_form_from_json(struct spl_value values[SPL_CAMERA_PARAMS], enum spl_camera_param form,

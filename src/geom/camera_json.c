@@ -99,7 +99,7 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
     if (choice < 0)
         return spl_fail_field(err, SPL_E_INPUT, name, "%s '%.32s' is unknown; known are %s", name, text,
                               axes         ? "opengl, opencv"
-                              : projection ? "perspective, orthographic"
+                              : projection ? "perspective, orthographic, equirectangular, cube, fisheye"
                                            : spl_colmap_model_names);
     value->n[0] = choice;
     return 0;

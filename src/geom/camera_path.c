@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/array.h"
 
@@ -48,6 +49,8 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
     if (path->count && camera->projection != first->projection)
         return spl_fail_field(err, SPL_E_INPUT, "projection", "%s after cameras that are %s",
                               spl_projection_name(camera->projection), spl_projection_name(first->projection));
+    if (path->count && memcmp(&camera->lens, &first->lens, sizeof first->lens))
+        return spl_fail_field(err, SPL_E_INPUT, "params", "the lens of a path's cameras is one");
     if (path->count == path->capacity && grow(path, err))
         return SPL_E_NOMEM;
     if (!path->count && isnan(time)) {

@@ -33,7 +33,7 @@ struct spl_camera_path {
 /* Takes NULL and zeroed paths. */
 void spl_camera_path_finish(struct spl_camera_path *path);
 
-/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size or projection than
+/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size, projection or lens than
  * the first, a time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX
  * (SPL_E_LIMIT, field "cameras"). */
 int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,

@@ -166,10 +166,12 @@ static void between(const struct spline *s, size_t i, double t, struct spl_camer
     *out = *from;
     for (int v = 0; v < 3; v++)
         out->eye[v] = cameras[0].eye[v] + value[EYE + v];
-    out->fx = exp(value[LENS]);
-    out->fy = exp(value[LENS + 1]);
-    out->cx = value[LENS + 2];
-    out->cy = value[LENS + 3];
+    if (from->projection != SPL_EQUIRECTANGULAR && from->projection != SPL_CUBE) { /* which have one lens each */
+        out->fx = exp(value[LENS]);
+        out->fy = exp(value[LENS + 1]);
+        out->cx = value[LENS + 2];
+        out->cy = value[LENS + 3];
+    }
     out->near = from->near + t * (to->near - from->near);
     out->far = mix_depth(from->far, to->far, t);
     rotate(s, a, b, t, rotation);

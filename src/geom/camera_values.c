@@ -65,10 +65,14 @@ static int resolve_size(const struct spl_value *v, const struct spl_camera_limit
                         uint32_t *height, struct spl_error *err)
 {
     static const enum spl_camera_param sides[] = {SPL_CAMERA_width, SPL_CAMERA_height};
+    const enum spl_projection projection = given(v, SPL_CAMERA_projection) ? (enum spl_projection)v[SPL_CAMERA_projection].n[0] : SPL_PERSPECTIVE;
     const bool parallel = v[SPL_CAMERA_view_height].n[1] != 0;
     const char *said = parallel ? SPL_GLTF_XMAG : SPL_GLTF_ASPECT;
     double aspect = v[parallel ? SPL_CAMERA_view_height : SPL_CAMERA_fov].n[1], size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
-    const double shape[2] = {aspect != 0 ? SPL_HEIGHT_DEFAULT * aspect : SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT};
+    double shape[2];
+    spl_size_of_projection(projection, shape);
+    if (aspect != 0)
+        shape[0] = shape[1] * aspect;
     const char *const fields[] = {"width", "height"};
     for (int i = 0; i < 2; i++)
         if (given(v, sides[i]) && !(size[i] >= 1 && size[i] <= limits->side_px))
@@ -99,6 +103,27 @@ static bool is_orthographic(const struct spl_value *v)
     return given(v, SPL_CAMERA_projection)
                ? v[SPL_CAMERA_projection].n[0] == SPL_ORTHOGRAPHIC
                : given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
+}
+
+static bool is_around(const struct spl_value *v)
+{
+    const double projection = v[SPL_CAMERA_projection].n[0];
+    return given(v, SPL_CAMERA_projection) && (projection == SPL_EQUIRECTANGULAR || projection == SPL_CUBE);
+}
+
+static bool is_fisheye(const struct spl_value *v)
+{
+    return given(v, SPL_CAMERA_projection) && v[SPL_CAMERA_projection].n[0] == SPL_FISHEYE;
+}
+
+/* Of all directions there are no two ways to draw. */
+static int resolve_around(const struct spl_value *v, struct spl_camera *camera, struct spl_error *err)
+{
+    for (enum spl_camera_param other = SPL_CAMERA_model; other <= SPL_CAMERA_cy; other++)
+        if (other != SPL_CAMERA_projection && given(v, other))
+            return conflict(v, other, SPL_CAMERA_projection, err);
+    return spl_camera_set_around(camera, (enum spl_projection)v[SPL_CAMERA_projection].n[0], camera->width, camera->height,
+                                 err);
 }
 
 /* The field of view where nobody says one. */
@@ -151,13 +176,15 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
                               struct spl_camera *camera, struct spl_error *err)
 {
     static const enum spl_camera_param pinhole[] = {SPL_CAMERA_fx, SPL_CAMERA_fy, SPL_CAMERA_cx, SPL_CAMERA_cy};
-    int rc = spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, usual_fov(defaults, camera)), camera->width, camera->height,
-                                err);
+    const bool fisheye = is_fisheye(v);
+    int rc = fisheye ? spl_camera_set_fisheye(camera, get(v, SPL_CAMERA_fov, 180), camera->width, camera->height, err)
+                     : spl_camera_set_fov(camera, get(v, SPL_CAMERA_fov, usual_fov(defaults, camera)), camera->width,
+                                          camera->height, err);
     if (rc)
         return rc;
     for (int i = 0; i < 2; i++) {
         enum spl_camera_param size = i ? SPL_CAMERA_units_per_pixel : SPL_CAMERA_view_height;
-        if (given(v, size)) /* and perspective is said */
+        if (given(v, size)) /* and another projection is said */
             return conflict(v, size, SPL_CAMERA_projection, err);
     }
     if (given(v, SPL_CAMERA_params) && !given(v, SPL_CAMERA_model))
@@ -170,7 +197,13 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
                 return conflict(v, pinhole[i], SPL_CAMERA_params, err);
         if (given(v, SPL_CAMERA_fov))
             return conflict(v, SPL_CAMERA_fov, SPL_CAMERA_params, err);
-        return spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, NULL, err);
+        struct spl_distortion lens;
+        if ((rc = spl_colmap_apply((int)v[SPL_CAMERA_model].n[0], &v[SPL_CAMERA_params], camera, &lens, err)) ||
+            (rc = spl_camera_set_lens(camera, &lens, err)))
+            return rc;
+        if (given(v, SPL_CAMERA_projection) && v[SPL_CAMERA_projection].n[0] != camera->projection)
+            return conflict(v, SPL_CAMERA_projection, SPL_CAMERA_model, err);
+        return 0;
     }
     if (given(v, SPL_CAMERA_fov) && given(v, SPL_CAMERA_fx))
         return conflict(v, SPL_CAMERA_fov, SPL_CAMERA_fx, err);
@@ -180,6 +213,8 @@ static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera
     camera->fy = get(v, SPL_CAMERA_fy, camera->fx);
     camera->cx = get(v, SPL_CAMERA_cx, camera->cx);
     camera->cy = get(v, SPL_CAMERA_cy, camera->cy);
+    if (fisheye && given(v, SPL_CAMERA_fx))
+        camera->lens.reach = M_PI; /* no field of view ends it */
     return 0;
 }
 
@@ -227,6 +262,23 @@ static void get_up(const struct spl_value *v, const struct spl_camera_defaults *
     memcpy(up, lies ? (double[]){0, 0, -1} : (double[]){0, 1, 0}, 3 * sizeof *up);
 }
 
+/* Has what is seen all around stand upright: `up` is up in the image, and what is looked at in its middle column. Where that
+ * lies straight up or down, it stays, to be refused. */
+static void level(const double eye[3], double target[3], const double up[3])
+{
+    double along = 0, square = 0, moved[3], left = 0;
+    for (int i = 0; i < 3; i++) {
+        along += (target[i] - eye[i]) * up[i];
+        square += up[i] * up[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        moved[i] = target[i] - (square > 0 ? along / square * up[i] : 0);
+        left += (moved[i] - eye[i]) * (moved[i] - eye[i]);
+    }
+    if (left * square > along * along * 1e-12)
+        memcpy(target, moved, sizeof moved);
+}
+
 /* *distance: from the eye to what it looks at, 0 where the pose does not say. */
 static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                         struct spl_camera *camera, double *distance, struct spl_error *err)
@@ -264,6 +316,8 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
         (rc = get_point(v, SPL_CAMERA_target, defaults->target, defaults, target, err)))
         return rc;
     get_up(v, defaults, eye, target, up);
+    if (is_around(v))
+        level(eye, target, up);
     *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
     return spl_camera_look_at(camera, eye, target, up, err);
 }
@@ -278,6 +332,7 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
     if (!free_pose && !given(v, SPL_CAMERA_target))
         return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
     bool sized = is_orthographic(v) || given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
+    sized = sized || is_around(v);
     if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model) && !sized)
         return spl_fail_field(
             err, SPL_E_INPUT, "fov",
@@ -298,7 +353,8 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
     if (!defaults)
         defaults = &fallback;
     if ((rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
-        (!is_orthographic(values) && (rc = resolve_intrinsics(values, defaults, camera, err))) ||
+        (is_around(values) ? (rc = resolve_around(values, camera, err))
+                           : !is_orthographic(values) && (rc = resolve_intrinsics(values, defaults, camera, err))) ||
         (rc = resolve_pose(values, defaults, camera, &distance, err)) ||
         (is_orthographic(values) && (rc = resolve_orthographic(values, defaults, camera, distance, err))))
         return rc;

@@ -1,27 +1,25 @@
-/* What real lenses add to a pinhole: OpenCV's polynomials, which COLMAP and nerfstudio write too. Nothing is drawn with
- * them; photographs are sampled through them. Pure functions; any thread. */
+/* What real lenses add to a pinhole (struct spl_distortion), both ways. Photographs are sampled through lenses, and views
+ * drawn through them. Pure functions; any thread. */
 #ifndef SPL_GEOM_DISTORTION_H
 #define SPL_GEOM_DISTORTION_H
 
 #include <splatd/camera.h>
 
-enum spl_distortion_kind {
-    SPL_DISTORTION_NONE,
-    SPL_DISTORTION_RADIAL,  /* (1 + k0 r^2 + k1 r^4 + k2 r^6) / (1 + k3 r^2 + k4 r^4 + k5 r^6), and the tangential p */
-    SPL_DISTORTION_FISHEYE, /* equidistant: a (1 + k0 a^2 + k1 a^4 + k2 a^6 + k3 a^8), a = angle off the axis */
-};
-
-struct spl_distortion {
-    enum spl_distortion_kind kind;
-    double k[6], p[2];
-    double reach; /* r (fisheye: a) up to which the image of r grows; what lies further out has no image */
-};
-
 /* Sets `reach` from the rest. A RADIAL one whose coefficients are all 0 becomes NONE. Refuses coefficients that are not
  * finite, and those that turn the middle of the image inside out (field "params"). */
 int spl_distortion_init(struct spl_distortion *distortion, struct spl_error *err);
 
-/* The same of a point in the camera's frame (x right, y down, z forward). */
+/* `reach` anew for views, whose fisheyes see behind them: up to half a turn off the axis. */
+void spl_distortion_widen(struct spl_distortion *distortion);
+
+/* The radius of the image of r (fisheye: of the angle a), and how fast it grows. Without the tangential terms. */
+double spl_distortion_get_image(const struct spl_distortion *distortion, double r, double *growth);
+
+/* The ray, unit, in the camera's frame, whose image is at m: offsets from the principal point over focal lengths. False
+ * beyond `reach`. */
+bool spl_distortion_get_ray(const struct spl_distortion *distortion, const double m[2], double ray[3]);
+
+/* As spl_distortion_project() of a point in the camera's frame (x right, y down, z forward). */
 bool spl_distortion_place(const struct spl_camera *camera, const struct spl_distortion *distortion, const double c[3],
                           double pixel[2]);
 

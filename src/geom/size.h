@@ -12,6 +12,15 @@ enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
 /* Where no dataset is at hand whose size would say; far is infinite then. */
 #define SPL_CAMERA_NEAR_DEFAULT 0.01
 
+/* The size of an image of which neither side is said, and so its ratio where one is. */
+static inline void spl_size_of_projection(enum spl_projection projection, double shape[2])
+{
+    static const double shapes[SPL_PROJECTION_COUNT][2] = {[SPL_EQUIRECTANGULAR] = {1440, 720}, [SPL_CUBE] = {1920, 320},
+                                                           [SPL_FISHEYE] = {720, 720}};
+    shape[0] = shapes[projection][0] > 0 ? shapes[projection][0] : SPL_WIDTH_DEFAULT;
+    shape[1] = shapes[projection][1] > 0 ? shapes[projection][1] : SPL_HEIGHT_DEFAULT;
+}
+
 /* Fills the sides of `size`, width and height, that are 0: both from `shape`, one from the other at the ratio of
  * `shape`, to the nearest pixel, halves up, at least 1. A shape of 0 x 0 leaves them 0. No upper limit: the caller
  * has one. */
@@ -31,6 +40,14 @@ static inline void spl_camera_scale(struct spl_camera *camera, double across, do
     camera->cx *= across;
     camera->fy *= down;
     camera->cy *= down;
+}
+
+/* A share of the size; a pixel's centre stays where it is in the world. */
+static inline void spl_camera_coarsen(struct spl_camera *camera, double scale)
+{
+    camera->width = (uint32_t)ceil(camera->width * scale);
+    camera->height = (uint32_t)ceil(camera->height * scale);
+    spl_camera_scale(camera, scale, scale);
 }
 
 /* What offsets from the axis at view depth z are divided by on the image. */

@@ -26,9 +26,9 @@ struct axis {
     float share;        /* of the far one, at most 1/2 */
 };
 
-static struct axis place(uint32_t pixel, double scale, uint32_t size)
+static struct axis place(double at, uint32_t size)
 {
-    double position = (pixel + 0.5) * scale - 0.5, nearest = floor(position + 0.5), off = position - nearest;
+    double position = at - 0.5, nearest = floor(position + 0.5), off = position - nearest;
     double far = nearest + (off < 0 ? -1 : 1), last = size - 1.0;
     return (struct axis){.near = (uint32_t)fmin(fmax(nearest, 0), last),
                          .far = (uint32_t)fmin(fmax(far, 0), last),
@@ -95,36 +95,49 @@ static float coverage(const float *from, const struct taps *t)
     return sum;
 }
 
+static void sample(const struct spl_image *small, const struct taps *t, float tolerance, void *to)
+{
+    const void *from = small->pixels;
+    switch (small->layer) {
+    case SPL_LAYER_COLOR:
+        color(from, t, to);
+        break;
+    case SPL_LAYER_DEPTH:
+    case SPL_LAYER_RANGE:
+        *(float *)to = distance(from, t, tolerance);
+        break;
+    case SPL_LAYER_NORMAL:
+        normal(from, t, to);
+        break;
+    case SPL_LAYER_COVERAGE:
+        *(float *)to = coverage(from, t);
+        break;
+    default:
+        *(uint32_t *)to = ((const uint32_t *)from)[t->at[0]];
+    }
+}
+
 static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worker)
 {
     (void)worker;
     const struct job *j = context;
-    const void *from = j->small->pixels;
+    const size_t pixel_bytes = spl_pixel_bytes(j->large->type);
     for (size_t y = j->first + begin; y < j->first + end; y++) {
-        struct axis row = place((uint32_t)y, j->scale, j->small->height);
-        void *to = spl_image_row(j->large, y);
-        for (uint32_t x = 0; x < j->large->width; x++) {
-            struct axis column = place(x, j->scale, j->small->width);
+        struct axis row = place(((double)y + 0.5) * j->scale, j->small->height);
+        char *to = spl_image_row(j->large, y);
+        for (uint32_t x = 0; x < j->large->width; x++, to += pixel_bytes) {
+            struct axis column = place((x + 0.5) * j->scale, j->small->width);
             struct taps t = place_taps(&column, &row, j->small->width);
-            switch (j->large->layer) {
-            case SPL_LAYER_COLOR:
-                color(from, &t, (uint8_t *)to + 4 * (size_t)x);
-                break;
-            case SPL_LAYER_DEPTH:
-            case SPL_LAYER_RANGE:
-                ((float *)to)[x] = distance(from, &t, 0.01f / (float)j->scale);
-                break;
-            case SPL_LAYER_NORMAL:
-                normal(from, &t, (float *)to + 3 * (size_t)x);
-                break;
-            case SPL_LAYER_COVERAGE:
-                ((float *)to)[x] = coverage(from, &t);
-                break;
-            default:
-                ((uint32_t *)to)[x] = ((const uint32_t *)from)[t.at[0]];
-            }
+            sample(j->small, &t, 0.01f / (float)j->scale, to);
         }
     }
+}
+
+void spl_image_sample(const struct spl_image *small, double x, double y, float tolerance, void *to)
+{
+    struct axis column = place(x, small->width), row = place(y, small->height);
+    struct taps t = place_taps(&column, &row, small->width);
+    sample(small, &t, tolerance, to);
 }
 
 void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin,

@@ -8,7 +8,28 @@
 
 #include "dataset/dataset.h"
 #include "dataset/panels.h"
+#include "geom/faces.h"
 #include "geom/size.h"
+#include "render/view.h"
+
+static const double nowhere = 1e30; // view depth: nothing lies so far away
+
+/* The camera that sees pixel (x, y) of `camera`'s image at at[0], at[1] of its own: itself, or of a bent one the face that
+ * is looked up there. False where no ray goes. */
+static bool find_camera(const struct spl_camera *camera, double x, double y, struct spl_camera *out, double at[2])
+{
+    struct spl_faces faces;
+    double ray[3], along;
+    *out = *camera;
+    at[0] = x;
+    at[1] = y;
+    if (!spl_camera_is_bent(camera))
+        return true;
+    if (!spl_camera_get_ray(camera, x, y, ray) || spl_faces_init(&faces, camera, SPL_VIEW_SIDE_MAX, NULL))
+        return false;
+    *out = faces.cameras[spl_faces_place(&faces, ray, at, &along)];
+    return out->width;
+}
 
 void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
 {
@@ -18,8 +39,15 @@ void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_v
     out->color = (struct spl_color_params){0};
     out->disc.atoms = 0; // its colour is the splat's
     out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
-    out->camera.cx += 0.5 - x;
-    out->camera.cy += 0.5 - y;
+    double at[2];
+    if (!find_camera(&view->camera, x, y, &out->camera, at)) {
+        spl_camera_set_fov(&out->camera, 1, 1, 1, NULL);
+        out->camera.near = nowhere;
+        out->camera.far = INFINITY;
+        return;
+    }
+    out->camera.cx += 0.5 - at[0];
+    out->camera.cy += 0.5 - at[1];
     out->camera.width = out->camera.height = 1;
 }
 
@@ -81,9 +109,14 @@ void spl_pick_read(const struct spl_camera *camera, double x, double y, const st
     *pick = (struct spl_pick){.hit = isfinite(depth)};
     if (!pick->hit)
         return;
+    struct spl_camera own;
+    double at[2];
+    find_camera(camera, x, y, &own, at);
     pick->depth = (double)depth;
     pick->distance = (double)*(const float *)images[SPL_LAYER_RANGE].pixels;
-    place(camera, x, y, pick->depth, pick->position);
+    place(&own, at[0], at[1], pick->depth, pick->position);
+    if (spl_camera_is_bent(camera))
+        pick->depth = pick->distance;
     for (int i = 0; i < 3 && normal; i++)
         pick->normal[i] = (double)normal[i];
     memcpy(pick->color, images[SPL_LAYER_COLOR].pixels, sizeof pick->color);

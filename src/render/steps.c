@@ -16,6 +16,7 @@
 #include "image/enlarge.h"
 #include "image/rows.h"
 #include "render/advance.h"
+#include "render/around.h"
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
@@ -32,7 +33,8 @@ struct spl_frame_steps {
     const struct spl_dataset *dataset;
     struct spl_view wanted, view; /* as asked for; as rendered, with at least one sample a pixel */
     struct spl_frame frame;       /* of `view` */
-    struct spl_frame enlarged;    /* of `wanted`, where it has less than a sample a pixel */
+    struct spl_frame enlarged;    /* of `wanted`, where it has less than a sample a pixel, or is looked up in faces */
+    struct spl_around *around;    // may be NULL: `view` is not one of several faces
     struct spl_frame_job job;
     uint32_t x, y; /* corner of the tile; y = height: all are there */
     struct spl_pieces pieces; /* of it that are to be drawn; none: it was not begun */
@@ -43,10 +45,16 @@ struct spl_frame_steps {
     bool paused;   /* the last step gave way in the middle of a piece */
 };
 
+/* Are its images made of others, that were drawn? */
+static bool is_enlarged(const struct spl_frame_steps *steps)
+{
+    return steps->wanted.supersample < 1 || steps->around;
+}
+
 /* The frame that is handed out at the end. */
 static struct spl_frame *get_made(struct spl_frame_steps *steps)
 {
-    return steps->wanted.supersample < 1 ? &steps->enlarged : &steps->frame;
+    return is_enlarged(steps) ? &steps->enlarged : &steps->frame;
 }
 
 static int check_image(const struct spl_image *image, const struct spl_view *view, struct spl_error *err)
@@ -97,16 +105,14 @@ static void give_images_back(struct spl_frame_steps *steps)
             get_made(steps)->images[layer] = (struct spl_image){0};
 }
 
-/* A share of the size, to be enlarged; a pixel's centre stays where it is in the world. */
+/* A share of the size, to be enlarged. */
 static void make_coarse(struct spl_view *view)
 {
     double scale = view->supersample;
     view->supersample = 1;
     view->shade.radius = (uint32_t)fmax(rint(view->shade.radius * scale), 1);
     view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
-    view->camera.width = (uint32_t)ceil(view->camera.width * scale);
-    view->camera.height = (uint32_t)ceil(view->camera.height * scale);
-    spl_camera_scale(&view->camera, scale, scale);
+    spl_camera_coarsen(&view->camera, scale);
 }
 
 static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
@@ -162,13 +168,15 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     steps->view = steps->wanted;
     if (view->supersample < 1)
         make_coarse(&steps->view);
+    if (spl_camera_is_bent(&view->camera))
+        rc = spl_around_create(&steps->view, &steps->around, err);
     double advance = spl_camera_advance(&steps->view.camera, info);
     steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame,
                                         .advance = advance};
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
-    if (options)
+    if (!rc && options)
         rc = borrow_images(steps, options, err);
     if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
         rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
@@ -290,12 +298,23 @@ static int enlarge(struct spl_frame_steps *steps, struct spl_error *err)
         return rc;
     uint32_t rows = enlarged_pixels / camera->width + 1, left = camera->height - steps->row;
     uint32_t end = steps->row + (rows < left ? rows : left);
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
+    if (steps->around)
+        spl_around_look_up(steps->around, &steps->wanted, steps->enlarged.images, steps->row, end);
+    for (int layer = 0; layer < SPL_LAYER_COUNT && !steps->around; layer++)
         if (steps->enlarged.images[layer].pixels)
             spl_image_enlarge(&steps->frame.images[layer], steps->wanted.supersample, &steps->enlarged.images[layer],
                               steps->row, end);
     steps->row = end;
     return SPL_OK;
+}
+
+/* To the next face. */
+static void go_round(struct spl_frame_steps *steps)
+{
+    if (!spl_around_next(steps->around, steps->frame.images, &steps->view))
+        return;
+    steps->x = steps->y = 0;
+    steps->prepared = false;
 }
 
 /* SPL_SLOT_PENDING: it waits. */
@@ -315,8 +334,12 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
     spl_hold_release(&steps->job.hold);
     if (!steps->prepared && (rc = prepare(steps, err)))
         return rc;
-    if (steps->y < steps->view.camera.height)
-        return make_tile(steps, err);
+    if (steps->y < steps->view.camera.height) {
+        rc = make_tile(steps, err);
+        if (!rc && steps->y == steps->view.camera.height && steps->around)
+            go_round(steps);
+        return rc;
+    }
     clock = spl_now_ns();
     rc = enlarge(steps, err);
     steps->frame.stats.readback_ms += spl_since_ms(&clock);
@@ -347,7 +370,8 @@ uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
     uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
     const struct spl_piece tile = spl_tiling_get_tile(&steps->job.tiling, camera, steps->x, steps->y);
     uint64_t pieces = steps->pieces.count ? (uint64_t)tile.width * tile.height - steps->pieces.pixels : 0; /* drawn */
-    uint64_t enlarged = steps->wanted.supersample < 1 ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+    uint64_t enlarged = is_enlarged(steps) ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+    enlarged += steps->around ? spl_around_get_samples_left(steps->around) : 0;
     return (camera->width * rows - steps->x * drawn - pieces) * side * side + enlarged;
 }
 
@@ -368,6 +392,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
     spl_soft_pause_drop(&steps->job.pause);
     spl_frame_finish(&steps->frame);
     spl_frame_finish(&steps->enlarged);
+    spl_around_destroy(steps->around);
     free(steps);
 }
 

@@ -7,11 +7,11 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "geom/size.h"
+#include "render/around.h"
 #include "render/marks.h"
 #include "render/paint.h"
 #include "shared.h"
 
-enum { side_max = 32768 };
 #define PIXELS_MAX (1ull << 28)
 
 void spl_view_init_sized(struct spl_view *view, size_t size)
@@ -36,13 +36,39 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
 uint64_t spl_view_get_samples(const struct spl_view *view)
 {
     uint64_t side = view->supersample > 1 ? (uint64_t)view->supersample : 1;
-    return view->camera.width * side * view->camera.height * side;
+    uint64_t pixels = (uint64_t)view->camera.width * view->camera.height;
+    struct spl_faces faces;
+    if (!spl_camera_is_bent(&view->camera))
+        return pixels * side * side;
+    spl_around_get_faces(view, &faces);
+    return pixels + spl_faces_get_pixels(&faces) * side * side;
 }
 
 uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
 {
     uint64_t pixel = 4 * (uint64_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
-    return pixel * view->camera.width * view->camera.height;
+    struct spl_faces faces;
+    spl_around_get_faces(view, &faces);
+    return pixel * ((uint64_t)view->camera.width * view->camera.height + spl_faces_get_pixels(&faces));
+}
+
+/* What is not there of cameras that are no one pinhole. */
+static int check_around(const struct spl_view *view, struct spl_error *err)
+{
+    struct spl_camera camera = view->camera;
+    struct spl_faces faces;
+    if (view->layers >> SPL_LAYER_DEPTH & 1)
+        return spl_fail_field(err, SPL_E_INPUT, "layer",
+                              "an image of %s has no one axis that depth could be along; ask for layer range",
+                              camera.lens.kind == SPL_DISTORTION_RADIAL ? "a lens that bends"
+                                                                        : spl_projection_name(camera.projection));
+    if (view->supersample < 1)
+        spl_camera_coarsen(&camera, view->supersample);
+    int rc = spl_faces_init(&faces, &camera, SPL_VIEW_SIDE_MAX, err);
+    if (!rc && spl_faces_get_pixels(&faces) > PIXELS_MAX)
+        rc = spl_fail_field(err, SPL_E_LIMIT, "width", "%llu pixels of a cube around the eye are more than %llu",
+                            (unsigned long long)spl_faces_get_pixels(&faces), PIXELS_MAX);
+    return rc;
 }
 
 static int check(const struct spl_view *view, struct spl_error *err)
@@ -50,10 +76,10 @@ static int check(const struct spl_view *view, struct spl_error *err)
     int rc = spl_camera_check(&view->camera, err);
     if (rc)
         return rc;
-    if (view->camera.width > side_max)
-        return spl_fail_field(err, SPL_E_LIMIT, "width", "width %u is above %d", view->camera.width, side_max);
-    if (view->camera.height > side_max)
-        return spl_fail_field(err, SPL_E_LIMIT, "height", "height %u is above %d", view->camera.height, side_max);
+    if (view->camera.width > SPL_VIEW_SIDE_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, "width", "width %u is above %d", view->camera.width, SPL_VIEW_SIDE_MAX);
+    if (view->camera.height > SPL_VIEW_SIDE_MAX)
+        return spl_fail_field(err, SPL_E_LIMIT, "height", "height %u is above %d", view->camera.height, SPL_VIEW_SIDE_MAX);
     if ((uint64_t)view->camera.width * view->camera.height > PIXELS_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "width", "%u x %u pixels are more than %llu", view->camera.width,
                               view->camera.height, PIXELS_MAX);
@@ -67,6 +93,8 @@ static int check(const struct spl_view *view, struct spl_error *err)
     double side = view->supersample;
     if (side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
         return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
+    if (spl_camera_is_bent(&view->camera) && (rc = check_around(view, err)))
+        return rc;
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
         rc = spl_method_param_check(spl_method_param_get(i), spl_view_get_param(view, i), err);
     rc = rc ? rc : spl_shade_check(&view->shade, err);

@@ -6,6 +6,8 @@
 
 #include "base/error.h"
 
+enum { SPL_VIEW_SIDE_MAX = 32768 };
+
 /* Reads `given` by its size, with defaults where it ends, and checks it: errors as of spl_view_check(). Pure; any
  * thread. */
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err);

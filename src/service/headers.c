@@ -76,11 +76,32 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
     }
 }
 
+/* What is said of a camera that is no plain pinhole, as a request would say it again. */
+static void write_lens(const struct spl_camera *camera, char *out, size_t bytes)
+{
+    const struct spl_distortion *lens = &camera->lens;
+    const double *k = lens->k, *p = lens->p;
+    const bool fisheye = lens->kind == SPL_DISTORTION_FISHEYE;
+    const bool straight = fisheye && k[0] == 0 && k[1] == 0 && k[2] == 0 && k[3] == 0;
+    *out = '\0';
+    if (camera->projection != SPL_PERSPECTIVE)
+        out += snprintf(out, bytes, ",\"projection\":\"%s\"", spl_projection_name(camera->projection));
+    if (straight && lens->reach < M_PI)
+        snprintf(out, bytes / 2, ",\"fov\":%.17g", lens->reach * 360 / M_PI);
+    else if (fisheye && !straight)
+        snprintf(out, bytes / 2, ",\"model\":\"OPENCV_FISHEYE\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g]",
+                 camera->fx, camera->fy, camera->cx, camera->cy, k[0], k[1], k[2], k[3]);
+    else if (lens->kind == SPL_DISTORTION_RADIAL)
+        snprintf(out, bytes / 2,
+                 ",\"model\":\"FULL_OPENCV\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g]",
+                 camera->fx, camera->fy, camera->cx, camera->cy, k[0], k[1], p[0], p[1], k[2], k[3], k[4], k[5]);
+}
+
 void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
-    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
-    char far[32] = "null", text[672]; // JSON has no infinity
+    char far[32] = "null", lens[1024], text[2048]; // JSON has no infinity
+    write_lens(camera, lens, sizeof lens);
     if (isfinite(camera->far))
         snprintf(far, sizeof far, "%.9g", camera->far);
     snprintf(
@@ -89,7 +110,7 @@ void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera
         "\"fx\":%.17g,\"fy\":%.17g,\"cx\":%.17g,\"cy\":%.17g,\"width\":%u,\"height\":%u,\"near\":%.9g,\"far\":%s%s}",
         eye[0], eye[1], eye[2], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], camera->fx, camera->fy,
         camera->cx, camera->cy, camera->width, camera->height, camera->near, far,
-        parallel ? ",\"projection\":\"orthographic\"" : "");
+        lens);
     spl_headers_add(headers, "Splatd-Camera", "%s", spl_decimal_shorten(text));
 }
 

@@ -157,6 +157,10 @@ static int resolve_demand(const struct values *values, const struct spl_camera_l
         return spl_fail_field(err, SPL_E_INPUT, "layers",
                               "budget and psnr are about one layer; ask for it with 'layer'");
     out->planned = given(values, PARAM_budget) || given(values, PARAM_psnr);
+    if (out->planned && spl_camera_is_bent(&out->view.camera))
+        return spl_fail_field(err, SPL_E_INPUT, given(values, PARAM_budget) ? "budget" : "psnr",
+                              "what settings cost and gain is known of pinholes and parallel rays; give method, lod and "
+                              "supersample");
     demand->budget_ms = budget;
     demand->psnr = psnr;
     demand->width = out->view.camera.width;

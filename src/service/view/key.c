@@ -69,7 +69,9 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
     add_number(form, camera->near);
     add_number(form, camera->far);
     add(form, (uint64_t)camera->width << 32 | camera->height);
-    add(form, (uint64_t)camera->projection);
+    add(form, (uint64_t)camera->projection << 32 | (uint64_t)camera->lens.kind);
+    for (int i = 0; camera->lens.kind && i < 9; i++)
+        add_number(form, i < 6 ? camera->lens.k[i] : i < 8 ? camera->lens.p[i - 6] : camera->lens.reach);
 }
 
 /* Their one text stands for what is soft, or drawn; another order of terms is another key. */

@@ -1,0 +1,204 @@
+/* Which part of each face a camera asks for: its edges' rays, those at the end of its lens' reach, and what of the face's
+ * own edges lies in the image, for these bound all others. */
+#include "geom/faces.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "geom/distortion.h"
+
+const double spl_face_axes[SPL_FACES][9] = {
+    {0, 0, -1, 0, 1, 0, 1, 0, 0}, {0, 0, 1, 0, 1, 0, -1, 0, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0},
+    {1, 0, 0, 0, 0, -1, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1},  {-1, 0, 0, 0, 1, 0, 0, 0, -1},
+};
+
+enum { edge_steps = 256, grow_steps = 256, FRONT = 4 };
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static unsigned find_face(const double ray[3])
+{
+    const double x = fabs(ray[0]), y = fabs(ray[1]), z = fabs(ray[2]);
+    if (z >= x && z >= y)
+        return ray[2] >= 0 ? 4 : 5;
+    return x >= y ? (ray[0] >= 0 ? 0 : 1) : ray[1] >= 0 ? 3 : 2;
+}
+
+unsigned spl_face_of(const double ray[3], double place[2])
+{
+    const unsigned face = find_face(ray);
+    const double *axes = spl_face_axes[face], along = dot(axes + 6, ray);
+    place[0] = dot(axes, ray) / along;
+    place[1] = dot(axes + 3, ray) / along;
+    return face;
+}
+
+unsigned spl_faces_place(const struct spl_faces *faces, const double ray[3], double pixel[2], double *along)
+{
+    const unsigned face = spl_face_of(ray, pixel);
+    const struct spl_camera *c = &faces->cameras[face];
+    *along = dot(spl_face_axes[face] + 6, ray);
+    pixel[0] = c->cx + c->fx * pixel[0];
+    pixel[1] = c->cy + c->fy * pixel[1];
+    return face;
+}
+
+uint64_t spl_faces_get_pixels(const struct spl_faces *faces)
+{
+    uint64_t pixels = 0;
+    for (int i = 0; i < SPL_FACES; i++)
+        pixels += (uint64_t)faces->cameras[i].width * faces->cameras[i].height;
+    return pixels;
+}
+
+/* What pixels ask for, of each face. */
+struct parts {
+    double low[SPL_FACES][2], high[SPL_FACES][2];
+    double widest; /* angle off the axis */
+};
+
+static void grow(struct parts *parts, unsigned face, const double place[2])
+{
+    for (int i = 0; i < 2; i++) {
+        parts->low[face][i] = fmin(parts->low[face][i], place[i]);
+        parts->high[face][i] = fmax(parts->high[face][i], place[i]);
+    }
+}
+
+static void add_ray(struct parts *parts, const double ray[3])
+{
+    double place[2];
+    const unsigned face = spl_face_of(ray, place);
+    grow(parts, face, place);
+    parts->widest = fmax(parts->widest, acos(fmin(fmax(ray[2], -1), 1)));
+}
+
+static bool is_inside(const struct spl_camera *camera, const double ray[3])
+{
+    double pixel[2];
+    return spl_camera_place(camera, ray, pixel) && pixel[0] >= 0 && pixel[0] <= camera->width && pixel[1] >= 0 &&
+           pixel[1] <= camera->height;
+}
+
+static void add_image_edges(struct parts *parts, const struct spl_camera *camera)
+{
+    double ray[3];
+    for (int i = 0; i < 4 * (edge_steps + 1); i++) {
+        const double t = (double)(i % (edge_steps + 1)) / edge_steps, w = camera->width, h = camera->height;
+        const int edge = i / (edge_steps + 1);
+        if (spl_camera_get_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray))
+            add_ray(parts, ray);
+    }
+}
+
+static void add_reach(struct parts *parts, const struct spl_camera *camera)
+{
+    const double end = camera->projection == SPL_FISHEYE ? camera->lens.reach : atan(camera->lens.reach);
+    const double angle = end * (1 - 1e-9);
+    for (int i = 0; i < 4 * edge_steps; i++) {
+        const double around = 2 * M_PI * i / (4 * edge_steps);
+        const double ray[3] = {cos(around) * sin(angle), sin(around) * sin(angle), cos(angle)};
+        if (is_inside(camera, ray))
+            add_ray(parts, ray);
+    }
+}
+
+/* A step beyond what is inside counts as well. */
+static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
+{
+    for (unsigned face = 0; face < SPL_FACES; face++)
+        for (int i = 0; i < 4 * (edge_steps + 1); i++) {
+            const int edge = i / (edge_steps + 1);
+            const double *axes = spl_face_axes[face], step = 2.0 / edge_steps, t = step * (i % (edge_steps + 1)) - 1;
+            const double place[2] = {edge < 2 ? t : edge == 2 ? -1 : 1, edge < 2 ? (edge ? 1 : -1) : t};
+            double ray[3];
+            for (int k = 0; k < 3; k++)
+                ray[k] = axes[k] * place[0] + axes[3 + k] * place[1] + axes[6 + k];
+            if (!is_inside(camera, ray))
+                continue;
+            for (int side = -1; side <= 1; side++) {
+                double beside[2] = {place[0], place[1]};
+                beside[edge >= 2] = fmin(fmax(t + side * step, -1), 1);
+                grow(parts, face, beside);
+            }
+            parts->widest = fmax(parts->widest, acos(ray[2] / sqrt(dot(ray, ray))));
+        }
+}
+
+/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it. Where a face shows an
+ * angle off the camera's axis, itself is finer than in its middle, towards its edges. */
+static double find_focal(const struct spl_camera *camera, double widest)
+{
+    const double focal = fmax(camera->fx, camera->fy), end = fmin(widest, M_PI_2);
+    double needed = 1;
+    if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE)
+        return focal;
+    for (int i = 1; i <= grow_steps; i++) {
+        const double angle = end * i / grow_steps, tangent = tan(angle), front = cos(fmin(angle, M_PI_4));
+        const bool fisheye = camera->projection == SPL_FISHEYE;
+        const double r = fmin(fisheye ? angle : tangent, camera->lens.reach);
+        double growth, image = spl_distortion_get_image(&camera->lens, r, &growth);
+        if (!fisheye)
+            growth *= 1 + r * r; /* by the angle */
+        const double along = growth * front * front, around = image / sin(angle) * (angle > M_PI_4 ? sin(angle) : front);
+        needed = fmax(needed, fmax(along, around));
+    }
+    return needed * focal;
+}
+
+int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err)
+{
+    const bool whole = camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE;
+    struct parts parts;
+    memset(faces, 0, sizeof *faces);
+    for (int i = 0; i < SPL_FACES; i++)
+        for (int k = 0; k < 2; k++) {
+            parts.low[i][k] = whole ? -1 : INFINITY;
+            parts.high[i][k] = whole ? 1 : -INFINITY;
+        }
+    parts.widest = 0;
+    if (!whole) {
+        add_image_edges(&parts, camera);
+        add_reach(&parts, camera);
+        add_face_edges(&parts, camera);
+        if (is_inside(camera, (double[]){0, 0, 1}))
+            grow(&parts, FRONT, (double[]){0, 0});
+    }
+    double focal = find_focal(camera, parts.widest);
+    if (camera->projection != SPL_CUBE)
+        focal = ceil(focal);
+    for (int i = 0; i < SPL_FACES; i++) {
+        struct spl_camera *face = &faces->cameras[i];
+        double from[2], size[2];
+        if (!(parts.low[i][0] <= parts.high[i][0]))
+            continue;
+        /* of a pixel, on the axis; of a cube's as its own pixels lie */
+        const double middle = camera->projection == SPL_CUBE && fmod(2 * focal, 2) == 0 ? 0 : 0.5;
+        for (int k = 0; k < 2; k++) {
+            from[k] = floor(parts.low[i][k] * focal + middle) - SPL_FACE_MARGIN;
+            size[k] = ceil(parts.high[i][k] * focal + middle) + SPL_FACE_MARGIN - from[k];
+            if (!(size[k] <= side_px))
+                return spl_fail_field(err, SPL_E_LIMIT, camera->lens.kind ? "params" : "width",
+                                      "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
+                                      "%u are drawn", size[k], side_px);
+        }
+        *face = *camera;
+        face->projection = SPL_PERSPECTIVE;
+        face->lens = (struct spl_distortion){0};
+        face->fx = face->fy = focal;
+        face->cx = middle - from[0];
+        face->cy = middle - from[1];
+        face->width = (uint32_t)size[0];
+        face->height = (uint32_t)size[1];
+        for (int row = 0; row < 3; row++)
+            for (int column = 0; column < 3; column++) {
+                const double *axis = spl_face_axes[i] + 3 * row, *r = camera->rotation + column;
+                face->rotation[3 * row + column] = axis[0] * r[0] + axis[1] * r[3] + axis[2] * r[6];
+            }
+    }
+    return SPL_OK;
+}
