@@ -209,7 +209,7 @@ static int read_lens(const json_t *json, struct spl_value *values, struct spl_er
                  *parallel = json_object_get(json, "orthographic");
     const char *kind = type ? json_string_value(type) : parallel ? "orthographic" : "perspective";
     int projection = kind ? spl_projection_from_name(kind) : -1;
-    if (projection < 0)
+    if (projection < 0 || projection > SPL_ORTHOGRAPHIC)
         return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf.type must be perspective or orthographic, not %.32s",
                               kind ? kind : spl_json_type_name(type));
     if (projection == SPL_ORTHOGRAPHIC ? pinhole != NULL : parallel != NULL)
@@ -311,7 +311,7 @@ static int read_ros_distortion(const json_t *json, double bend[8], unsigned *cou
                               "ros.distortion_model must be plumb_bob, rational_polynomial or equidistant, not %.32s; "
                               "rectify the image and give p alone",
                               name ? name : spl_json_type_name(model));
-    bool bends = found == 2 && given;
+    bool bends = found == 2 && (given || json_object_get(json, "k"));
     for (size_t i = 0; i < given; i++) {
         const json_t *number = json_array_get(d, i);
         if (!json_is_number(number))

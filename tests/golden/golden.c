@@ -131,8 +131,11 @@ static struct spl_view make_view(const struct golden *golden)
     spl_view_init(&view);
     struct spl_camera *camera = &view.camera;
     const double height = golden->view_height, up[3] = {0, height > 0, height == 0};
-    if ((height > 0 ? spl_camera_set_orthographic(camera, height, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL)
-                    : spl_camera_set_fov(camera, golden->fov, GOLDEN_WIDTH, GOLDEN_HEIGHT, NULL)) ||
+    const uint32_t w = GOLDEN_WIDTH, h = GOLDEN_HEIGHT;
+    if ((height > 0                      ? spl_camera_set_orthographic(camera, height, w, h, NULL)
+         : golden->around == SPL_FISHEYE ? spl_camera_set_fisheye(camera, golden->fov, w, h, NULL)
+         : golden->around                ? spl_camera_set_around(camera, golden->around, w, h, NULL)
+                                         : spl_camera_set_fov(camera, golden->fov, w, h, NULL)) ||
         spl_camera_look_at(camera, golden->eye, golden->target, up, NULL))
         abort();
     camera->cx += golden->shift;

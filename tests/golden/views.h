@@ -30,6 +30,7 @@ struct golden {
     const char *clip;         /* conditions of what is drawn; NULL = all */
     const char *shade, *color_by; /* NULL: none, rgb */
     double view_height;       /* of an orthographic view; 0 = fov */
+    enum spl_projection around; /* equirectangular, or a fisheye of fov; 0 = neither */
 };
 
 static const struct golden goldens[] = {
@@ -102,6 +103,12 @@ static const struct golden goldens[] = {
     /* parallel rays, straight down: walls are their upper edges, and a column's foot lies under its head */
     {"plan-splat", {1, 0.5, 30}, {1, 0.5, 0}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0, {1, 0.002},
      .view_height = 14},
+    /* all around, six faces and their edges, up to straight up and down, where a pixel is a sliver */
+    {"around-splat", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+     .around = SPL_EQUIRECTANGULAR},
+    /* ranges in a fisheye, parts of five faces; millimetres, and nothing around the circle */
+    {"fisheye-range", {0, -2, 1.5}, {-1, 3, 1.5}, 200, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+     .around = SPL_FISHEYE},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

@@ -1,4 +1,4 @@
-/* Depth against the truth: a tilted plane and a sphere, sampled densely with exact normals, quantised by the codec and
+/* Depth, and the range of views all around, against the truth: a tilted plane and a sphere, sampled densely with exact normals, quantised by the codec and
  * blended by the kernels. At every pixel that sees the surface at no more than 70 degrees, well inside its rim, the
  * point that comes back lies within 3 % of a splat radius of the surface; its depth, which slant enlarges by 1 / cos,
  * is that near the truth in 99 % of these pixels, and in all that see the surface within 35 degrees. One body for every
@@ -73,11 +73,13 @@ static void measure_pixel(struct tally *tally, const struct spl_camera *c, const
 {
     double at[3] = {(x + 0.5 - c->cx) / c->fx, (y + 0.5 - c->cy) / c->fy, 1};
     double from[3], ray[3], hit[3], normal[3], t = INFINITY;
+    const bool parallel = c->projection == SPL_ORTHOGRAPHIC;
+    if (spl_camera_is_bent(c) && !spl_camera_get_ray(c, x + 0.5, y + 0.5, at))
+        return;
     for (int i = 0; i < 3; i++) {
         double across = c->rotation[i] * at[0] + c->rotation[3 + i] * at[1];
-        bool parallel = c->projection == SPL_ORTHOGRAPHIC;
         from[i] = c->eye[i] + (parallel ? across : 0);
-        ray[i] = c->rotation[6 + i] + (parallel ? 0 : across);
+        ray[i] = c->rotation[6 + i] * at[2] + (parallel ? 0 : across);
     }
     if (!spl_primitive_hit(p, from, ray, &t))
         return;
@@ -106,12 +108,14 @@ static void measure_pixel(struct tally *tally, const struct spl_camera *c, const
 }
 
 static void check_view(const struct spl_dataset *dataset, const struct spl_primitive *p, const double eye[3],
-                       double radius, bool parallel, const char *what)
+                       double radius, enum spl_projection projection, const char *what)
 {
     const double up[3] = {0, 0.1, 1};
+    const bool parallel = projection == SPL_ORTHOGRAPHIC, around = projection == SPL_EQUIRECTANGULAR;
+    const enum spl_layer layer = around ? SPL_LAYER_RANGE : SPL_LAYER_DEPTH;
     struct spl_view view;
     spl_view_init(&view);
-    view.layers = 1 << SPL_LAYER_DEPTH;
+    view.layers = 1u << layer;
     view.lod = 0; /* the splats as they are: how levels look is not in question */
     view.camera.near = 0.05;
     view.camera.far = 100;
@@ -122,11 +126,20 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_primi
     if (parallel)
         assert_int_equal(spl_camera_set_orthographic(&view.camera, 2 * tan(M_PI / 9) * sqrt(dot3(away, away)), 320, 240, NULL),
                          SPL_OK);
+    if (around) { /* and turned, so that what is measured lies across the edge of two faces */
+        double *r = view.camera.rotation;
+        assert_int_equal(spl_camera_set_around(&view.camera, projection, 1024, 512, NULL), SPL_OK);
+        for (int i = 0; i < 3; i++) {
+            const double right = r[i], forward = r[6 + i];
+            r[i] = (right - forward) * sqrt(0.5);
+            r[6 + i] = (right + forward) * sqrt(0.5);
+        }
+    }
     struct spl_frame frame;
     struct spl_error err = {0};
     if (spl_renderer_render(renderer, dataset, &view, &frame, &err))
         fail_msg("%s: %s", what, err.message);
-    const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+    const float *depth = frame.images[layer].pixels;
     size_t pixels = (size_t)view.camera.width * view.camera.height;
     struct tally t = {.depth = calloc(pixels, sizeof *t.depth)};
     for (size_t i = 0; i < pixels; i++)
@@ -183,9 +196,11 @@ static void plane_depth_is_true(void **state)
             mad3(eye, distance * sin(tilt), u, eye);
             snprintf(name, sizeof name, "plane %s, %d degrees, %g m", place ? "at UTM" : "at the origin", view % 3 * 30,
                      distance);
-            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, false, name);
+            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_PERSPECTIVE, name);
             if (view % 3 == 1)
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, true, "parallel rays");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC, "parallel rays");
+            if (view == 1)
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR, "all around");
         }
         spl_renderer_remove(renderer, dataset);
         spl_dataset_close(dataset);
@@ -218,9 +233,11 @@ static void sphere_depth_is_true(void **state)
             char name[64];
             mad3(centers[place], 1.7, directions[i], eye);
             snprintf(name, sizeof name, "sphere %s, view %d", place ? "at UTM" : "at the origin", i);
-            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, false, name);
-            if (i == 1)
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, true, "parallel rays");
+            check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_PERSPECTIVE, name);
+            if (i == 1) {
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC, "parallel rays");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR, "all around");
+            }
         }
         spl_renderer_remove(renderer, dataset);
         spl_dataset_close(dataset);

@@ -107,6 +107,78 @@ static void every_form_hits_the_golden_pixel(void **state)
     }
 }
 
+/* The same point, 1.3 right and 0.7 below the axis at depth 8, through lenses; and how large images become. */
+static void lenses_hit_the_golden_pixel(void **state)
+{
+    (void)state;
+#define COLMAP(model, params) "{\"camera\":{" POSE ",\"model\":\"" model "\",\"params\":[500,510,331.25,228.5," params "]}," SIZE "}"
+#define BENT_FRAME(members) FRAME("\"w\":640,\"h\":480,\"fl_x\":500,\"fl_y\":510,\"cx\":331.25,\"cy\":228.5," members,          \
+                                  "[[0.78387787227503695,-0.30826946648440512,0.53898554469575628,2.5],"                       \
+                                  "[0.60698607043454015,0.19761352719368059,-0.76975113132005719,-3.5],"                       \
+                                  "[0.13077993598406572,0.93054759679636629,0.34202014332566873,1.75],[0,0,0,1]]")
+#define PROJECTION(rest) "{\"camera\":{" POSE ",\"projection\":" rest "}"
+    static const struct {
+        const char *text;
+        uint32_t width, height;
+        double u, v;
+    } rows[] = {
+        {COLMAP("OPENCV", "-0.3,0.1,0.01,-0.02"), 640, 480, 410.952591125488, 272.635915914307},
+        {COLMAP("FULL_OPENCV", "-0.3,0.1,0.01,-0.02,0.05,0.2,-0.1,0.04"), 640, 480, 410.417616041725, 272.342091137532},
+        {COLMAP("OPENCV_FISHEYE", "0.1,-0.2,0.3,-0.4"), 640, 480, 411.846525439661, 272.766091664552},
+        {ROS("\"k\":" K ",\"distortion_model\":\"plumb_bob\",\"d\":[-0.3,0.1,0.01,-0.02,0.05]"), 640, 480, 410.952751680155,
+         272.636004095870},
+        {ROS("\"k\":" K ",\"distortion_model\":\"rational_polynomial\",\"d\":[-0.3,0.1,0.01,-0.02,0.05,0.2,-0.1,0.04]"), 640, 480,
+         410.417616041725, 272.342091137532},
+        {ROS("\"k\":" K ",\"distortion_model\":\"equidistant\",\"d\":[0.1,-0.2,0.3,-0.4]"), 640, 480, 411.846525439661,
+         272.766091664552},
+        {BENT_FRAME("\"k1\":-0.3,\"k2\":0.1,\"p1\":0.01,\"p2\":-0.02,\"k3\":0.05"), 640, 480, 410.952751680155, 272.636004095870},
+        {BENT_FRAME("\"camera_model\":\"OPENCV_FISHEYE\""), 640, 480, 411.595881180571, 272.628430125329},
+        {BENT_FRAME("\"camera_model\":\"EQUIRECTANGULAR\""), 640, 480, 336.408686655516, 253.163258412386},
+        {PROJECTION("\"equirectangular\"") "," SIZE "}", 640, 480, 336.408686655516, 253.163258412386},
+        {PROJECTION("\"fisheye\"") "," SIZE "}", 640, 480, 344.551892762167, 253.220249948859},
+        {PROJECTION("\"fisheye\",\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5") "," SIZE "}", 640, 480, 411.595881180571,
+         272.628430125329},
+        {PROJECTION("\"cube\"") ",\"height\":640}", 3840, 640, 2932, 348},
+        {PROJECTION("\"cube\"") ",\"width\":3840}", 3840, 640, 2932, 348},
+        {PROJECTION("\"equirectangular\"") ",\"width\":640}", 640, 320, 336.408686655516, 168.775505608257},
+        {PROJECTION("\"fisheye\"") ",\"height\":480}", 480, 480, 264.551892762167, 253.220249948859},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        static const double point[3] = {-0.577054497069, 3.30876147309, -1.46753054758};
+        struct spl_camera camera;
+        struct spl_error err;
+        double pixel[2], distance;
+        if (read_camera(rows[i].text, NULL, &camera, &err))
+            fail_msg("%s: %s: %s", rows[i].text, err.field, err.message);
+        assert_true(spl_camera_is_bent(&camera));
+        assert_true(camera.width == rows[i].width && camera.height == rows[i].height);
+        assert_true(spl_camera_project(&camera, point, pixel, &distance));
+        if (!(fabs(pixel[0] - rows[i].u) < 1e-8 && fabs(pixel[1] - rows[i].v) < 1e-8 &&
+              fabs(distance - sqrt(1.3 * 1.3 + 0.7 * 0.7 + 64)) < 1e-9))
+            fail_msg("%s: pixel %.12f %.12f distance %.12f", rows[i].text, pixel[0], pixel[1], distance);
+    }
+}
+
+/* What is seen all around stands upright, however steeply its middle is looked at; a pose is taken as it is. */
+static void what_is_seen_all_around_is_level(void **state)
+{
+    (void)state;
+    static const char *const rows[] = {
+        "{\"camera\":{\"eye\":[5,6,7],\"target\":[8,10,-40],\"up\":[0,0,3],\"projection\":\"equirectangular\"}}",
+        "{\"camera\":{\"eye\":[5,6,7],\"target\":[8,10,-40],\"up\":[0,0,3],\"projection\":\"cube\"}}",
+        "{\"camera\":{\"eye\":[5,6,7],\"target\":[8,10,-40],\"up\":[0,0,3],\"projection\":\"fisheye\"}}"};
+    for (int i = 0; i < 3; i++) {
+        static const double level[9] = {0.8, -0.6, 0, 0, 0, -1, 0.6, 0.8, 0};
+        struct spl_camera camera;
+        struct spl_error err;
+        assert_int_equal(read_camera(rows[i], NULL, &camera, &err), 0);
+        double off = 0;
+        for (int k = 0; k < 9; k++)
+            off = fmax(off, fabs(camera.rotation[k] - level[k]));
+        assert_true(i < 2 ? off < 1e-12 : camera.rotation[8] < -0.9);
+    }
+}
+
 static void an_aspect_ratio_decides_the_side_that_is_left_out(void **state)
 {
     (void)state;
@@ -159,7 +231,19 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{" POSE ",\"view_height\":4,\"fov\":50}," SIZE "}", "fov"},
         {"{\"camera\":{" POSE ",\"projection\":\"orthographic\"}," SIZE "}", "view_height"},
         {"{\"camera\":{" POSE ",\"projection\":\"perspective\",\"view_height\":4}," SIZE "}", "view_height"},
-        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"view_height\":4}," SIZE "}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"view_height\":4}," SIZE "}", "view_height"},
+        {"{\"camera\":{" POSE ",\"projection\":\"panorama\"}," SIZE "}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"fov\":361}," SIZE "}", "fov"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"fov\":90,\"fx\":50}," SIZE "}", "fov"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"model\":\"OPENCV\",\"params\":[9,9,9,9,0.1,0,0,0]}," SIZE "}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"equirectangular\",\"fov\":90}," SIZE "}", "fov"},
+        {"{\"camera\":{" POSE ",\"projection\":\"equirectangular\",\"cx\":9}," SIZE "}", "cx"},
+        {"{\"camera\":{" POSE ",\"projection\":\"cube\"}," SIZE "}", "width"},
+        {"{\"camera\":{" POSE ",\"projection\":\"cube\",\"view_height\":4}," SIZE "}", "view_height"},
+        {"{\"camera\":{\"eye\":[0,0,1],\"target\":[0,0,9],\"projection\":\"equirectangular\"}}", "up"},
+        {"{\"camera\":{" POSE ",\"model\":\"OPENCV_FISHEYE\",\"params\":[9,9,9,9]}," SIZE "}", "params"},
+        {"{\"camera\":{" POSE ",\"model\":\"SIMPLE_RADIAL\",\"params\":[9,9,9,-1e9]}," SIZE "}", "params"},
+        {GLTF("\"type\":\"fisheye\"," LENS), "gltf.type"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"units_per_pixel\":4}," SIZE "}", "units_per_pixel"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"fx\":4}," SIZE "}", "fx"},
         {"{\"camera\":{" POSE ",\"view_height\":0}," SIZE "}", "view_height"},
@@ -223,10 +307,13 @@ static void faults_carry_the_members_name(void **state)
         {ROS("\"p\":[500,0,330,-40,0,510,228,0,0,0,1,0]"), "ros.p"},
         {ROS("\"p\":[-500,0,330,0,0,510,228,0,0,0,1,0]"), "ros.p"},
         {ROS("\"k\":[499,0,330.75,0,510,228,0,0,1],\"p\":" P), "ros.p"},
-        {ROS("\"k\":" K ",\"d\":[0,0,0,0.01]"), "ros.d"},
+        {ROS("\"k\":" K ",\"d\":[0,0,0,0.01]"), "ros.distortion_model"},
+        {ROS("\"k\":" K ",\"d\":[0,0,0.01],\"distortion_model\":\"plumb_bob\""), "ros.d"},
+        {ROS("\"p\":" P ",\"d\":[0,0,0,0.01],\"distortion_model\":\"plumb_bob\""), "ros.p"},
+        {ROS("\"k\":" K ",\"distortion_model\":\"thin_prism\""), "ros.distortion_model"},
         {ROS("\"k\":" K ",\"d\":[\"0\"]"), "ros.d"},
         {ROS("\"k\":" K ",\"d\":0"), "ros.d"},
-        {ROS("\"k\":" K ",\"distortion_model\":\"equidistant\""), "ros.distortion_model"},
+        {ROS("\"k\":" K ",\"distortion_model\":\"equidistant\""), "ros.d"},
         {ROS("\"k\":" K ",\"distortion_model\":null"), "ros.distortion_model"},
         {"{\"camera\":{" POSE ",\"ros\":{\"k\":" K ",\"width\":0,\"height\":4}}}", "ros.width"},
         {"{\"camera\":{" POSE ",\"ros\":{\"k\":" K ",\"width\":4,\"height\":4.5}}}", "ros.height"},
@@ -245,7 +332,9 @@ static void faults_carry_the_members_name(void **state)
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"cx\":\"2\"", ROWS), "nerfstudio.cx"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"k4\":0.1", ROWS), "nerfstudio.k4"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"p2\":null", ROWS), "nerfstudio.p2"},
-        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"camera_model\":\"OPENCV_FISHEYE\"", ROWS), "nerfstudio.camera_model"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"camera_model\":\"FOV\"", ROWS), "nerfstudio.camera_model"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"p1\":1,\"camera_model\":\"OPENCV_FISHEYE\"", ROWS), "nerfstudio.p1"},
+        {FRAME("\"w\":4,\"h\":4,\"fl_x\":5,\"k1\":1,\"camera_model\":\"PINHOLE\"", ROWS), "nerfstudio.k1"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[1,0,0,0,0,1,0,0,0,0,1,0]"), "nerfstudio.transform_matrix"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0],[0,1,0],[0,0,1]]"), "nerfstudio.transform_matrix"},
         {FRAME("\"w\":4,\"h\":4,\"fl_x\":5", "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"),
@@ -266,6 +355,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_form_hits_the_golden_pixel),
+        cmocka_unit_test(lenses_hit_the_golden_pixel),
+        cmocka_unit_test(what_is_seen_all_around_is_level),
         cmocka_unit_test(an_aspect_ratio_decides_the_side_that_is_left_out),
         cmocka_unit_test(faults_carry_the_members_name),
     };

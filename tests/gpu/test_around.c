@@ -1,0 +1,297 @@
+/* Views all around and through lenses: what lies where two faces meet is as the same surface seen elsewhere, whatever draws
+ * and shades it; a cube's faces are the pinholes' own images; ranges are the truth's; what a fisheye does not see is nothing;
+ * every layer that there is holds its kind, into memory of the caller's as well; picks lie where the image says. One body
+ * for every backend. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include <splatd/render.h>
+
+#include "support/make_dataset.h"
+
+enum { splats = 30000, width = 384, height = 192 };
+static const double radius = 3, eye[3] = {0.4, -0.3, 0.2}, up[3] = {0, 0, 1};
+static double disc; /* radius of a splat */
+
+static struct spl_renderer *renderer;
+static struct spl_dataset *ball; /* seen from within, its colours smooth */
+
+static void make_ball(void)
+{
+    struct make_splat *all = calloc(splats, sizeof *all);
+    assert_non_null(all);
+    disc = 1.128379 * sqrt(4 * M_PI * radius * radius / splats);
+    for (int i = 0; i < splats; i++) { /* Fibonacci's lattice */
+        double z = 1 - (2 * i + 1.0) / splats, around = sqrt(1 - z * z), angle = i * M_PI * (3 - sqrt(5));
+        const double n[3] = {around * cos(angle), around * sin(angle), z};
+        all[i] = (struct make_splat){.radius = (float)disc};
+        for (int k = 0; k < 3; k++) {
+            all[i].position[k] = radius * n[k];
+            all[i].normal[k] = (float)-n[k];
+            all[i].color[k] = (uint8_t)lrint(128 + 40 * n[(k + 1) % 3]);
+        }
+    }
+    ball = make_dataset(all, splats);
+    free(all);
+    assert_int_equal(spl_renderer_add(renderer, ball, NULL), SPL_OK);
+}
+
+/* Turned by so many eighths of a turn to the right. */
+static struct spl_view all_around(int eighths)
+{
+    const double angle = eighths * M_PI / 4, target[3] = {eye[0] + cos(angle), eye[1] - sin(angle), eye[2]};
+    struct spl_view view;
+    spl_view_init(&view);
+    view.lod = 0;
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, width, height, NULL), SPL_OK);
+    return view;
+}
+
+static struct spl_frame render(const struct spl_view *view)
+{
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    if (spl_renderer_render(renderer, ball, view, &frame, &err))
+        fail_msg("%s: %s", err.field, err.message);
+    return frame;
+}
+
+/* The greatest and the mean difference of two images, one turned by an eighth: its edges lie in the other's faces. */
+static int find_seam(struct spl_view *one, double *mean)
+{
+    struct spl_view two = *one;
+    int most = 0;
+    memcpy(two.camera.rotation, all_around(1).camera.rotation, sizeof two.camera.rotation);
+    struct spl_frame a = render(one), b = render(&two);
+    const uint8_t *p = a.images[SPL_LAYER_COLOR].pixels, *q = b.images[SPL_LAYER_COLOR].pixels;
+    *mean = 0;
+    for (int y = 0; y < height; y++)
+        for (int x = 0; x < width; x++)
+            for (int c = 0; c < 4; c++) {
+                const int off = abs(p[4 * (y * width + x) + c] - q[4 * (y * width + (x + width - width / 8) % width) + c]);
+                most = off > most ? off : most;
+                *mean += off / (4.0 * width * height);
+            }
+    spl_frame_finish(&a);
+    spl_frame_finish(&b);
+    return most;
+}
+
+static void no_edge_of_a_face_is_seen(void **state)
+{
+    (void)state;
+    static const struct {
+        enum spl_method method;
+        const char *shade, *soft;
+        double supersample;
+        int most; /* levels */
+        double mean;
+    } rows[] = {
+        {SPL_METHOD_SPLAT, "none", NULL, 1, 1, 0.1},
+        {SPL_METHOD_SPLAT, "none", NULL, 2, 1, 0.1},
+        {SPL_METHOD_SPLAT, "edl+headlight", NULL, 1, 2, 0.2},
+        {SPL_METHOD_SPLAT, "none", "plane:0,0,0,0.2,0.1,1>0", 1, 2, 0.2},
+        {SPL_METHOD_NEAREST, "none", NULL, 1, 3, 0.3},
+        {SPL_METHOD_FILL, "none", NULL, 1, 6, 0.5},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view view = all_around(0);
+        double mean;
+        view.method = rows[i].method;
+        view.supersample = rows[i].supersample;
+        assert_int_equal(spl_shade_parse(rows[i].shade, &view.shade, NULL), SPL_OK);
+        if (rows[i].soft)
+            assert_int_equal(spl_soft_parse(rows[i].soft, &view.soft, NULL), SPL_OK);
+        const int most = find_seam(&view, &mean);
+        print_message("%s, %s, %s: %d levels, mean %.3f\n", spl_method_name(view.method), rows[i].shade,
+                      rows[i].soft ? rows[i].soft : "solid", most, mean);
+        if (most > rows[i].most || !(mean <= rows[i].mean))
+            fail_msg("row %zu: %d levels, mean %g", i, most, mean);
+    }
+}
+
+/* Along the unit ray from the eye. */
+static double true_range(const struct spl_camera *camera, const double ray[3])
+{
+    double along = 0, square = 0;
+    for (int k = 0; k < 3; k++) {
+        const double world = camera->rotation[k] * ray[0] + camera->rotation[3 + k] * ray[1] + camera->rotation[6 + k] * ray[2];
+        along += world * eye[k];
+        square += eye[k] * eye[k];
+    }
+    return -along + sqrt(along * along - square + radius * radius);
+}
+
+static void ranges_are_true(void **state)
+{
+    (void)state;
+    struct spl_view views[3] = {all_around(0), all_around(1), all_around(1)};
+    assert_int_equal(spl_camera_set_fisheye(&views[1].camera, 220, height, height, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&views[2].camera, 70, width, height, NULL), SPL_OK);
+    const struct spl_distortion barrel = {.kind = SPL_DISTORTION_RADIAL, .k = {-0.12, 0.02}, .p = {0.003, -0.002}};
+    assert_int_equal(spl_camera_set_lens(&views[2].camera, &barrel, NULL), SPL_OK);
+    for (int i = 0; i < 3; i++) {
+        const struct spl_camera *camera = &views[i].camera;
+        views[i].layers = 1u << SPL_LAYER_RANGE;
+        struct spl_frame frame = render(&views[i]);
+        const float *range = frame.images[SPL_LAYER_RANGE].pixels;
+        double sum = 0, most = 0;
+        size_t seen = 0;
+        for (uint32_t at = 0; at < camera->width * camera->height; at++) {
+            double ray[3];
+            const bool sees = spl_camera_get_ray(camera, at % camera->width + 0.5, at / camera->width + 0.5, ray);
+            assert_int_equal(sees, !isnan(range[at]));
+            if (!sees)
+                continue;
+            const double off = fabs((double)range[at] - true_range(camera, ray)) / disc;
+            most = fmax(most, off);
+            sum += off;
+            seen++;
+        }
+        spl_frame_finish(&frame);
+        print_message("view %d, %% of a radius: mean %.2f, most %.2f\n", i, 100 * sum / (double)seen, 100 * most);
+        assert_true(sum <= 0.03 * (double)seen && most < 0.12);
+    }
+}
+
+static void a_cubes_faces_are_pinholes(void **state)
+{
+    (void)state;
+    enum { side = 48 };
+    static const int turns[6][2] = {{2, 0}, {-2, 0}, {0, 0}, {0, 0}, {0, 0}, {4, 0}};
+    struct spl_view cube = all_around(0);
+    cube.layers = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_RANGE;
+    assert_int_equal(spl_camera_set_around(&cube.camera, SPL_CUBE, 6 * side, side, NULL), SPL_OK);
+    struct spl_frame all = render(&cube);
+    for (int face = 0; face < 6; face++) {
+        if (face == 2 || face == 3)
+            continue; /* up and down: test_rays.c */
+        struct spl_view pinhole = all_around(turns[face][0]);
+        pinhole.layers = cube.layers;
+        assert_int_equal(spl_camera_set_fov(&pinhole.camera, 90, side, side, NULL), SPL_OK);
+        struct spl_frame one = render(&pinhole);
+        for (int y = 0; y < side; y++)
+            for (int x = 0; x < side; x++) {
+                const int from = y * side + x, at = y * 6 * side + face * side + x;
+                const float *a = one.images[SPL_LAYER_RANGE].pixels, *b = all.images[SPL_LAYER_RANGE].pixels;
+                const uint8_t *p = one.images[SPL_LAYER_COLOR].pixels, *q = all.images[SPL_LAYER_COLOR].pixels;
+                assert_true(fabsf(a[from] - b[at]) < 0.002f);
+                for (int c = 0; c < 4; c++)
+                    assert_true(abs(p[4 * from + c] - q[4 * at + c]) <= 1);
+            }
+        spl_frame_finish(&one);
+    }
+    spl_frame_finish(&all);
+}
+
+static void layers_hold_their_kind(void **state)
+{
+    (void)state;
+    static const double samples[] = {1, 4, 0.5};
+    for (int i = 0; i < 3; i++) {
+        struct spl_view view = all_around(0);
+        view.layers = ((1u << SPL_LAYER_COUNT) - 1) & ~(1u << SPL_LAYER_DEPTH);
+        view.supersample = samples[i];
+        view.background[0] = 200;
+        assert_int_equal(spl_camera_set_fisheye(&view.camera, 150, 64, 64, NULL), SPL_OK);
+        struct spl_frame frame = render(&view);
+        const uint8_t *color = frame.images[SPL_LAYER_COLOR].pixels;
+        const float *range = frame.images[SPL_LAYER_RANGE].pixels, *normal = frame.images[SPL_LAYER_NORMAL].pixels,
+                    *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
+        const uint32_t *id = frame.images[SPL_LAYER_ID].pixels, *shape = frame.images[SPL_LAYER_PRIMITIVE].pixels;
+        assert_true(frame.stats.complete && frame.stats.tiles >= 5);
+        for (int at = 0; at < 64 * 64; at++) {
+            double ray[3];
+            const float *n = normal + 3 * at;
+            if (spl_camera_get_ray(&view.camera, at % 64 + 0.5, at / 64 + 0.5, ray)) {
+                assert_true(range[at] > 2 && range[at] < 4 && id[at] < splats && shape[at] == SPL_SHAPE_SPLAT && coverage[at] > 0.99f);
+                assert_true(fabsf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1) < 0.01f && color[4 * at + 3] == 255);
+            } else {
+                assert_true(isnan(range[at]) && id[at] == UINT32_MAX && !shape[at] && coverage[at] == 0 && n[0] == 0 && n[1] == 0 && n[2] == 0);
+                assert_memory_equal(color + 4 * at, view.background, 4);
+            }
+        }
+        /* rows apart, in memory of the caller's */
+        enum { row = 80 };
+        static float apart[64 * row];
+        const struct spl_image own = {SPL_LAYER_RANGE, SPL_PIXEL_F32, 64, 64, apart, row * sizeof *apart};
+        view.layers = 1u << SPL_LAYER_RANGE;
+        assert_int_equal(spl_renderer_render_with(renderer, ball, &view,
+                                                  &SPL_SIZED(spl_render_options, .images = &own, .image_count = 1), NULL, NULL), SPL_OK);
+        for (int y = 0; y < 64; y++)
+            assert_memory_equal(apart + row * y, range + 64 * y, 64 * sizeof *apart);
+        spl_frame_finish(&frame);
+    }
+    struct spl_view view = all_around(0);
+    struct spl_error err = {0};
+    view.layers = 1u << SPL_LAYER_DEPTH;
+    assert_int_equal(spl_view_check(&view, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "layer");
+    view = all_around(0);
+    assert_int_equal(spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, 32768, 2048, NULL), SPL_OK);
+    err = (struct spl_error){0};
+    assert_int_equal(spl_view_check(&view, &err), SPL_E_LIMIT);
+    assert_string_equal(err.field, "width");
+    /* what is drawn costs and takes memory, and not the image's pixels alone */
+    view = all_around(0);
+    assert_true(spl_view_get_samples(&view) > 2 * width * height && spl_view_get_samples(&view) < 3 * width * height);
+    assert_true(spl_view_get_frame_bytes(&view) == 4 * spl_view_get_samples(&view));
+}
+
+static void picks_lie_where_the_image_says(void **state)
+{
+    (void)state;
+    struct spl_view view = all_around(0);
+    struct spl_pick pick;
+    view.layers = 1u << SPL_LAYER_RANGE;
+    struct spl_frame frame = render(&view);
+    const float *range = frame.images[SPL_LAYER_RANGE].pixels;
+    for (int i = 0; i < 12; i++) {
+        const int x = (i * 97 + 3) % width, y = (i * 53 + 7) % height;
+        double pixel[2], distance;
+        assert_int_equal(spl_renderer_pick(renderer, ball, &view, x + 0.5, y + 0.5, &pick, NULL), SPL_OK);
+        assert_true(pick.hit && pick.depth == pick.distance && pick.splat >= 0);
+        assert_true(fabs(pick.distance - (double)range[y * width + x]) < 0.1 * disc);
+        assert_true(spl_camera_project(&view.camera, pick.position, pixel, &distance));
+        assert_true(fabs(pixel[0] - x - 0.5) < 1e-3 / cos((y - height / 2.0) / height * 3.1) && fabs(pixel[1] - y - 0.5) < 1e-3 &&
+                    fabs(distance - pick.distance) < 1e-5);
+    }
+    spl_frame_finish(&frame);
+    assert_int_equal(spl_camera_set_fisheye(&view.camera, 150, 64, 64, NULL), SPL_OK);
+    assert_int_equal(spl_renderer_pick(renderer, ball, &view, 1, 1, &pick, NULL), SPL_OK);
+    assert_false(pick.hit);
+    assert_int_equal(spl_renderer_pick(renderer, ball, &view, 32, 32, &pick, NULL), SPL_OK);
+    assert_true(pick.hit);
+}
+
+int main(int argc, char **argv)
+{
+    struct spl_renderer_options options = {
+        .size = sizeof options, .device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE")};
+    struct spl_error err = {0};
+    if (spl_renderer_create(&options, &renderer, &err)) {
+        fprintf(stderr, "skipped: %s\n", err.message);
+        return 77;
+    }
+    make_ball();
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(no_edge_of_a_face_is_seen),
+        cmocka_unit_test(ranges_are_true),
+        cmocka_unit_test(a_cubes_faces_are_pinholes),
+        cmocka_unit_test(layers_hold_their_kind),
+        cmocka_unit_test(picks_lie_where_the_image_says),
+    };
+    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    spl_renderer_remove(renderer, ball);
+    spl_dataset_close(ball);
+    spl_renderer_destroy(renderer);
+    return failed;
+}
