@@ -129,8 +129,9 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
         }
 }
 
-/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it. Where a face shows an
- * angle off the camera's axis, itself is finer than in its middle, towards its edges. */
+/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its own. A
+ * face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by what is left of
+ * it to 90 degrees. */
 static double find_focal(const struct spl_camera *camera, double widest)
 {
     const double focal = fmax(camera->fx, camera->fy), end = fmin(widest, M_PI_2);
@@ -138,16 +139,16 @@ static double find_focal(const struct spl_camera *camera, double widest)
     if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE)
         return focal;
     for (int i = 1; i <= grow_steps; i++) {
-        const double angle = end * i / grow_steps, tangent = tan(angle), front = cos(fmin(angle, M_PI_4));
+        const double angle = end * i / grow_steps, tangent = tan(angle);
+        const double finer = angle > M_PI_4 ? sin(angle) : cos(angle);
         const bool fisheye = camera->projection == SPL_FISHEYE;
         const double r = fmin(fisheye ? angle : tangent, camera->lens.reach);
         double growth, image = spl_distortion_get_image(&camera->lens, r, &growth);
         if (!fisheye)
             growth *= 1 + r * r; /* by the angle */
-        const double along = growth * front * front, around = image / sin(angle) * (angle > M_PI_4 ? sin(angle) : front);
-        needed = fmax(needed, fmax(along, around));
+        needed = fmax(needed, fmax(growth * finer * finer, image / sin(angle) * finer));
     }
-    return needed * focal;
+    return fmin(needed, 2) * focal;
 }
 
 int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err)

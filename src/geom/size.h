@@ -62,6 +62,8 @@ static inline void spl_camera_resize(struct spl_camera *camera, uint32_t width, 
     spl_camera_scale(camera, (double)width / camera->width, (double)height / camera->height);
     camera->width = width;
     camera->height = height;
+    if (camera->projection == SPL_CUBE) /* which has no other */
+        camera->fx = camera->fy = camera->cx = camera->cy = height / 2.0;
 }
 
 #endif

@@ -296,6 +296,52 @@ def test_orthographic_views():
         assert d.view(**eye, view_height=6, near=0, **size).status == 200
         wrong = d.view(**eye, projection="perspective", near=0, up="0,1,0", **size)
         assert wrong.status == 400 and wrong.json()["field"] == "near", wrong.body
+        views_all_around(d)
+
+
+def views_all_around(d):
+    """Sizes follow from the projection, what a lens saw can be asked for again, picks and batches speak of the same place, and
+    what there is not of them is refused by name."""
+    at, npy = {"eye": "3,0.2,1", "target": "0,0,0.4"}, {"layer": "range", "format": "npy"}
+    for projection, size, fov in (("equirectangular", (128, 64), None), ("cube", (96, 16), None), ("fisheye", (64, 64), 200)):
+        first = d.view(**at, projection=projection, width=size[0], **npy, **({"fov": fov} if fov else {}))
+        assert first.status == 200, first.body
+        used = json.loads(first.headers["Splatd-Camera"])
+        assert (used["width"], used["height"], used["projection"], used.get("fov")) == (*size, projection, fov), used
+        if not fov:  # upright, however steeply the target lies
+            assert used["rotation"][5] == -1 and abs(used["rotation"][8]) < 1e-12, used
+        floats = struct.unpack(f"<{size[0] * size[1]}f", first.body[-4 * size[0] * size[1]:])
+        seen = next(i for i, r in enumerate(floats) if r == r)
+        x, y = seen % size[0] + 0.5, seen // size[0] + 0.5
+        query = "&".join(f"{k}={v}" for k, v in {**at, "projection": projection, "width": size[0], "x": x, "y": y,
+                                                 **({"fov": fov} if fov else {})}.items())
+        pick = d.ask(f"{PICK}?{query}").json()
+        assert pick["distance"] == pick["depth"] and abs(pick["distance"] - floats[seen]) < 0.05, (pick, floats[seen])
+        assert d.view(**at, projection=projection, width=size[0]).headers["ETag"] != first.headers["ETag"]
+        view = {"camera": {"eye": [3, 0.2, 1], "target": [0, 0, 0.4], "projection": projection, **({"fov": fov} if fov else {})}, "width": size[0]}
+        views = d.post({"views": [view], **npy}, VIEW + "s")
+        assert views.status == 200 and first.body in views.body
+        for extra, field in (({"layer": "depth"}, "layer"), ({"budget": "50ms"}, "budget"), ({"psnr": 20}, "psnr"),
+                             ({"format": "tiff"}, "format"), ({"view_height": 3}, "view_height"),
+                             ({"units_per_pixel": 3}, "units_per_pixel")):
+            wrong = d.view(**at, projection=projection, width=size[0], **extra)
+            assert wrong.status == 400 and wrong.json()["field"] == field, (projection, extra, wrong.body)
+    assert d.view(**at, projection="equirectangular", fov=50).json()["field"] == "fov"
+    assert d.view(**at, projection="cube", width=97, height=16).json()["field"] == "width"
+    assert d.view(**at, projection="fisheye", fov=361).json()["field"] == "fov"
+    assert d.view(**at, fov=200).json()["field"] == "fov"
+    pose = {"eye": [3, 0.2, 1], "target": [0, 0, 0.4]}
+    lens = {"model": "OPENCV", "params": [50, 51, 32.5, 24, -0.2, 0.05, 0.002, -0.001]}
+    saw = d.post({"camera": {**pose, **lens}, "width": 64, "height": 48, **npy})
+    assert saw.status == 200, saw.body
+    used = json.loads(saw.headers["Splatd-Camera"])
+    assert used["model"] == "FULL_OPENCV" and "projection" not in used
+    again = d.post({"camera": {**pose, "model": used["model"], "params": used["params"]}, "width": 64, "height": 48, **npy})
+    assert again.body == saw.body
+    straight = d.post({"camera": {**pose, "fx": 50, "fy": 51, "cx": 32.5, "cy": 24}, "width": 64, "height": 48, **npy})
+    assert straight.status == 200 and straight.body != saw.body
+    wrong = d.post({"camera": {**pose, **lens}, "width": 64, "height": 48, "layer": "depth"})
+    assert wrong.status == 400 and wrong.json()["field"] == "layer", wrong.body
 
 
 def test_a_body_says_all_that_a_query_does():

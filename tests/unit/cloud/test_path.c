@@ -185,6 +185,38 @@ static void test_times_and_order(void **state)
     spl_camera_path_finish(&path);
 }
 
+/* The size is that of the projection; between keys, which are all of one, it stays what it is. */
+static void test_paths_all_around(void **state)
+{
+    (void)state;
+#define AROUND(projection)                                                                                                      \
+    "{\"keyframes\":[{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,5],\"projection\":\"" projection "\"}},"                       \
+    "{\"camera\":{\"eye\":[4,0,0],\"target\":[4,9,0],\"projection\":\"" projection "\"}}]}"
+    static const struct {
+        const char *text;
+        uint32_t width, height, wanted[2];
+    } rows[] = {{AROUND("equirectangular"), 1440, 720, {0}}, {AROUND("cube"), 1920, 320, {0}}, {AROUND("fisheye"), 720, 720, {0}},
+                {AROUND("equirectangular"), 256, 128, {256}}, {AROUND("cube"), 198, 33, {0, 33}}, {AROUND("fisheye"), 90, 90, {0, 90}},
+                {"{\"camera_type\":\"equirectangular\",\"render_width\":512,\"render_height\":256,\"camera_path\":["
+                 "{\"camera_to_world\":" MATRIX ",\"fov\":60},{\"camera_to_world\":" MATRIX "}]}", 512, 256, {0}}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_camera_path path;
+        struct spl_camera between[3];
+        struct spl_error err = {0};
+        const struct spl_path_options options = {.width = rows[i].wanted[0], .height = rows[i].wanted[1]};
+        if (parse(rows[i].text, options, &path, &err))
+            fail_msg("%s: %s: %s", rows[i].text, err.field, err.message);
+        assert_int_equal(spl_camera_path_sample(&path, &(struct spl_path_motion){0}, 3, between, NULL), 0);
+        for (int k = 0; k < 3; k++) {
+            assert_true(spl_camera_is_bent(&between[k]) && between[k].projection == path.cameras[0].projection);
+            assert_true(between[k].width == rows[i].width && between[k].height == rows[i].height);
+            if (i < 2) /* upright, though the first key's target is not level */
+                assert_true(fabs(between[k].rotation[5] + 1) < 1e-12);
+        }
+        spl_camera_path_finish(&path);
+    }
+}
+
 static void test_bad_paths_are_named(void **state)
 {
     (void)state;
@@ -233,6 +265,8 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[],\"fps\":0}", "fps"},
         {"{\"keyframes\":[],\"closed\":1}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"), "keyframes[1].projection"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"model\":\"SIMPLE_RADIAL\",\"params\":[900,640,360,0.1]}}"), "keyframes[1].params"},
         {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
              "\"znear\":1,\"aspectRatio\":1}}}}"),
          "keyframes[1].camera.gltf.perspective.aspectRatio"},
@@ -361,6 +395,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_other_coordinates),
         cmocka_unit_test(test_golden_vectors),  cmocka_unit_test(test_own_sizes_and_defaults),
+        cmocka_unit_test(test_paths_all_around),
         cmocka_unit_test(test_times_and_order), cmocka_unit_test(test_bad_paths_are_named),
         cmocka_unit_test(test_what_is_no_trajectory_says_so),
         cmocka_unit_test(test_files),           cmocka_unit_test(test_a_binary_model),
