@@ -10,7 +10,7 @@
 #include "base/error.h"
 
 static const double radial_reach = 20, fisheye_reach = 1.55; /* tan of 87 degrees; a view depth above 0 */
-enum { reach_steps = 2000 };
+enum { reach_steps = 2000, tangential_rounds = 24 };
 
 double spl_distortion_get_image(const struct spl_distortion *d, double r, double *growth)
 {
@@ -69,14 +69,14 @@ void spl_distortion_widen(struct spl_distortion *d)
     find_reach(d, d->kind == SPL_DISTORTION_FISHEYE ? M_PI : radial_reach);
 }
 
-/* The r, or the angle, whose image has the radius `image`. Newton's steps, halving where they would leave what is known
- * to hold it. */
-static double find_radius(const struct spl_distortion *d, double image)
+/* The r, or the angle, whose image has the radius `image`, from a guess. Newton's steps, halving where they would leave what
+ * is known to hold it. */
+static double find_radius(const struct spl_distortion *d, double image, double guess)
 {
-    double low = 0, high = d->reach, r = fmin(image, d->reach), growth;
+    double low = 0, high = d->reach, r = fmin(guess, d->reach), growth;
     if (d->kind == SPL_DISTORTION_NONE || image_of(d, high) <= image)
         return d->kind == SPL_DISTORTION_NONE ? image : high;
-    for (int i = 0; i < 100; i++) {
+    for (int i = 0; i < 60; i++) {
         double off = spl_distortion_get_image(d, r, &growth) - image;
         *(off < 0 ? &low : &high) = r;
         double next = r - off / growth;
@@ -91,7 +91,7 @@ static double find_radius(const struct spl_distortion *d, double image)
 
 double spl_distortion_invert(const struct spl_distortion *d, double image)
 {
-    double r = find_radius(d, image);
+    double r = find_radius(d, image, image);
     return d->kind == SPL_DISTORTION_FISHEYE ? tan(r) : r;
 }
 
@@ -106,17 +106,20 @@ bool spl_distortion_get_ray(const struct spl_distortion *d, const double m[2], d
 {
     double straight[2] = {m[0], m[1]}, bent[2] = {0}, radius = 0, scale = 1;
     const bool tangential = d->kind == SPL_DISTORTION_RADIAL && (d->p[0] != 0 || d->p[1] != 0);
-    for (int i = 0; i < 60; i++) { /* what is tangential is small: each round leaves a hundredth of the error or less */
+    for (int i = 0;; i++) { /* what is tangential is small: each round leaves a hundredth of the error, say */
         double r = hypot(straight[0], straight[1]), before[2] = {bent[0], bent[1]};
-        radius = find_radius(d, r);
+        radius = find_radius(d, r, i ? radius : r);
         scale = r > 1e-12 ? radius / r : 1;
         if (d->kind != SPL_DISTORTION_NONE && radius >= d->reach && r > image_of(d, d->reach) * (1 + 1e-12))
             return false;
         if (!tangential)
             break;
         set_tangential(d, straight[0] * scale, straight[1] * scale, bent);
-        if (hypot(bent[0] - before[0], bent[1] - before[1]) < 1e-15)
+        const double moved = hypot(bent[0] - before[0], bent[1] - before[1]);
+        if (moved < 1e-14)
             break;
+        if (i == tangential_rounds)
+            return false;
         straight[0] = m[0] - bent[0];
         straight[1] = m[1] - bent[1];
     }

@@ -13,7 +13,7 @@ const double spl_face_axes[SPL_FACES][9] = {
     {1, 0, 0, 0, 0, -1, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1},  {-1, 0, 0, 0, 1, 0, 0, 0, -1},
 };
 
-enum { edge_steps = 256, grow_steps = 256, FRONT = 4 };
+enum { edge_steps = 128, grow_steps = 128, FRONT = 4 };
 
 static double dot(const double a[3], const double b[3])
 {

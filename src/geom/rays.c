@@ -7,6 +7,8 @@
 #include "base/error.h"
 #include "geom/distortion.h"
 
+static const double tangential_most = 0.1; /* of lenses that are; beyond, what bends has no inverse */
+
 bool spl_camera_is_bent(const struct spl_camera *camera)
 {
     return camera->projection > SPL_ORTHOGRAPHIC || camera->lens.kind != SPL_DISTORTION_NONE;
@@ -90,6 +92,10 @@ int spl_camera_check_bent(const struct spl_camera *camera, struct spl_error *err
         !(camera->projection == SPL_PERSPECTIVE && lens->kind == SPL_DISTORTION_RADIAL))
         return spl_fail_field(err, SPL_E_USAGE, "projection", "projection %s and lens %d do not go together",
                               spl_projection_name(camera->projection), (int)lens->kind);
+    for (int i = 0; i < 2; i++)
+        if (fabs(lens->p[i]) > tangential_most)
+            return spl_fail_field(err, SPL_E_INPUT, "params", "the lens has the tangential coefficient %g; at most %g is drawn",
+                                  lens->p[i], tangential_most);
     for (int i = 0; i < 8; i++)
         if (!isfinite(i < 6 ? lens->k[i] : lens->p[i - 6]) || (i >= 6 && fisheye && lens->p[i - 6] != 0))
             return spl_fail_field(err, SPL_E_INPUT, "params", "the lens has the %s coefficient %g",

@@ -24,7 +24,7 @@
 #include "render/turns.h"
 #include "render/view.h"
 
-enum { enlarged_pixels = 1 << 20 }; /* a step; 10 ms of a core or two */
+enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17 }; /* a step; 10 ms of a core or two */
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
 enum { mapped_samples = 1 << 19 };
@@ -296,7 +296,7 @@ static int enlarge(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = spl_frame_make_images(&steps->enlarged, &steps->wanted, err);
     if (rc)
         return rc;
-    uint32_t rows = enlarged_pixels / camera->width + 1, left = camera->height - steps->row;
+    uint32_t rows = (uint32_t)(steps->around ? looked_up_pixels : enlarged_pixels) / camera->width + 1, left = camera->height - steps->row;
     uint32_t end = steps->row + (rows < left ? rows : left);
     if (steps->around)
         spl_around_look_up(steps->around, &steps->wanted, steps->enlarged.images, steps->row, end);
