@@ -23,7 +23,8 @@ SPL_BEGIN_DECLARATIONS
 enum spl_projection {
     SPL_PERSPECTIVE,
     SPL_ORTHOGRAPHIC,
-    SPL_EQUIRECTANGULAR, /* all directions: 2 pi fx = width, pi fy = height, where nothing is cut off */
+    SPL_EQUIRECTANGULAR, /* all directions: 2 pi fx = width, pi fy = height, where nothing is cut off; below 0: from the right,
+                            from below */
     SPL_CUBE,            /* right, left, up, down, front and back, in this order; each height x height pixels */
     SPL_FISHEYE,         /* equidistant, or as `lens` bends it */
     SPL_PROJECTION_COUNT

@@ -31,6 +31,7 @@ struct arguments {
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     int projection;                      /* enum spl_projection, -1 = not given */
     double view_height, units_per_pixel; /* NAN = not given */
+    double azimuth[3], elevation[3];     /* the same, of the first */
     bool world_file;
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
@@ -70,6 +71,9 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_REAL(struct arguments, view_height, 1e-9, 1e12)},
     {"units-per-pixel", "U", "of an orthographic image, instead of its height",
      SPL_CMD_REAL(struct arguments, units_per_pixel, 1e-9, 1e9)},
+    {"azimuth", "A,B,N", "columns of an equirectangular image, instead of --size: a scanner's rays, N from A to B, degrees to the right of forward",
+     SPL_CMD_VECTOR(struct arguments, azimuth)},
+    {"elevation", "A,B,N", "its rows; degrees upwards", SPL_CMD_VECTOR(struct arguments, elevation)},
     {"size", "WxH", "pixels; W or xH alone: at the ratio of the default", .otherwise = "1280x720, 1440x720 all around, "
      "1920x320 of a cube, 720x720 of a fisheye", SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
     {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 0, 1e12)},
@@ -199,8 +203,12 @@ static int resolve_projection(const struct arguments *a, const struct spl_saved_
     give(values, SPL_CAMERA_fy, &a->fy, 1);
     give(values, SPL_CAMERA_cx, &a->cx, 1);
     give(values, SPL_CAMERA_cy, &a->cy, 1);
-    give(values, SPL_CAMERA_width, &size[0], 1);
-    give(values, SPL_CAMERA_height, &size[1], 1);
+    give(values, SPL_CAMERA_azimuth, a->azimuth, 3);
+    give(values, SPL_CAMERA_elevation, a->elevation, 3);
+    if (isnan(a->azimuth[0]) && isnan(a->elevation[0])) {
+        give(values, SPL_CAMERA_width, &size[0], 1);
+        give(values, SPL_CAMERA_height, &size[1], 1);
+    }
     give(values, SPL_CAMERA_near, &a->near, 1);
     give(values, SPL_CAMERA_far, &a->far, 1);
     return spl_camera_from_values(values, &defaults, &limits, camera, err);
@@ -234,6 +242,11 @@ static int start_camera(const struct arguments *a, const struct spl_dataset *dat
 static int resolve_size(struct arguments *a, struct spl_error *err)
 {
     double size[2] = {a->drawing.size[0], a->drawing.size[1]}, shape[2];
+    const bool scans = !isnan(a->azimuth[0]) || !isnan(a->elevation[0]);
+    if (scans && a->projection != SPL_EQUIRECTANGULAR)
+        return spl_fail(err, SPL_E_USAGE, "--azimuth and --elevation go with --projection equirectangular");
+    if (scans && (size[0] > 0 || size[1] > 0))
+        return spl_fail(err, SPL_E_USAGE, "--size and --azimuth exclude each other");
     spl_size_of_projection(a->projection < 0 ? SPL_PERSPECTIVE : (enum spl_projection)a->projection, shape);
     spl_size_follow(size, shape);
     for (int i = 0; i < 2; i++) {
@@ -387,6 +400,7 @@ int spl_cmd_render(int argc, char **argv)
     struct arguments a = {
         .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
         .near = NAN, .far = NAN, .projection = -1, .view_height = NAN, .units_per_pixel = NAN,
+        .azimuth = {NAN}, .elevation = {NAN},
     };
     struct spl_error err = {0};
     spl_cmd_drawing_init(&a.drawing, 0, 0);

@@ -238,7 +238,7 @@ int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const do
 
 static int check_focal(enum spl_projection projection, double focal, const char *field, struct spl_error *err)
 {
-    if (isfinite(focal) && focal > 0)
+    if (isfinite(focal) && (focal > 0 || (projection == SPL_EQUIRECTANGULAR && focal < 0))) /* which may go the other way */
         return SPL_OK;
     if (projection == SPL_ORTHOGRAPHIC)
         return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not a positive number", focal);

@@ -134,7 +134,7 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
  * it to 90 degrees. */
 static double find_focal(const struct spl_camera *camera, double widest)
 {
-    const double focal = fmax(camera->fx, camera->fy), end = fmin(widest, M_PI_2);
+    const double focal = fmax(fabs(camera->fx), fabs(camera->fy)), end = fmin(widest, M_PI_2);
     double needed = 1;
     if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE)
         return focal;
@@ -153,7 +153,8 @@ static double find_focal(const struct spl_camera *camera, double widest)
 
 int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err)
 {
-    const bool whole = camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE;
+    const bool sphere = camera->width >= 6.283185 * fabs(camera->fx) && camera->height >= 3.141592 * fabs(camera->fy);
+    const bool whole = (camera->projection == SPL_EQUIRECTANGULAR && sphere) || camera->projection == SPL_CUBE;
     struct parts parts;
     memset(faces, 0, sizeof *faces);
     for (int i = 0; i < SPL_FACES; i++)

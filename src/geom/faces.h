@@ -22,7 +22,7 @@ struct spl_faces {
 };
 
 /* Of a bent camera (spl_camera_is_bent()) that has passed spl_camera_check(). A face's pixel is as fine as the camera's
- * finest: of an equirectangular one up its columns, of a fisheye up to 90 degrees off its axis, of a lens at most half as large
+ * finest: of an equirectangular one along its columns and its equator, of a fisheye up to 90 degrees off its axis, of a lens at most half as large
  * as in the middle. SPL_E_LIMIT, fields
  * "width" and "params", where a side would be more than `side_px`. */
 int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err);

@@ -142,7 +142,8 @@ bool spl_camera_place(const struct spl_camera *camera, const double c[3], double
     if (!(length > 0))
         return false;
     if (camera->projection == SPL_EQUIRECTANGULAR) {
-        pixel[0] = camera->cx + camera->fx * atan2(c[0], c[2]);
+        const double turn = 2 * M_PI * camera->fx, u = camera->cx + camera->fx * atan2(c[0], c[2]);
+        pixel[0] = u - rint((u - camera->width / 2.0) / turn) * turn;
         pixel[1] = camera->cy + camera->fy * atan2(c[1], hypot(c[0], c[2]));
         return true;
     }

@@ -330,6 +330,13 @@ def views_all_around(d):
     assert d.view(**at, projection="cube", width=97, height=16).json()["field"] == "width"
     assert d.view(**at, projection="fisheye", fov=361).json()["field"] == "fov"
     assert d.view(**at, fov=200).json()["field"] == "fov"
+    whole = d.view(**at, projection="equirectangular", azimuth="-180,180,64", elevation="88,-88,45", **npy)
+    rings = d.view(**at, projection="equirectangular", azimuth="180,-180,64", elevation="-88,88,45", **npy)
+    assert whole.status == rings.status == 200, (whole.body, rings.body)
+    down, up = ([struct.unpack("<64f", r.body[-4 * 64 * 45:][256 * i:256 * (i + 1)]) for i in range(45)] for r in (whole, rings))
+    pairs = [(down[i][j], up[44 - i][(64 - j) % 64]) for i in range(45) for j in range(64)]
+    assert all((a != a and b != b) or abs(a - b) < 1e-5 for a, b in pairs) and any(a == a for a, _ in pairs)
+    assert d.view(**at, projection="fisheye", azimuth="0,9,4", elevation="0,9,4").json()["field"] == "azimuth"
     pose = {"eye": [3, 0.2, 1], "target": [0, 0, 0.4]}
     lens = {"model": "OPENCV", "params": [50, 51, 32.5, 24, -0.2, 0.05, 0.002, -0.001]}
     saw = d.post({"camera": {**pose, **lens}, "width": 64, "height": 48, **npy})

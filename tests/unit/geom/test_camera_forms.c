@@ -142,6 +142,11 @@ static void lenses_hit_the_golden_pixel(void **state)
         {PROJECTION("\"cube\"") ",\"width\":3840}", 3840, 640, 2932, 348},
         {PROJECTION("\"equirectangular\"") ",\"width\":640}", 640, 320, 336.408686655516, 168.775505608257},
         {PROJECTION("\"fisheye\"") ",\"height\":480}", 480, 480, 264.551892762167, 253.220249948859},
+        /* 9.2299 degrees to the right and 4.9362 below: rays every half degree, from the left and from above, and the other way */
+        {PROJECTION("\"equirectangular\",\"azimuth\":[-30,20,101],\"elevation\":[10,-20,61]") "}", 101, 61, 78.959772487455,
+         30.372443809289},
+        {PROJECTION("\"equirectangular\",\"azimuth\":[180,-180,720],\"elevation\":[-20,10,61]") "}", 720, 61, 342.040227512545,
+         30.627556190711},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         static const double point[3] = {-0.577054497069, 3.30876147309, -1.46753054758};
@@ -241,6 +246,15 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{" POSE ",\"projection\":\"cube\"}," SIZE "}", "width"},
         {"{\"camera\":{" POSE ",\"projection\":\"cube\",\"view_height\":4}," SIZE "}", "view_height"},
         {"{\"camera\":{\"eye\":[0,0,1],\"target\":[0,0,9],\"projection\":\"equirectangular\"}}", "up"},
+#define SCAN(azimuth, elevation, rest) "{\"camera\":{" POSE ",\"azimuth\":" azimuth ",\"elevation\":" elevation rest "}}"
+        {SCAN("[0,9,10]", "[0,9,10]", ""), "azimuth"},
+        {SCAN("[0,9,10]", "[0,9,10]", ",\"projection\":\"fisheye\""), "azimuth"},
+        {SCAN("[0,9,10]", "[0,9,10]", ",\"projection\":\"equirectangular\",\"width\":9"), "width"},
+        {SCAN("[0,9,2.5]", "[0,9,10]", ",\"projection\":\"equirectangular\""), "azimuth"},
+        {SCAN("[-200,200,10]", "[0,9,10]", ",\"projection\":\"equirectangular\""), "azimuth"},
+        {SCAN("[0,9,10]", "[0,91,10]", ",\"projection\":\"equirectangular\""), "elevation"},
+        {SCAN("[0,9,10]", "[9,9,10]", ",\"projection\":\"equirectangular\""), "elevation"},
+        {"{\"camera\":{" POSE ",\"azimuth\":[0,9,10],\"projection\":\"equirectangular\"}}", "elevation"},
         {"{\"camera\":{" POSE ",\"model\":\"OPENCV_FISHEYE\",\"params\":[9,9,9,9]}," SIZE "}", "params"},
         {"{\"camera\":{" POSE ",\"model\":\"SIMPLE_RADIAL\",\"params\":[9,9,9,-1e9]}," SIZE "}", "params"},
         {GLTF("\"type\":\"fisheye\"," LENS), "gltf.type"},
