@@ -289,6 +289,8 @@ def test_bad_tours_are_refused_by_field():
         ({"path": {"keyframes": [look(3, soft_opacity=0.5)]}, "frames": 2}, "settings.soft"),
         ({"path": {"keyframes": [look(3, soft_opacity=0.5)]}, "frames": 2, "settings": {"soft_opacity": 0.1}}, "settings.soft"),
         ({"path": {"keyframes": [look(3)]}, "settings": {"soft_model": "exact"}}, "settings.soft_model"),
+        ({"path": {"keyframes": [{"camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "projection": "cube"}}]}, "frames": 2,
+          "settings": {"layer": "depth"}}, "settings.layer"),
         ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
         ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
         ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),

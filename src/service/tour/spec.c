@@ -5,6 +5,7 @@
 #include "service/tour/spec.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -173,6 +174,12 @@ static int check_limits(const struct spl_view *settings, const struct spl_camera
 {
     struct spl_view view = *settings;
     view.camera = path->cameras[0];
+    struct spl_error why = {0};
+    if (spl_view_check(&view, &why)) { /* what the path's cameras have no images of */
+        char field[sizeof why.field + 16];
+        snprintf(field, sizeof field, "settings.%s", why.field);
+        return spl_fail_field(err, why.code, field, "%s", why.message);
+    }
     uint64_t samples = spl_view_get_samples(&view);
     if (limits->image.samples && samples > limits->image.samples)
         return spl_fail_field(err, SPL_E_LIMIT, "settings.supersample", "frames of %llu samples; the limit is %llu",
