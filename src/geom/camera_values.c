@@ -373,7 +373,7 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
     if (!free_pose && !given(v, SPL_CAMERA_target))
         return missing(SPL_CAMERA_target, SPL_CAMERA_eye, err);
     bool sized = is_orthographic(v) || given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
-    sized = sized || is_around(v);
+    sized = sized || is_around(v) || is_fisheye(v);
     if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model) && !sized)
         return spl_fail_field(
             err, SPL_E_INPUT, "fov",

@@ -265,8 +265,8 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[],\"fps\":0}", "fps"},
         {"{\"keyframes\":[],\"closed\":1}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"), "keyframes[1].projection"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"model\":\"SIMPLE_RADIAL\",\"params\":[900,640,360,0.1]}}"), "keyframes[1].params"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"), "keyframes[1].camera.projection"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"model\":\"SIMPLE_RADIAL\",\"params\":[900,640,360,0.1]}}"), "keyframes[1].camera.params"},
         {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
              "\"znear\":1,\"aspectRatio\":1}}}}"),
          "keyframes[1].camera.gltf.perspective.aspectRatio"},

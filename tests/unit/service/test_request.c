@@ -513,7 +513,7 @@ static void bodies_are_refused_by_name(void **state)
         {"{\"camera\":{\"params\":[1,2,3]}}", "model"},
         {"{\"camera\":{\"model\":\"FISHEYE\",\"params\":[1,2,3]}}", "model"},
         {"{\"camera\":{\"model\":\"PINHOLE\",\"params\":[1,2,3]}}", "params"},
-        {"{\"camera\":{\"model\":\"RADIAL\",\"params\":[500,2,3,0.1,0]}}", "params"},
+        {"{\"camera\":{\"model\":\"RADIAL\",\"params\":[500,2,3,0.1]}}", "params"},
         {"{\"camera\":{\"model\":\"PINHOLE\",\"params\":[1,2,3,4],\"fx\":3}}", "fx"},
         {"{\"camera\":{\"model\":\"PINHOLE\",\"params\":[1,2,3,4],\"fov\":3}}", "fov"},
         {"{\"camera\":{\"model\":\"PINHOLE\",\"params\":[0,2,3,4]}}", "fx"},
