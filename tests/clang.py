@@ -14,7 +14,8 @@ build = pathlib.Path(sys.argv[1])
 
 def warnings_of(entry):
     words = shlex.split(entry["command"])
-    command = ["clang", "-fsyntax-only", "-Werror", "-Wno-unknown-warning-option", *words[1 : words.index("-MD")], entry["file"]]
+    first = next(i for i, word in enumerate(words) if word.startswith("-"))  # behind the compiler and what runs it
+    command = ["clang", *words[first : words.index("-MD")], "-fsyntax-only", "-Werror", "-Wno-unknown-warning-option", entry["file"]]
     done = subprocess.run(command, cwd=entry["directory"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     return done.stdout or f"{entry['file']}: clang ended with {done.returncode}\n" if done.returncode else ""
 
