@@ -110,11 +110,11 @@ gcc -shared -fPIC "$out/keep-loaded.c" -o "$out/keep-loaded.so"
 # Of what is built without a backend only its stub differs, and the choice of a device.
 few="src/splatd tests/gpu/test-gpu-gpu tests/gpu/test-gpu-exact"
 build_others() {
-    build asan gcc "${sanitised[@]}" -Db_sanitize=address,undefined
-    build tsan gcc "${sanitised[@]}" -Db_sanitize=thread
-    targets=$few build no-vulkan gcc $strict -Dvulkan=disabled -Doptimization=0
-    targets=$few build no-egl gcc $strict -Degl=disabled -Dsystemd=disabled -Dvideo=disabled -Doptimization=0
-    build clang clang $strict
+    local kernels=-Dkernels=$out/normal/shaders
+    build asan gcc "${sanitised[@]}" "$kernels" -Db_sanitize=address,undefined
+    build tsan gcc "${sanitised[@]}" "$kernels" -Db_sanitize=thread
+    targets=$few build no-vulkan gcc $strict "$kernels" -Dvulkan=disabled -Doptimization=0
+    targets=$few build no-egl gcc $strict "$kernels" -Degl=disabled -Dsystemd=disabled -Dvideo=disabled -Doptimization=0
 }
 
 build normal gcc $strict
@@ -154,10 +154,6 @@ fi
 if built no-egl; then
     only="gpu-vulkan exact-vulkan devices" suites no-egl gpu # nor this one, nor what stands in for FFmpeg and systemd
 fi
-built clang || true # for what it warns of: the sanitised builds see what code does that only one compiler bears
-[ "$mode" = --full ] || { finish; exit; }
-suites clang unit
-
 # One program as a test: what it is called, and its command.
 program() {
     local name=$1 begin=$SECONDS verdict=passed
@@ -170,6 +166,10 @@ program() {
     fi
     printf '%-10s %-8s %s in %d s\n' "$name" "" "$verdict" $((SECONDS - begin))
 }
+# For what it warns of alone: the sanitised builds see what code does that only one compiler bears.
+program clang python3 tests/clang.py "$out/normal"
+[ "$mode" = --full ] || { finish; exit; }
+
 whole=(stability-whole-{conditions,drivers,invariants-vulkan,invariants-egl})
 program stability meson test -C "$out/normal" --no-rebuild --benchmark "${whole[@]}"
 program mutants python3 tests/mutants/mutants.py --keep "$out/mutants"

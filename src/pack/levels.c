@@ -7,7 +7,8 @@
  *
  * What panels leave may be a few splats, far from each other. A quarter of them would be discs from one to the next,
  * across what lies between, so there cells stay near what their splats are large, or as large as the node's panels ask
- * for, and discs near the area of their parts; the node holds more of them instead.
+ * for, and discs near the area of their parts, or as far as these reach laid end to end, which is what lines of a scan
+ * need; the node holds more of them instead.
  *
  * Where inner nodes are drawn for good, a mean of two surfaces is drawn for good too, and maps put the wrong texels on
  * it. There a cell gives a splat for each surface in it, told apart by their normals and by how far off one another's
@@ -34,8 +35,9 @@ static const double most = 0.28, wanted = 0.25, least = 0.20;
 enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
 
 /* Beside panels: how many times as wide as its splats lie apart a cell becomes, if not for the panels' sake; along a
- * wire a quarter of the splats asks for 4. And how much farther a disc reaches than its area. */
-static const double beside_panels = 4, reach_most = 1.5;
+ * wire a quarter of the splats asks for 4, lines of a scan that lie unevenly for up to twice as much. And how much
+ * farther a disc reaches than its area. */
+static const double beside_panels = 8, reach_most = 1.5;
 
 /* Surfaces of a cell: their normals differ by more than so much (cosine), or their planes by such a share of the
  * cell. The fourth takes what faces its way at all. */
@@ -48,7 +50,7 @@ struct cluster {
     uint32_t votes; /* of `classification`, majority by pairing off */
     uint8_t classification;
     float largest;
-    double weight, linear, position[3], squared, normal[3], color[3], uncertainty;
+    double weight, length, linear, position[3], squared, normal[3], color[3], uncertainty;
 };
 
 struct scratch { /* of one worker */
@@ -148,6 +150,7 @@ static void add_to(struct cluster *k, const struct spl_inner_splat *s)
         k->squared += w * s->position[c] * s->position[c];
     }
     k->weight += w;
+    k->length += s->radius;
     k->linear += s->linear ? w : 0;
     k->uncertainty += w * s->uncertainty;
     k->largest = fmaxf(k->largest, s->radius);
@@ -246,7 +249,7 @@ static size_t cluster_surfaces(void *context, double cell)
     return cluster(c->scratch, c->count, cell, c->count, true);
 }
 
-/* `farthest`: it reaches over its parts up to so many times the radius of their area. */
+/* `farthest`: it reaches over its parts up to so many times the radius of their area, or what they do end to end. */
 static void finish_cluster(const struct cluster *k, double cell, double farthest, struct spl_inner_splat *out)
 {
     double mean2 = 0, length = 0, weight = k->weight;
@@ -259,7 +262,7 @@ static void finish_cluster(const struct cluster *k, double cell, double farthest
     length = sqrt(length);
     for (int c = 0; c < 3; c++)
         out->normal[c] = length > 0 ? (float)(k->normal[c] / length) : c == 2;
-    double reach = fmin(sqrt(3 * fmax(0, k->squared / weight - mean2)), farthest * sqrt(weight));
+    double reach = fmin(sqrt(3 * fmax(0, k->squared / weight - mean2)), fmax(farthest * sqrt(weight), k->length));
     double radius = fmin(fmax(sqrt(weight), reach), 1.1284 * 1.4142 * cell);
     out->radius = fmaxf((float)radius, k->largest);
     out->uncertainty = (float)(k->uncertainty / weight);

@@ -32,10 +32,8 @@ static enum spl_marks_verdict fold(const struct spl_marks *clip, struct conditio
     for (uint32_t t = first; t < end; t++)
         verdict = c->of[t] > verdict ? c->of[t] : verdict;
     verdict = verdict == SPL_VERDICT_BLENDED ? SPL_VERDICT_ALL : verdict;
-    if (clip->terms[first].outside)
-        verdict = verdict == SPL_VERDICT_NONE  ? SPL_VERDICT_ALL
-                  : verdict == SPL_VERDICT_ALL ? SPL_VERDICT_NONE
-                                               : verdict;
+    if (clip->terms[first].outside && verdict != SPL_VERDICT_SOME)
+        verdict = verdict == SPL_VERDICT_NONE ? SPL_VERDICT_ALL : SPL_VERDICT_NONE;
     for (uint32_t t = first; t < end && verdict != SPL_VERDICT_SOME; t++)
         c->of[t] = SPL_VERDICT_NONE;
     return verdict;

@@ -154,8 +154,8 @@ static void soft_spheres_are_those_from_afar(void **state)
         struct spl_view view = parallel(2.2, 97, 75), pinhole;
         view.layers = 1u << SPL_LAYER_COLOR;
         view.lod = 0;
-        view.soft.terms.count = 1;
-        view.soft.terms.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = 0, .most = INFINITY,
+        view.soft.what.count = 1;
+        view.soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = 0, .most = INFINITY,
                                                      .shape = {0, 0, 0, 1, 0, 0}};
         view.soft.opacity = 0.5;
         view.soft.model = (enum spl_soft_model)model;

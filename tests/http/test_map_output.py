@@ -228,7 +228,7 @@ def test_every_parameter_of_a_tile():
     query = {p["name"]: p for _, _, operation, parameters in openapi.operations() if operation["operationId"] == "getTile"
              for p in parameters if p["in"] == "query"}
     values = {"method": "points", "lod": 2, "margin": 1, "atoms": 1, "maps": "off", "primitives": "off", "visibility": "none", "kernel": 5,
-              "threshold": 0.5, "pyramid": 3, "soft": "uncertainty>1", "soft_model": "base", "soft_opacity": 0.5, "soft_cover": 0.5,
+              "threshold": 0.5, "pyramid": 3, "clip": "z<3", "class": "!7", "soft": "uncertainty>1", "soft_model": "base", "soft_opacity": 0.5, "soft_cover": 0.5,
               "soft_blend": 0.1, "of": "first", "supersample": 2, "background": "white", "quality": 80, "wait": 0, "color_by": "height",
               "ramp": "turbo", "range": "0..2", "shade": "edl", "edl_strength": 0.7, "edl_radius": 3}
     with Daemon(FAKE) as d:

@@ -297,6 +297,8 @@ def test_looking_up_ends_with_the_deadline():
         replies = list(many.map(d.ask, asked))
         statuses = [reply.status for reply in replies]
         assert set(statuses) <= {200, 400, 503} and 503 in statuses[::2] and 503 in statuses[1::2], statuses
+        tiles = [reply.status for reply in many.map(d.ask, 8 * [f"{DATASET}/tiles.json"])]
+        assert set(tiles) <= {200, 503} and 503 in tiles, tiles
         assert d.ask(f"{DATASET}").status == 200
         eventually(lambda: place(d, crs="EPSG:32618", world="1,2,3").status == 200)
 

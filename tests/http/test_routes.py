@@ -275,7 +275,8 @@ def test_orthographic_views():
         assert used["projection"] == "orthographic" and abs(used["fx"] - 8) < 1e-12
         assert max(abs(a - b) for a, b in zip(used["rotation"], [1, 0, 0, 0, -1, 0, 0, 0, -1])) < 1e-12
         for same in (d.view(**eye, units_per_pixel=0.125, **size, **npy), d.view(**eye, projection="orthographic", fx=8, **size, **npy),
-                     d.post({"camera": {**down, "view_height": 6}, **size, **npy})):
+                     d.post({"camera": {**down, "projection": "orthographic", "view_height": 6}, **size, **npy}),
+                     d.post({"camera": {**down, "units_per_pixel": 0.125}, **size, **npy})):
             assert same.body == first.body and same.headers["ETag"] in (None, first.headers["ETag"]), same.headers  # a POST has none
         lens = {"orthographic": {"xmag": 4, "ymag": 3, "znear": used["near"], "zfar": 1e12}, "matrix": matrix}
         gltf = d.post({"camera": {"gltf": lens}, "height": 48, **npy})
@@ -291,6 +292,9 @@ def test_orthographic_views():
         wanted = [0.3 + (point["x"] - 32) / 8, 0.2 - (point["y"] - 24) / 8, 9 - floats[at]]
         assert max(abs(a - b) for a, b in zip(pick["position"], wanted)) < 1e-5, (pick, wanted)
         assert pick["distance"] == pick["depth"]
+        for camera, rest in (({**down, "projection": "orthographic", "view_height": 6}, size), ({**down, "units_per_pixel": 0.125}, size),
+                             ({"gltf": lens}, {"height": 48})):
+            assert d.post({"camera": camera, **rest, **point}, PICK).json()["position"] == pick["position"], camera
         views = d.post({"views": [{"camera": {**down, "view_height": h}} for h in (6, 2)], **size, **npy}, VIEW + "s")
         assert views.status == 200 and first.body in views.body
         assert d.view(**eye, view_height=6, near=0, **size).status == 200

@@ -244,7 +244,7 @@ def test_thumbnails():
         assert d.ask("/v1/datasets/nothing/thumbnail.jpg").status == 404
     for setting, arguments, status in (({"FAKE_ROOM_PX": "0"}, (), 507), ({"FAKE_FRAME_MS": "2000"}, ("--deadline", "100"), 503)):
         with Daemon(FAKE, *arguments, **setting) as d:
-            assert d.ask(path).status == status
+            assert d.ask(path).status == d.ask("/v1/datasets/wall/tiles/0/0/0.png").status == status
 
 
 def test_the_default_view_fits_narrow_images():

@@ -206,7 +206,7 @@ bool spl_frame_is_paused(const struct spl_frame_steps *steps)
 static bool gives_way(const struct spl_frame_steps *steps, uint64_t began)
 {
     const struct spl_soft_params *soft = &steps->view.soft;
-    bool walks = soft->count && (soft->model == SPL_SOFT_MODEL_BASE || soft->model == SPL_SOFT_MODEL_CONCENTRIC);
+    bool walks = soft->what.count && (soft->model == SPL_SOFT_MODEL_BASE || soft->model == SPL_SOFT_MODEL_CONCENTRIC);
     return walks && steps->asked && steps->asked(steps->context, spl_now_ns() - began, 0);
 }
 
