@@ -313,7 +313,7 @@ def views_all_around(d):
         used = json.loads(first.headers["Splatd-Camera"])
         assert (used["width"], used["height"], used["projection"], used.get("fov")) == (*size, projection, fov), used
         if not fov:  # upright, however steeply the target lies
-            assert used["rotation"][5] == -1 and abs(used["rotation"][8]) < 1e-12, used
+            assert abs(used["rotation"][5] + 1) < 1e-12 and abs(used["rotation"][8]) < 1e-12, used
         floats = struct.unpack(f"<{size[0] * size[1]}f", first.body[-4 * size[0] * size[1]:])
         seen = next(i for i, r in enumerate(floats) if r == r)
         x, y = seen % size[0] + 0.5, seen // size[0] + 0.5
