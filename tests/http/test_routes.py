@@ -342,6 +342,13 @@ def views_all_around(d):
     assert all((a != a and b != b) or abs(a - b) < 1e-5 for a, b in pairs) and any(a == a for a, _ in pairs)
     assert d.view(**at, projection="fisheye", azimuth="0,9,4", elevation="0,9,4").json()["field"] == "azimuth"
     pose = {"eye": [3, 0.2, 1], "target": [0, 0, 0.4]}
+    scan = {**pose, "projection": "equirectangular", "azimuth": [-180, 180, 64], "elevation": [88, -88, 45]}
+    assert d.post({"camera": scan, **npy}).body == whole.body
+    hit = next((i, j) for i in range(45) for j in range(64) if down[i][j] == down[i][j])
+    point = {"x": hit[1] + 0.5, "y": hit[0] + 0.5}
+    picks = (d.post({"camera": scan, **point}, PICK), d.ask(f"{PICK}?eye=3,0.2,1&target=0,0,0.4&projection=equirectangular&"
+                                                            f"azimuth=-180,180,64&elevation=88,-88,45&x={point['x']}&y={point['y']}"))
+    assert picks[0].json() == picks[1].json() and abs(picks[0].json()["distance"] - down[hit[0]][hit[1]]) < 0.1, picks[0].body
     lens = {"model": "OPENCV", "params": [50, 51, 32.5, 24, -0.2, 0.05, 0.002, -0.001]}
     saw = d.post({"camera": {**pose, **lens}, "width": 64, "height": 48, **npy})
     assert saw.status == 200, saw.body
