@@ -238,7 +238,7 @@ static int start_camera(const struct arguments *a, const struct spl_dataset *dat
     return spl_camera_look_at(camera, view->eye, view->target, view->up, err);
 }
 
-/* What is left out of --size. */
+/* What is left out of --size, and what does not go together. */
 static int resolve_size(struct arguments *a, struct spl_error *err)
 {
     double size[2] = {a->drawing.size[0], a->drawing.size[1]}, shape[2];
@@ -249,6 +249,8 @@ static int resolve_size(struct arguments *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE, "--size and --azimuth exclude each other");
     spl_size_of_projection(a->projection < 0 ? SPL_PERSPECTIVE : (enum spl_projection)a->projection, shape);
     spl_size_follow(size, shape);
+    if (a->fov > 179 && a->projection != SPL_FISHEYE)
+        return spl_fail(err, SPL_E_USAGE, "--fov takes 1e-06 to 179, not %g; of --projection fisheye up to 360", a->fov);
     for (int i = 0; i < 2; i++) {
         if (size[i] > UINT32_MAX)
             return spl_fail(err, SPL_E_USAGE, "--size makes an image of %.0f x %.0f pixels", size[0], size[1]);
