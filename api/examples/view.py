@@ -21,9 +21,14 @@ class Error(c.Structure):  # struct spl_error
     _fields_ = [("code", c.c_int), ("field", c.c_char * 64), ("message", c.c_char * 512)]
 
 
+class Distortion(c.Structure):  # struct spl_distortion
+    _fields_ = [("kind", c.c_int), ("k", real * 6), ("p", real * 2), ("reach", real)]
+
+
 class Camera(c.Structure):  # struct spl_camera
     _fields_ = [("eye", real * 3), ("rotation", real * 9), ("fx", real), ("fy", real), ("cx", real), ("cy", real),
-                ("width", u32), ("height", u32), ("near", real), ("far", real), ("projection", c.c_int)]
+                ("width", u32), ("height", u32), ("near", real), ("far", real), ("projection", c.c_int),
+                ("lens", Distortion)]
 
 
 class View(c.Structure):  # struct spl_view, up to what is set here
