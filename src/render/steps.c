@@ -4,7 +4,8 @@
  * next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill plan, which
  * is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was drawn before
  * it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for its first pages
- * has none. Belongs to the renderer's thread. */
+ * has none. A camera that is no one pinhole is drawn face by face, each as a frame of its own, and looked up in them at the
+ * end (around.h). Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
