@@ -62,29 +62,31 @@ static char *shorten(const char *from, const char *end, char *out)
     return out + shorter;
 }
 
+static bool is_of_number(char c)
+{
+    return (c >= '0' && c <= '9') || c == '-' || c == '+' || c == '.' || c == 'e' || c == 'E';
+}
+
+/* Byte by byte: lists are megabytes of short texts, for each of which strcspn() would make its table anew. */
 char *spl_decimal_shorten(char *json)
 {
     const char *at = json;
     char *out = json;
     bool quoted = false;
     while (at && *at) {
-        size_t plain = strcspn(at, quoted ? "\"\\" : "\"-0123456789"); /* in one go: lists are megabytes */
-        memmove(out, at, plain);
-        at += plain;
-        out += plain;
-        if (quoted && *at == '\\' && at[1]) {
-            *out++ = *at++;
-            *out++ = *at++;
-        } else if (*at == '"') {
-            quoted = !quoted;
-            *out++ = *at++;
-        } else if (*at && !quoted) {
-            size_t length = strspn(at, "-+.eE0123456789");
-            out = shorten(at, at + length, out);
-            at += length;
-        } else if (*at) { /* a text that ends in the middle of an escape */
-            *out++ = *at++;
+        if (!quoted && (*at == '-' || (*at >= '0' && *at <= '9'))) {
+            const char *end = at;
+            while (is_of_number(*end))
+                end++;
+            out = shorten(at, end, out);
+            at = end;
+            continue;
         }
+        if (quoted && *at == '\\' && at[1])
+            *out++ = *at++;
+        else if (*at == '"')
+            quoted = !quoted;
+        *out++ = *at++;
     }
     if (out)
         *out = '\0';

@@ -159,7 +159,7 @@ void spl_put_saved_view(struct request *request, const struct spl_call *call)
         request->wants_body = true;
         return;
     }
-    json_t *json = spl_body_parse(request->body, request->body_length, values_max, &err);
+    json_t *json = spl_body_parse(request->body, request->body_length, values_max, SPL_BODY_TEXT, &err);
     int rc = json ? spl_saved_view_from_json(json, call->entry->info->default_up, false, true, &view, &err)
                   : SPL_E_INPUT;
     json_decref(json);

@@ -1,48 +1,55 @@
 /* Bodies of JSON into documents. jansson takes a tenth of a second and a hundred megabytes for a MiB of empty arrays,
- * so values are counted before it is asked: what stands outside strings tells how many there can be.
+ * so values are counted before it is asked: what stands outside strings tells how many there can be. It copies a long
+ * text many times over, so texts have a limit too.
  *
- * Invariant: a document has no more values, and is no deeper, than was said. Pure functions, any thread. */
+ * Invariant: a document has no more values, is no deeper and has no longer text than was said. Pure functions, any thread. */
 #include "service/request/body.h"
 
 enum { depth_max = 64 };
 
+struct size {
+    size_t values, depth, text; /* the last in bytes of the longest */
+};
+
 /* An upper bound of the values in valid JSON, exact but for an empty array's or object's inside, and how deep it goes.
  * In broken JSON it is one for what lies before the fault, and no parser looks further. */
-static void measure(const char *body, size_t length, size_t *values, size_t *depth)
+static struct size measure(const char *body, size_t length)
 {
+    struct size size = {.values = 1};
     size_t open = 0;
-    *values = 1;
-    *depth = 0;
     for (size_t i = 0; i < length; i++) {
+        const size_t begin = i;
         switch (body[i]) {
         case '"':
             while (++i < length && body[i] != '"')
                 i += body[i] == '\\';
+            size.text = i - begin - 1 > size.text ? i - begin - 1 : size.text;
             break;
         case '[':
         case '{':
-            ++*values;
-            *depth = ++open > *depth ? open : *depth;
+            size.values++;
+            size.depth = ++open > size.depth ? open : size.depth;
             break;
         case ']':
         case '}':
             open -= open > 0;
             break;
         case ',':
-            ++*values;
+            size.values++;
             break;
         }
     }
+    return size;
 }
 
-json_t *spl_body_parse(const char *body, size_t length, size_t values_max, struct spl_error *err)
+json_t *spl_body_parse(const char *body, size_t length, size_t values_max, size_t text_max, struct spl_error *err)
 {
-    size_t values, depth;
+    const struct size size = measure(body, length);
     json_error_t where;
-    measure(body, length, &values, &depth);
-    if (values > values_max || depth > depth_max) {
-        spl_fail_field(err, SPL_E_INPUT, "body", "the body has %zu values and is %zu deep; the limits are %zu and %d",
-                       values, depth, values_max, depth_max);
+    if (size.values > values_max || size.depth > depth_max || size.text > text_max) {
+        spl_fail_field(err, SPL_E_INPUT, "body",
+                       "the body has %zu values, is %zu deep and has a text of %zu bytes; the limits are %zu, %d and %zu",
+                       size.values, size.depth, size.text, values_max, depth_max, text_max);
         return NULL;
     }
     json_t *document = json_loadb(length ? body : "", length, JSON_REJECT_DUPLICATES, &where);

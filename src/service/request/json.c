@@ -85,7 +85,7 @@ int spl_values_from_body(struct values *values, const char *body, size_t length,
 {
     if (!length)
         return 0;
-    json_t *document = spl_body_parse(body, length, SPL_BODY_VALUES, err);
+    json_t *document = spl_body_parse(body, length, SPL_BODY_VALUES, SPL_BODY_TEXT, err);
     int rc;
     if (!document)
         return SPL_E_INPUT;

@@ -81,7 +81,7 @@ int spl_views_request_from_json(const char *body, size_t length, const struct sp
                                 struct spl_error *err)
 {
     struct values common = {0};
-    json_t *list = NULL, *document = spl_body_parse(body, length, SPL_BODY_VALUES, err);
+    json_t *list = NULL, *document = spl_body_parse(body, length, SPL_BODY_VALUES, SPL_BODY_TEXT, err);
     *out = (struct spl_views_request){0};
     int rc = document ? read_document(document, &common, &list, err) : SPL_E_INPUT;
     struct spl_value *container = &common.v[PARAM_container];

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/decimal.h"
 #include "service/access/access.h"
 #include "service/exchange.h"
 #include "service/reply.h"
@@ -61,12 +62,31 @@ void spl_list_tours(struct request *request, const struct spl_call *call)
     struct spl_tour *tour;
     if (!tours)
         return;
-    json_t *list = json_array();
+    /* One by one: the memory of one serves the next, and a thousand of them stall nobody. */
+    char *text = NULL;
+    size_t length;
+    FILE *out = open_memstream(&text, &length);
+    const char *comma = "";
+    if (out)
+        fputs("{\"tours\": [", out);
     TAILQ_FOREACH(tour, &tours->all, link)
-    if (may_see(request, tour))
-        json_array_append_new(list, spl_tour_describe(tour));
-    spl_reply_json(request, json_pack("{s:o, s:I, s:I}", "tours", list, "bytes", (json_int_t)tours->bytes, "bytes_max",
-                                      (json_int_t)(tours->service->options->tour_disk_max & INT64_MAX)));
+    {
+        json_t *json = out && may_see(request, tour) ? spl_tour_describe(tour) : NULL;
+        if (!json)
+            continue;
+        fputs(comma, out);
+        json_dumpf(json, out, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+        json_decref(json);
+        comma = ",\n";
+    }
+    if (out)
+        fprintf(out, "],\n\"bytes\": %llu, \"bytes_max\": %llu}", (unsigned long long)tours->bytes,
+                (unsigned long long)(tours->service->options->tour_disk_max & INT64_MAX));
+    if (out && fclose(out)) {
+        free(text);
+        text = NULL;
+    }
+    spl_reply_text(request, "application/json", spl_decimal_shorten(text));
 }
 
 void spl_show_tour(struct request *request, const struct spl_call *call)

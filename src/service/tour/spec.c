@@ -251,7 +251,7 @@ int spl_tour_spec_from_text(const char *body, size_t length, const struct spl_ca
                             const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err)
 {
     *out = (struct spl_tour_spec){0};
-    json_t *document = spl_body_parse(body, length, SPL_BODY_PATH_VALUES, err);
+    json_t *document = spl_body_parse(body, length, SPL_BODY_PATH_VALUES, length, err);
     int rc = document ? spl_tour_spec_from_json(document, defaults, limits, out, err) : SPL_E_INPUT;
     json_decref(document);
     return rc;

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
@@ -16,7 +17,7 @@ static int parse(const char *text, size_t most, struct spl_error *err)
     assert_non_null(exact);
     memcpy(exact, text, length);
     *err = (struct spl_error){0};
-    json_t *document = spl_body_parse(exact, length, most, err);
+    json_t *document = spl_body_parse(exact, length, most, 100, err);
     free(exact);
     assert_int_equal(!document, err->code != 0);
     json_decref(document);
@@ -67,7 +68,21 @@ static void broken_bodies_are_refused(void **state)
         assert_int_equal(parse(texts[i], 1000, &err), SPL_E_INPUT);
         assert_non_null(strstr(err.message, "broken JSON"));
     }
-    assert_null(spl_body_parse(NULL, 0, 1000, &err));
+    assert_null(spl_body_parse(NULL, 0, 1000, 1000, &err));
+}
+
+static void texts_are_no_longer_than_was_said(void **state)
+{
+    (void)state;
+    struct spl_error err;
+    char text[128];
+    for (int length = 100; length <= 101; length++)
+        for (int name = 0; name < 2; name++) { /* with an escape, which counts as it is written */
+            snprintf(text, sizeof text, name ? "{\"%.*s\\n\":1}" : "[\"%.*s\\n\"]", length - 2,
+                     "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa");
+            assert_int_equal(parse(text, 1000, &err), length == 100 ? 0 : SPL_E_INPUT);
+        }
+    assert_non_null(strstr(err.message, "a text of 101 bytes"));
 }
 
 int main(void)
@@ -76,6 +91,7 @@ int main(void)
         cmocka_unit_test(values_are_counted_before_they_are_parsed),
         cmocka_unit_test(depth_is_bounded),
         cmocka_unit_test(broken_bodies_are_refused),
+        cmocka_unit_test(texts_are_no_longer_than_was_said),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
