@@ -53,6 +53,7 @@ def test_what_is_left_out_is_not_there():
             assert count(method=method, clip="z<-100") == 0, method
         body = {"x": 32, "y": 12, "camera": {"eye": [3, 0.8, 1], "target": [0, 0.8, 1], "fov": 40}, "width": 64, "height": 48}
         assert d.post(body, PICK).json()["position"] and d.post({**body, "clip": "z<1"}, PICK).json()["position"] is None
+        assert d.post({**body, "class": "!77"}, PICK).json()["position"] and d.post({**body, "class": 77}, PICK).json()["position"] is None
         assert d.post({**body, "soft": "z<1", "soft_opacity": 0, "clip": "z<1"}, PICK).json()["position"] is None
 
 
