@@ -13,7 +13,7 @@ const double spl_face_axes[SPL_FACES][9] = {
     {1, 0, 0, 0, 0, -1, 0, 1, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1},  {-1, 0, 0, 0, 1, 0, 0, 0, -1},
 };
 
-enum { edge_steps = 128, grow_steps = 128, FRONT = 4 };
+enum { edge_steps = 32, grow_steps = 128, FRONT = 4 };
 
 static double dot(const double a[3], const double b[3])
 {
@@ -58,7 +58,7 @@ uint64_t spl_faces_get_pixels(const struct spl_faces *faces)
 /* What pixels ask for, of each face. */
 struct parts {
     double low[SPL_FACES][2], high[SPL_FACES][2];
-    double widest; /* angle off the axis */
+    double least; /* cosine of the widest angle off the axis */
 };
 
 static void grow(struct parts *parts, unsigned face, const double place[2])
@@ -74,7 +74,7 @@ static void add_ray(struct parts *parts, const double ray[3])
     double place[2];
     const unsigned face = spl_face_of(ray, place);
     grow(parts, face, place);
-    parts->widest = fmax(parts->widest, acos(fmin(fmax(ray[2], -1), 1)));
+    parts->least = fmin(parts->least, ray[2]);
 }
 
 static bool is_inside(const struct spl_camera *camera, const double ray[3])
@@ -125,7 +125,7 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
                 beside[edge >= 2] = fmin(fmax(t + side * step, -1), 1);
                 grow(parts, face, beside);
             }
-            parts->widest = fmax(parts->widest, acos(ray[2] / sqrt(dot(ray, ray))));
+            parts->least = fmin(parts->least, ray[2] / sqrt(dot(ray, ray)));
         }
 }
 
@@ -162,7 +162,7 @@ int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uin
             parts.low[i][k] = whole ? -1 : INFINITY;
             parts.high[i][k] = whole ? 1 : -INFINITY;
         }
-    parts.widest = 0;
+    parts.least = 1;
     if (!whole) {
         add_image_edges(&parts, camera);
         add_reach(&parts, camera);
@@ -170,7 +170,7 @@ int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uin
         if (is_inside(camera, (double[]){0, 0, 1}))
             grow(&parts, FRONT, (double[]){0, 0});
     }
-    double focal = find_focal(camera, parts.widest);
+    double focal = find_focal(camera, acos(fmax(parts.least, -1)));
     if (camera->projection != SPL_CUBE)
         focal = ceil(focal);
     for (int i = 0; i < SPL_FACES; i++) {

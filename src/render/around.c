@@ -16,16 +16,6 @@
 
 static const float edge = 0.01f; /* of depth */
 
-void spl_around_get_faces(const struct spl_view *view, struct spl_faces *faces)
-{
-    struct spl_camera camera = view->camera;
-    *faces = (struct spl_faces){0};
-    if (view->supersample < 1)
-        spl_camera_coarsen(&camera, view->supersample);
-    if (spl_camera_is_bent(&camera))
-        spl_faces_init(faces, &camera, UINT32_MAX / 8, NULL);
-}
-
 static bool begin_face(struct spl_around *around, struct spl_view *view)
 {
     while (around->face < SPL_FACES && !around->faces.cameras[around->face].width)

@@ -32,7 +32,4 @@ uint64_t spl_around_get_samples_left(const struct spl_around *around);
 void spl_around_look_up(const struct spl_around *around, const struct spl_view *wanted,
                         struct spl_image images[SPL_LAYER_COUNT], uint32_t begin, uint32_t end);
 
-/* The faces of `view`, which has been checked; none where its camera is not bent. */
-void spl_around_get_faces(const struct spl_view *view, struct spl_faces *faces);
-
 #endif

@@ -89,6 +89,9 @@ def shapes():
     yield "views that hold much", filled('{"width":8,"height":8,"views":[' + "{}," * 255, '{"camera":{"eye":[3]}}', "]}")
     yield "256 views", json.dumps({"width": 8, "height": 8, "format": "png", "views": [
         {"camera": {"eye": [3, 0, 1 + 1e-3 * i], "target": [0, 0, 1], "fov": 60}} for i in range(256)]}).encode()
+    for name, differs in ("256 fisheyes", 0), ("256 fisheyes, none like another", 0.1):
+        yield name, json.dumps({"width": 8, "height": 8, "format": "png", "views": [
+            {"camera": {"eye": [3, 0, 1 + 1e-3 * i], "target": [0, 0, 1], "projection": "fisheye", "fov": 150 + differs * i}} for i in range(256)]}).encode()
 
 
 def paths():
