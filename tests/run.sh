@@ -47,7 +47,8 @@ built() {
     [ "$(cat "$out/$1.built")" = yes ] || { failed=$((failed + 1)); return 1; }
 }
 
-# name, suites…: runs them one after the other; what failed is shown with its output. Most tests over HTTP wait most of
+# name, suites…: runs them one after the other; what failed is shown with its output. Tests have four times their limit:
+# machines are shared, and others build beside them. Most tests over HTTP wait most of
 # their time: twice as many at once as there are processors. `only` names those of a suite.
 suites() {
     local name=$1 suite log=$out/$1/meson-logs/testlog counts at_once
@@ -58,7 +59,7 @@ suites() {
         case $suite in http | deploy) at_once=$((2 * at_once)) ;; esac
         rm -f "$log".{json,txt}
         ${run_under-} meson test -C "$out/$name" --no-rebuild --suite "$suite" --print-errorlogs ${only-} \
-            --num-processes "$at_once" --timeout-multiplier "${timeouts:-1}" >"$out/$name-$suite.log" 2>&1 || true
+            --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$suite.log" 2>&1 || true
         counts=$(python3 - "$log.json" <<'PY'
 import json, os, sys
 passed = failed = skipped = 0
