@@ -152,7 +152,7 @@ void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *da
 {
     uint32_t told = 0;
     for (uint32_t i = 0; i < view->soft.what.count; i++) {
-        char reason[SPL_SOFT_REASON_MAX], text[SPL_TERMS_TEXT_MAX];
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_TERMS_TEXT_MAX + 1];
         uint32_t next = i + 1;
         struct spl_terms one = view->soft.what;
         spl_soft_explain(&one.terms[i], spl_dataset_get_info(dataset), reason);

@@ -31,7 +31,6 @@ struct reader {
     const char *text, *at, *begin; /* `begin`: of the term */
     uint32_t number;               /* of the term */
     const char *field;
-    bool joins; /* conditions by " and " */
     struct spl_error *err;
 };
 
@@ -352,7 +351,7 @@ int spl_terms_parse(const char *text, const char *field, struct spl_terms *out, 
 {
     struct spl_terms read = *out;
     const bool joins = !strcmp(field, "clip");
-    struct reader r = {text, text, text, 0, field, joins, err};
+    struct reader r = {text, text, text, 0, field, err};
     enum spl_term_joint joint = joins ? SPL_TERM_AND : SPL_TERM_OR;
     int rc = check_text(text, field, err);
     if (rc)
@@ -380,7 +379,7 @@ int spl_terms_parse(const char *text, const char *field, struct spl_terms *out, 
 int spl_terms_parse_classes(const char *text, struct spl_terms *out, struct spl_error *err)
 {
     struct spl_terms read = *out;
-    struct reader r = {text, text, text, 1, "class", false, err};
+    struct reader r = {text, text, text, 1, "class", err};
     struct spl_term term;
     int rc = check_text(text, "class", err);
     if (rc)

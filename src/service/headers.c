@@ -120,7 +120,7 @@ static void write_terms(const struct spl_terms *terms, bool conditions, char *ou
     struct spl_terms one = *terms;
     size_t used = 0;
     for (uint32_t i = 0, next; i < one.count && used < bytes; i = next) {
-        char text[SPL_TERMS_TEXT_MAX];
+        char text[SPL_TERMS_TEXT_MAX + 1];
         for (uint32_t t = i + 1; t < one.count && !conditions; t++) /* what is outside a list stays one */
             if (one.terms[t].joint == SPL_TERM_OR)
                 one.terms[t].joint = SPL_TERM_AND;

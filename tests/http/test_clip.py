@@ -69,7 +69,7 @@ def test_bad_ones_are_named():
             if value:
                 reply = d.post({"x": 4, "y": 4, "width": 8, "height": 8, field: value}, PICK)
                 assert reply.status == 400 and words in reply.json()["detail"], (value, reply.body)
-        for body in {"clip": 3}, {"clip": [3]}, {"class": ["2"]}, {"class": [-1]}, {"class": {}}:
+        for body in {"clip": 3}, {"clip": [3]}, {"class": ["2"]}, {"class": -1}, {"class": [-1]}, {"class": {}}:
             field = next(iter(body))
             reply = d.post({"width": 8, "height": 8, **body})
             assert reply.status == 400 and reply.json()["field"] == field, (body, reply.body)

@@ -21,30 +21,27 @@ int spl_values_add_terms(struct values *values, int param, const char *text, str
                                  : spl_terms_parse_classes(text, &values->classes, err);
 }
 
-/* Classes as an array of numbers, too, which is one list. */
+/* Classes as a number, or an array of such, which is one list. */
 static int add_classes(struct values *values, const json_t *json, struct spl_error *err)
 {
+    const bool one = json_is_integer(json);
+    const size_t count = one ? 1 : json_array_size(json);
     char text[SPL_TERMS_MAX * 12 + 1] = "";
     size_t used = 0;
-    if (json_is_integer(json)) {
-        snprintf(text, sizeof text, "%lld", (long long)json_integer_value(json));
-        return spl_values_add_terms(values, PARAM_class, text, err);
-    }
-    if (!json_array_size(json)) {
-        values->v[PARAM_class].given = true;
-        return 0;
-    }
-    if (json_array_size(json) > SPL_TERMS_MAX)
+    if (count > SPL_TERMS_MAX)
         return spl_fail_field(err, SPL_E_INPUT, "class", "class has more than %d numbers; write \"3-5\" for 3, 4, 5",
                               SPL_TERMS_MAX);
-    for (size_t i = 0; i < json_array_size(json); i++) {
-        const json_t *item = json_array_get(json, i);
+    for (size_t i = 0; i < count; i++) {
+        const json_t *item = one ? json : json_array_get(json, i);
         if (!json_is_integer(item) || json_integer_value(item) < 0 || json_integer_value(item) > UINT32_MAX)
             return spl_fail_field(err, SPL_E_INPUT, "class", "class must hold whole numbers, or be text: \"!7\"");
         used += (size_t)snprintf(text + used, sizeof text - used, "%s%lld", i ? "," : "",
                                  (long long)json_integer_value(item));
     }
-    return spl_values_add_terms(values, PARAM_class, text, err);
+    if (count)
+        return spl_values_add_terms(values, PARAM_class, text, err);
+    values->v[PARAM_class].given = true;
+    return 0;
 }
 
 int spl_values_add_terms_json(struct values *values, int param, const json_t *json, struct spl_error *err)
