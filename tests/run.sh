@@ -28,7 +28,7 @@ build() {
     shift 2
     local begin=$SECONDS setup=(meson setup "$out/$name" "$@")
     [ ! -f "$out/$name/build.ninja" ] || setup+=(--reconfigure)
-    if CC=$compiler "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" ${targets-} >>"$log" 2>&1; then
+    if CC="ccache $compiler" "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" ${targets-} >>"$log" 2>&1; then
         printf '%-10s %-8s built in %d s\n' "$name" "" $((SECONDS - begin)) >"$out/$name.said"
         echo yes >"$out/$name.built"
     else
@@ -108,14 +108,15 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/tsan.supp:halt_on_error=1:second_dea
 printf 'int dlclose(void *handle) { (void)handle; return 0; }\n' >"$out/keep-loaded.c"
 gcc -shared -fPIC "$out/keep-loaded.c" -o "$out/keep-loaded.so"
 
-# Of what is built without a backend only its stub differs, and the choice of a device.
+# Of what is built without a backend only its stub differs, and the choice of a device: the rest was compiled before.
+export CCACHE_DIR=$out/ccache CCACHE_DEPEND=1
 few="src/splatd tests/gpu/test-gpu-gpu tests/gpu/test-gpu-exact"
 build_others() {
     local kernels=-Dkernels=$out/normal/shaders
     build asan gcc "${sanitised[@]}" "$kernels" -Db_sanitize=address,undefined
     build tsan gcc "${sanitised[@]}" "$kernels" -Db_sanitize=thread
-    targets=$few build no-vulkan gcc $strict "$kernels" -Dvulkan=disabled -Doptimization=0
-    targets=$few build no-egl gcc $strict "$kernels" -Degl=disabled -Dsystemd=disabled -Dvideo=disabled -Doptimization=0
+    targets=$few build no-vulkan gcc $strict "$kernels" -Dvulkan=disabled
+    targets=$few build no-egl gcc $strict "$kernels" -Degl=disabled -Dsystemd=disabled -Dvideo=disabled
 }
 
 build normal gcc $strict

@@ -101,6 +101,7 @@ static int read_own_key(struct spl_path_reader *reader, json_t *view, json_t *cr
     bool sized = spl_camera_form_has_size(camera);
     for (int i = 0; i < 2; i++)
         sized = sized || json_object_get(view, sides[i]) || json_object_get(camera, sides[i]);
+    sized = sized || json_object_get(camera, "azimuth"); // a scan's size is its rays
     for (int i = 0; i < 2 && !sized; i++) // a field of view needs the shape of the outcome
         json_object_set_new(view, sides[i], json_integer(i ? reader->height : reader->width));
     int rc = spl_camera_from_json(view, others, reader->options->defaults, reader->options->limits, &out, err);

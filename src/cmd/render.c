@@ -104,7 +104,7 @@ static const struct spl_cmd_table table = {
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --fov 70 --layer depth -o depth.png\n"
         "A calibrated camera, float depth in the dataset's unit, nothing = NaN:\n"
         "  splatd render courtyard.spld --eye 2,-6,1.7 --target 0,0,1.5 --size 640x480 \\\n"
-        "         --fx 525 --fy 525 --cx 319.5 --cy 239.5 --layer depth -o depth.npy\n"
+        "         --fx 525 --fy 525 --cx 320 --cy 240 --layer depth -o depth.npy\n"
         "A plan of the ground floor, looking down from 1.2 above it, a centimetre a pixel, north up:\n"
         "  splatd render courtyard.spld --projection orthographic --units-per-pixel 0.01 --eye 0,0,1.2 --target 0,0,0 -o plan.png\n"
         "The same as a GeoTIFF, colours and heights on the same pixels:\n"

@@ -238,6 +238,8 @@ int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const do
 
 static int check_focal(enum spl_projection projection, double focal, const char *field, struct spl_error *err)
 {
+    if (projection == SPL_ORTHOGRAPHIC && focal > 0 && !(focal >= 1e-12 && focal <= 1e14))
+        return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not within 1e-12 and 1e14", focal);
     if (isfinite(focal) && (focal > 0 || (projection == SPL_EQUIRECTANGULAR && focal < 0))) /* which may go the other way */
         return SPL_OK;
     if (projection == SPL_ORTHOGRAPHIC)

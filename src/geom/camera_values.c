@@ -305,9 +305,12 @@ static void get_up(const struct spl_value *v, const struct spl_camera_defaults *
 
 /* Has what is seen all around stand upright: `up` is up in the image, and what is looked at in its middle column. Where that
  * lies straight up or down, it stays, to be refused. */
-static void level(const double eye[3], double target[3], const double up[3])
+static void level(const double eye[3], double target[3], const double given_up[3])
 {
-    double along = 0, square = 0, moved[3], left = 0;
+    double along = 0, square = 0, moved[3], left = 0, up[3];
+    const double largest = fmax(fmax(fabs(given_up[0]), fabs(given_up[1])), fabs(given_up[2]));
+    for (int i = 0; i < 3; i++)
+        up[i] = largest > 0 ? given_up[i] / largest : 0; /* its length says nothing, and its square may be none */
     for (int i = 0; i < 3; i++) {
         along += (target[i] - eye[i]) * up[i];
         square += up[i] * up[i];

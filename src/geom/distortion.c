@@ -34,10 +34,23 @@ static double image_of(const struct spl_distortion *d, double r)
     return spl_distortion_get_image(d, r, &(double){0});
 }
 
+/* No lens, or a fisheye's polynomial of terms that all grow, as that of most tests and of cameras that nobody calibrated. */
+static bool grows_for_certain(const struct spl_distortion *d)
+{
+    for (int i = 0; i < 4; i++)
+        if (d->kind == SPL_DISTORTION_FISHEYE && !(d->k[i] >= 0))
+            return false;
+    return d->kind != SPL_DISTORTION_RADIAL;
+}
+
 static void find_reach(struct spl_distortion *d, double most)
 {
     double last = 0;
     d->reach = 0;
+    if (grows_for_certain(d)) {
+        d->reach = most;
+        return;
+    }
     for (int i = 1; i <= reach_steps; i++) {
         double r = most * i / reach_steps, image = image_of(d, r);
         if (!(image > last))

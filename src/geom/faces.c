@@ -1,5 +1,5 @@
-/* Which part of each face a camera asks for: its edges' rays, those at the end of its lens' reach, and what of the face's
- * own edges lies in the image, for these bound all others. */
+/* Which part of each face a camera asks for: its edges' rays, those at the end of its lens' reach, and what of the
+ * face's own edges lies in the image, for these bound all others. */
 #include "geom/faces.h"
 
 #include <math.h>
@@ -64,8 +64,10 @@ struct parts {
 static void grow(struct parts *parts, unsigned face, const double place[2])
 {
     for (int i = 0; i < 2; i++) {
-        parts->low[face][i] = fmin(parts->low[face][i], place[i]);
-        parts->high[face][i] = fmax(parts->high[face][i], place[i]);
+        if (place[i] < parts->low[face][i])
+            parts->low[face][i] = place[i];
+        if (place[i] > parts->high[face][i])
+            parts->high[face][i] = place[i];
     }
 }
 
@@ -84,13 +86,34 @@ static bool is_inside(const struct spl_camera *camera, const double ray[3])
            pixel[1] <= camera->height;
 }
 
+/* As spl_camera_get_ray(), of rings up to the poles; what lies beyond is the pole. */
+static void get_ring_ray(const struct spl_camera *camera, double u, double v, double ray[3])
+{
+    const double a = (u - camera->cx) / camera->fx, e = fmin(fmax((v - camera->cy) / camera->fy, -M_PI_2), M_PI_2);
+    ray[0] = sin(a) * cos(e);
+    ray[1] = sin(e);
+    ray[2] = cos(a) * cos(e);
+}
+
 static void add_image_edges(struct parts *parts, const struct spl_camera *camera)
 {
     double ray[3];
     for (int i = 0; i < 4 * (edge_steps + 1); i++) {
         const double t = (double)(i % (edge_steps + 1)) / edge_steps, w = camera->width, h = camera->height;
         const int edge = i / (edge_steps + 1);
-        if (spl_camera_get_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray))
+        if (camera->projection == SPL_EQUIRECTANGULAR)
+            get_ring_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray);
+        else if (!spl_camera_get_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray))
+            continue;
+        add_ray(parts, ray);
+    }
+    if (camera->projection != SPL_EQUIRECTANGULAR)
+        return;
+    const double turn = 2 * M_PI * fabs(camera->fx);
+    for (int i = 0; i < 16; i++) { /* where the first and the last ring turn, or cross from face to face */
+        const double u = camera->cx + i / 2 * M_PI_4 * camera->fx;
+        get_ring_ray(camera, u, i & 1 ? camera->height : 0, ray);
+        if (u - floor(u / turn) * turn <= camera->width)
             add_ray(parts, ray);
     }
 }
@@ -98,55 +121,58 @@ static void add_image_edges(struct parts *parts, const struct spl_camera *camera
 static void add_reach(struct parts *parts, const struct spl_camera *camera)
 {
     const double end = camera->projection == SPL_FISHEYE ? camera->lens.reach : atan(camera->lens.reach);
-    const double angle = end * (1 - 1e-9);
+    const double angle = end * (1 - 1e-9), flat = sin(angle), deep = cos(angle);
     for (int i = 0; i < 4 * edge_steps; i++) {
         const double around = 2 * M_PI * i / (4 * edge_steps);
-        const double ray[3] = {cos(around) * sin(angle), sin(around) * sin(angle), cos(angle)};
+        const double ray[3] = {cos(around) * flat, sin(around) * flat, deep};
         if (is_inside(camera, ray))
             add_ray(parts, ray);
     }
 }
 
-/* A step beyond what is inside counts as well. */
+/* The cube's twelve edges, for both faces that meet there. A step beyond what is inside counts as well. */
 static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
 {
-    for (unsigned face = 0; face < SPL_FACES; face++)
-        for (int i = 0; i < 4 * (edge_steps + 1); i++) {
-            const int edge = i / (edge_steps + 1);
-            const double *axes = spl_face_axes[face], step = 2.0 / edge_steps, t = step * (i % (edge_steps + 1)) - 1;
-            const double place[2] = {edge < 2 ? t : edge == 2 ? -1 : 1, edge < 2 ? (edge ? 1 : -1) : t};
-            double ray[3];
-            for (int k = 0; k < 3; k++)
-                ray[k] = axes[k] * place[0] + axes[3 + k] * place[1] + axes[6 + k];
-            if (!is_inside(camera, ray))
+    for (int i = 0; i < 12 * (edge_steps + 1); i++) {
+        const int edge = i / (edge_steps + 1), along = edge / 4;
+        const double step = 2.0 / edge_steps, t = step * (i % (edge_steps + 1)) - 1;
+        double ray[3];
+        ray[along] = t;
+        ray[(along + 1) % 3] = edge & 1 ? 1 : -1;
+        ray[(along + 2) % 3] = edge & 2 ? 1 : -1;
+        if (!is_inside(camera, ray))
+            continue;
+        for (unsigned face = 0; face < SPL_FACES; face++) {
+            const double *axes = spl_face_axes[face], place[2] = {dot(axes, ray), dot(axes + 3, ray)};
+            if (axes[6 + along] != 0 || dot(axes + 6, ray) < 0)
                 continue;
             for (int side = -1; side <= 1; side++) {
-                double beside[2] = {place[0], place[1]};
-                beside[edge >= 2] = fmin(fmax(t + side * step, -1), 1);
-                grow(parts, face, beside);
+                const double moved = fmin(fmax(t + side * step, -1), 1) - t;
+                grow(parts, face, (double[]){place[0] + axes[along] * moved, place[1] + axes[3 + along] * moved});
             }
-            parts->least = fmin(parts->least, ray[2] / sqrt(dot(ray, ray)));
         }
+        parts->least = fmin(parts->least, ray[2] / sqrt(dot(ray, ray)));
+    }
 }
 
-/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its own. A
- * face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by what is left of
- * it to 90 degrees. */
+/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its own.
+ * A face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by what is
+ * left of it to 90 degrees. */
 static double find_focal(const struct spl_camera *camera, double widest)
 {
     const double focal = fmax(fabs(camera->fx), fabs(camera->fy)), end = fmin(widest, M_PI_2);
+    const bool fisheye = camera->projection == SPL_FISHEYE;
     double needed = 1;
     if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE)
         return focal;
     for (int i = 1; i <= grow_steps; i++) {
-        const double angle = end * i / grow_steps, tangent = tan(angle);
-        const double finer = angle > M_PI_4 ? sin(angle) : cos(angle);
-        const bool fisheye = camera->projection == SPL_FISHEYE;
-        const double r = fmin(fisheye ? angle : tangent, camera->lens.reach);
+        const double angle = end * i / grow_steps, sine = sin(angle);
+        const double finer = angle > M_PI_4 ? sine : cos(angle);
+        const double r = fmin(fisheye ? angle : tan(angle), camera->lens.reach);
         double growth, image = spl_distortion_get_image(&camera->lens, r, &growth);
         if (!fisheye)
             growth *= 1 + r * r; /* by the angle */
-        needed = fmax(needed, fmax(growth * finer * finer, image / sin(angle) * finer));
+        needed = fmax(needed, fmax(growth * finer * finer, image / sine * finer));
     }
     return fmin(needed, 2) * focal;
 }

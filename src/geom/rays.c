@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "geom/distortion.h"
 
+static const double pixels_most = 1e9; /* of a focal length, and to the principal point */
 static const double tangential_most = 0.1; /* of lenses that are; beyond, what bends has no inverse */
 
 bool spl_camera_is_bent(const struct spl_camera *camera)
@@ -78,6 +79,14 @@ int spl_camera_set_lens(struct spl_camera *camera, const struct spl_distortion *
 
 int spl_camera_check_bent(const struct spl_camera *camera, struct spl_error *err)
 {
+    const struct {
+        const char *field;
+        double pixels;
+    } far[] = {{"fx", camera->fx}, {"fy", camera->fy}, {"cx", camera->cx}, {"cy", camera->cy}};
+    for (int i = 0; i < 4; i++) /* farther out pixels of the faces cannot be told apart */
+        if (!(fabs(far[i].pixels) <= pixels_most))
+            return spl_fail_field(err, SPL_E_INPUT, far[i].field, "%s %g is not within %g pixels", far[i].field,
+                                  far[i].pixels, pixels_most);
     const struct spl_distortion *lens = &camera->lens;
     const bool fisheye = camera->projection == SPL_FISHEYE;
     if (camera->projection == SPL_CUBE) {
@@ -138,8 +147,8 @@ bool spl_camera_get_ray(const struct spl_camera *camera, double u, double v, dou
 
 bool spl_camera_place(const struct spl_camera *camera, const double c[3], double pixel[2])
 {
-    const double flat = hypot(c[0], c[1]), length = hypot(flat, c[2]);
-    if (!(length > 0))
+    const double beside = c[0] * c[0] + c[1] * c[1];
+    if (!(beside + c[2] * c[2] > 0))
         return false;
     if (camera->projection == SPL_EQUIRECTANGULAR) {
         const double turn = 2 * M_PI * camera->fx, u = camera->cx + camera->fx * atan2(c[0], c[2]);
@@ -156,7 +165,7 @@ bool spl_camera_place(const struct spl_camera *camera, const double c[3], double
     }
     if (camera->projection != SPL_FISHEYE)
         return spl_distortion_place(camera, &camera->lens, c, pixel);
-    const double angle = atan2(flat, c[2]);
+    const double flat = sqrt(beside), angle = atan2(flat, c[2]);
     if (!(angle <= camera->lens.reach))
         return false;
     const double scale = flat > 0 ? spl_distortion_get_image(&camera->lens, angle, &(double){0}) / flat : 0;

@@ -38,7 +38,7 @@ int spl_around_create(struct spl_view *view, struct spl_around **out, struct spl
         return rc;
     if (view->layers & range)
         view->layers = (view->layers & ~range) | 1u << SPL_LAYER_DEPTH;
-    begin_face(around, view); // an image asks for one at least
+    begin_face(around, view);
     return SPL_OK;
 }
 
@@ -58,6 +58,11 @@ bool spl_around_next(struct spl_around *around, struct spl_image images[SPL_LAYE
     memset(images, 0, sizeof around->images[0]);
     around->face++;
     return begin_face(around, view);
+}
+
+bool spl_around_is_empty(const struct spl_around *around)
+{
+    return !spl_faces_get_pixels(&around->faces);
 }
 
 uint64_t spl_around_get_samples_left(const struct spl_around *around)
@@ -113,7 +118,7 @@ static void look_up_pixel(const struct job *j, uint32_t x, uint32_t y)
         if (!image->pixels)
             continue;
         void *to = (char *)spl_image_row(image, y) + (size_t)x * spl_pixel_bytes(image->type);
-        if (!sees || !j->around->faces.cameras[face].width)
+        if (!sees || !j->around->faces.cameras[face].width || !from[layer == SPL_LAYER_RANGE ? SPL_LAYER_DEPTH : layer].pixels)
             put_nothing(layer, j->wanted->background, to);
         else if (layer == SPL_LAYER_RANGE)
             *(float *)to = (float)(depth_at(&from[SPL_LAYER_DEPTH], place[0], place[1]) / along);

@@ -22,6 +22,9 @@ void spl_around_destroy(struct spl_around *around);
 /* Takes the images of the face that was drawn, and has `view` show the next; false: there is none. */
 bool spl_around_next(struct spl_around *around, struct spl_image images[SPL_LAYER_COUNT], struct spl_view *view);
 
+/* No pixel's ray goes anywhere, so no face is drawn. */
+bool spl_around_is_empty(const struct spl_around *around);
+
 /* Of the faces that are not begun. */
 uint64_t spl_around_get_samples_left(const struct spl_around *around);
 

@@ -290,6 +290,27 @@ static void place_shape(const struct spl_marks *marks, const struct spl_marks_te
     }
 }
 
+/* Of a box or polygon that is much larger than the dataset only what lies around the dataset: from a middle that is far away
+ * floats would not tell where its near side is. */
+static void trim(const struct spl_marks *marks, const struct spl_marks_term *term, const double axes[9],
+                 double middle[3], double half[3])
+{
+    if (term->least != -INFINITY || term->most != 0)
+        return;
+    for (int i = term->measure == SPL_TERM_POLYGON ? 2 : 0; i < 3; i++) {
+        const double *a = axes + 3 * i, reach = 2 * marks->reach;
+        double at = 0;
+        for (int c = 0; c < 3; c++)
+            at += a[c] * (marks->middle[c] - middle[c]);
+        const double low = fmax(-half[i], at - reach), high = fmin(half[i], at + reach);
+        if (!(half[i] > 4 * marks->reach && isfinite(half[i]) && low < high))
+            continue;
+        for (int c = 0; c < 3; c++)
+            middle[c] += a[c] * (low + high) / 2;
+        half[i] = (high - low) / 2;
+    }
+}
+
 static uint32_t float_word(double value)
 {
     return word_of((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
@@ -321,6 +342,8 @@ uint32_t spl_marks_see(const struct spl_marks *marks, const struct spl_camera *c
             continue;
         *shape = (struct spl_marks_shape){.word = first_word + used};
         place_shape(marks, term, camera, view, shape, axes, middle);
+        if (term->measure == SPL_TERM_BOX || term->measure == SPL_TERM_POLYGON)
+            trim(marks, term, axes, middle, shape->half);
         for (int i = 0; i < 3; i++) {
             const double *a = axes + 3 * i;
             for (int c = 0; c < 3; c++) { /* the axis, turned as the camera is; from the eye to the middle */

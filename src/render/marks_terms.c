@@ -8,7 +8,7 @@
 #include <splatd/render.h>
 
 #include "render/marks.h"
-#include "render/soft/hints.h"
+#include "render/terms_hints.h"
 
 static bool is_shape(const struct spl_term *term)
 {
@@ -90,8 +90,8 @@ static int resolve(const struct spl_term *term, double blend, const struct spl_d
         return SPL_OK;
     out->stream = spl_marks_find_stream(info, term->name);
     if (out->stream < 0) {
-        char hint[SPL_SOFT_HINT_MAX];
-        const bool hinted = spl_soft_hint_name(term, info, hint);
+        char hint[SPL_TERMS_HINT_MAX];
+        const bool hinted = spl_terms_hint_name(term, info, hint);
         return spl_marks_refuse_name(info, term->name, field, "shapes are left: axis, plane, box, polygon, x, y and z", hinted ? hint : NULL, err);
     }
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
@@ -206,6 +206,13 @@ static int init(struct spl_marks *marks, const struct spl_terms *terms, double b
     int rc = resolve_all(terms, blend, spl_dataset_get_info(dataset), field, marks->terms, err);
     if (rc)
         return rc;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        marks->middle[i] = (info->bounds_min[i] + info->bounds_max[i]) / 2;
+        square += (info->bounds_max[i] - info->bounds_min[i]) * (info->bounds_max[i] - info->bounds_min[i]);
+    }
+    marks->reach = sqrt(square) / 2 + info->splat_radius;
     marks->count = terms->count;
     memcpy(marks->corners, terms->corners, sizeof marks->corners);
     spl_marks_find_numbers(marks);

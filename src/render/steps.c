@@ -25,7 +25,7 @@
 #include "render/turns.h"
 #include "render/view.h"
 
-enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17 }; /* a step; 10 ms of a core or two */
+enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 }; /* a step; 10 ms of a core or two */
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
 enum { mapped_samples = 1 << 19 };
@@ -177,6 +177,8 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
+    if (!rc && steps->around && spl_around_is_empty(steps->around))
+        steps->y = steps->view.camera.height; // there is nothing to draw
     if (!rc && options)
         rc = borrow_images(steps, options, err);
     if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
@@ -297,7 +299,9 @@ static int enlarge(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = spl_frame_make_images(&steps->enlarged, &steps->wanted, err);
     if (rc)
         return rc;
-    uint32_t rows = (uint32_t)(steps->around ? looked_up_pixels : enlarged_pixels) / camera->width + 1, left = camera->height - steps->row;
+    const bool tangential = camera->lens.p[0] != 0 || camera->lens.p[1] != 0; // a ray takes rounds
+    uint32_t pixels = !steps->around ? enlarged_pixels : tangential ? bent_back_pixels : looked_up_pixels;
+    uint32_t rows = pixels / camera->width + 1, left = camera->height - steps->row;
     uint32_t end = steps->row + (rows < left ? rows : left);
     if (steps->around)
         spl_around_look_up(steps->around, &steps->wanted, steps->enlarged.images, steps->row, end);

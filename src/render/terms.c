@@ -7,6 +7,16 @@
 
 #include "base/error.h"
 
+static const char *const shape_names[SPL_TERM_MEASURES] = {
+    [SPL_TERM_AXIS] = "axis",   [SPL_TERM_PLANE] = "plane",     [SPL_TERM_BOX] = "box",
+    [SPL_TERM_COORDINATE] = "z", [SPL_TERM_POLYGON] = "polygon",
+};
+
+const char *spl_term_shape_name(enum spl_term_measure measure)
+{
+    return (unsigned)measure < SPL_TERM_MEASURES ? shape_names[measure] : NULL;
+}
+
 static bool say(char fault[SPL_TERM_FAULT_MAX], const char *what)
 {
     snprintf(fault, SPL_TERM_FAULT_MAX, "%s", what);
@@ -119,10 +129,17 @@ static int check_clip(const struct spl_terms *terms, struct spl_error *err)
 int spl_terms_check(const struct spl_terms *terms, const char *field, struct spl_error *err)
 {
     char fault[SPL_TERM_FAULT_MAX];
+    uint32_t corners = 0; /* as kernels have them: each term its own */
     if (terms->count > SPL_TERMS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, field, "%u terms are more than %d", terms->count, SPL_TERMS_MAX);
-    for (uint32_t i = 0; i < terms->count; i++)
-        if (!spl_term_check(&terms->terms[i], terms->corners[0], fault))
+    for (uint32_t i = 0; i < terms->count; i++) {
+        const struct spl_term *term = &terms->terms[i];
+        if (!spl_term_check(term, terms->corners[0], fault))
             return spl_fail_field(err, SPL_E_USAGE, field, "term %u of %s %s", i + 1, field, fault);
+        corners += term->measure == SPL_TERM_POLYGON ? term->corners : 0;
+        if (corners > SPL_TERMS_CORNERS_MAX)
+            return spl_fail_field(err, SPL_E_USAGE, field, "polygons of %s have more than %d corners in all", field,
+                                  SPL_TERMS_CORNERS_MAX);
+    }
     return strcmp(field, "clip") ? SPL_OK : check_clip(terms, err);
 }

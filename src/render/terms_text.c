@@ -1,9 +1,9 @@
-/* Terms as people write them, and back (splatd/terms.h has the syntax).
+/* Reads terms as people write them (splatd/terms.h has the syntax).
  *
  * Read from left to right in one pass, one term after the other: '!', ends, what is measured, ends. A list
  * (class:3-5,9) becomes a term for each of its items. Invariant: what is handed out has passed spl_term_check() and is
- * zeroed where it says nothing, so that equal terms have equal bytes; what is printed reads as the same terms. Bounded
- * by SPL_TERMS_TEXT_MAX; nothing is allocated. Pure functions, any thread. */
+ * zeroed where it says nothing, so that equal terms have equal bytes. Bounded by SPL_TERMS_TEXT_MAX; nothing is
+ * allocated. Pure functions, any thread. */
 #include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
@@ -12,19 +12,17 @@
 
 #include "base/decimal.h"
 #include "base/error.h"
-#include "render/soft/hints.h"
+#include "render/terms_hints.h"
 #include "render/terms.h"
 
 static const char write_attribute[] = "uncertainty>0.4, uncertainty>q0.9 or class:3-5,9",
                   write_number[] = "a number, as 0.4, or the share of splats that have less, as q0.9";
-static const struct {
-    const char *name, *example;
-} shapes[SPL_TERM_MEASURES] = {
-    [SPL_TERM_AXIS] = {"axis", "axis:x,y,z,dx,dy,dz<4"},
-    [SPL_TERM_PLANE] = {"plane", "plane:x,y,z,nx,ny,nz>0"},
-    [SPL_TERM_BOX] = {"box", "box:x0,y0,z0,x1,y1,z1, or that and <2; behind z1 how many degrees it is turned"},
-    [SPL_TERM_COORDINATE] = {"z", "z<2.5 or z:1.1..1.2"},
-    [SPL_TERM_POLYGON] = {"polygon", "polygon:x,y,x,y,x,y, with heights polygon:x,y,x,y,x,y@0..2.5"},
+static const char *const shape_examples[SPL_TERM_MEASURES] = {
+    [SPL_TERM_AXIS] = "axis:x,y,z,dx,dy,dz<4",
+    [SPL_TERM_PLANE] = "plane:x,y,z,nx,ny,nz>0",
+    [SPL_TERM_BOX] = "box:x0,y0,z0,x1,y1,z1, or that and <2; behind z1 how many degrees it is turned",
+    [SPL_TERM_COORDINATE] = "z<2.5 or z:1.1..1.2",
+    [SPL_TERM_POLYGON] = "polygon:x,y,x,y,x,y, with heights polygon:x,y,x,y,x,y@0..2.5",
 };
 
 struct reader {
@@ -119,7 +117,7 @@ static int read_numbers(struct reader *r, enum spl_term_measure measure, int lea
         if (*count >= least && !take(r, ','))
             break;
         if ((*count && *count < least && !take(r, ',')) || !read_number(r, &out[*count]))
-            return fail(r, "number %d of %d is missing; write %s", *count + 1, least, shapes[measure].example);
+            return fail(r, "number %d of %d is missing; write %s", *count + 1, least, shape_examples[measure]);
     }
     return 0;
 }
@@ -148,11 +146,11 @@ static int read_polygon(struct reader *r, struct spl_term *term, struct spl_term
     if (!take(r, '@'))
         return 0;
     if (!read_number(r, &term->shape[0]) || strncmp(r->at, "..", 2))
-        return fail(r, "heights are two numbers with dots between them; write %s", shapes[SPL_TERM_POLYGON].example);
+        return fail(r, "heights are two numbers with dots between them; write %s", shape_examples[SPL_TERM_POLYGON]);
     r->at += 2;
     return read_number(r, &term->shape[1])
                ? 0
-               : fail(r, "the upper height is missing; write %s", shapes[SPL_TERM_POLYGON].example);
+               : fail(r, "the upper height is missing; write %s", shape_examples[SPL_TERM_POLYGON]);
 }
 
 static int read_shape(struct reader *r, struct spl_term *term, struct spl_terms *out)
@@ -163,7 +161,7 @@ static int read_shape(struct reader *r, struct spl_term *term, struct spl_terms 
         return read_polygon(r, term, out);
     int rc = read_numbers(r, term->measure, 6, box ? 9 : 6, term->shape, &count);
     if (!rc && count == 8)
-        return fail(r, "a box is turned by one number or by three; write %s", shapes[SPL_TERM_BOX].example);
+        return fail(r, "a box is turned by one number or by three; write %s", shape_examples[SPL_TERM_BOX]);
     return rc;
 }
 
@@ -184,12 +182,13 @@ static int read_measure(struct reader *r, struct spl_term *term, struct spl_term
         return 0;
     }
     for (int i = SPL_TERM_AXIS; i < SPL_TERM_MEASURES; i++) {
-        if (i == SPL_TERM_COORDINATE || length != strlen(shapes[i].name) || strncmp(r->at, shapes[i].name, length))
+        const char *name = spl_term_shape_name((enum spl_term_measure)i);
+        if (i == SPL_TERM_COORDINATE || length != strlen(name) || strncmp(r->at, name, length))
             continue;
         r->at += length;
         term->measure = (enum spl_term_measure)i;
         if (!take(r, ':'))
-            return fail(r, "a shape needs its numbers; write %s", shapes[i].example);
+            return fail(r, "a shape needs its numbers; write %s", shape_examples[i]);
         return read_shape(r, term, out);
     }
     memcpy(term->name, r->at, length);
@@ -206,7 +205,7 @@ static void set_end(struct spl_term *term, bool upper, double value, bool includ
 static int set_share(struct reader *r, struct spl_term *term, bool share)
 {
     if (share && term->measure >= SPL_TERM_AXIS)
-        return fail(r, "a distance has no shares of splats; write %s", shapes[term->measure].example);
+        return fail(r, "a distance has no shares of splats; write %s", shape_examples[term->measure]);
     term->measure = share ? SPL_TERM_QUANTILE : term->measure;
     return 0;
 }
@@ -234,9 +233,9 @@ static int read_list(struct reader *r, const struct spl_term *term, struct spl_t
         return add(r, out, term);
     do {
         struct spl_term item = *term;
-        char hint[SPL_SOFT_HINT_MAX];
+        char hint[SPL_TERMS_HINT_MAX];
         item.joint = joint;
-        if (spl_soft_hint_list(term->name, r->at, hint))
+        if (spl_terms_hint_list(term->name, r->at, hint))
             return fail(r, "%s", hint);
         if ((rc = read_end(r, &low)))
             return rc;
@@ -314,11 +313,11 @@ static int read_term(struct reader *r, enum spl_term_joint joint, struct spl_ter
     } else if (term.measure == SPL_TERM_BOX || term.measure == SPL_TERM_POLYGON) {
         set_end(&term, true, 0, true);
     } else {
-        char hint[SPL_SOFT_HINT_MAX];
-        if (term.measure < SPL_TERM_AXIS && spl_soft_hint_sign(term.name, r->at, hint))
+        char hint[SPL_TERMS_HINT_MAX];
+        if (term.measure < SPL_TERM_AXIS && spl_terms_hint_sign(term.name, r->at, hint))
             return fail(r, "%s", hint);
         return fail(r, "no <, >, <=, >= or : where one is needed; write %s",
-                    term.measure < SPL_TERM_AXIS ? write_attribute : shapes[term.measure].example);
+                    term.measure < SPL_TERM_AXIS ? write_attribute : shape_examples[term.measure]);
     }
     return add(r, out, &term);
 }
@@ -398,151 +397,4 @@ int spl_terms_parse_classes(const char *text, struct spl_terms *out, struct spl_
         return fail(&r, "not a list of classes; write 2,6 or 3-5, or !7 for all others");
     *out = read;
     return SPL_OK;
-}
-
-struct writer {
-    char *text;
-    size_t bytes, used;
-};
-
-__attribute__((format(printf, 2, 3))) static void put(struct writer *w, const char *format, ...)
-{
-    va_list args;
-    size_t room = w->used < w->bytes ? w->bytes - w->used : 0;
-    va_start(args, format);
-    int length = vsnprintf(room ? w->text + w->used : NULL, room, format, args);
-    va_end(args);
-    w->used += length > 0 ? (size_t)length : 0;
-}
-
-static void put_number(struct writer *w, double value)
-{
-    char text[SPL_DECIMAL_MAX];
-    put(w, "%s", spl_decimal_print(value, text));
-}
-
-static void put_numbers(struct writer *w, const double *numbers, uint32_t count, char before)
-{
-    for (uint32_t i = 0; i < count; i++) {
-        put(w, "%c", i ? ',' : before);
-        put_number(w, numbers[i]);
-    }
-}
-
-static void put_polygon(struct writer *w, const struct spl_term *term, const double *corners)
-{
-    for (uint32_t i = 0; i < term->corners; i++)
-        put_numbers(w, corners + 2 * (term->first_corner + i), 2, i ? ',' : ':');
-    if (isfinite(term->shape[0])) {
-        put(w, "@");
-        put_number(w, term->shape[0]);
-        put(w, "..");
-        put_number(w, term->shape[1]);
-    }
-}
-
-static void put_measure(struct writer *w, const struct spl_term *term, const double *corners)
-{
-    const double *s = term->shape;
-    const uint32_t turns = term->measure != SPL_TERM_BOX || !(s[6] || s[7] || s[8]) ? 0 : s[7] || s[8] ? 3 : 1;
-    if (term->measure == SPL_TERM_COORDINATE) {
-        put(w, "%c", s[3] ? 'x' : s[4] ? 'y' : 'z');
-        return;
-    }
-    put(w, "%s", term->measure < SPL_TERM_AXIS ? term->name : shapes[term->measure].name);
-    if (term->measure == SPL_TERM_POLYGON)
-        put_polygon(w, term, corners);
-    else if (term->measure >= SPL_TERM_AXIS)
-        put_numbers(w, s, 6 + turns, ':');
-}
-
-/* What an item of a list says: the first one behind what is measured. */
-static void put_item(struct writer *w, const struct spl_term *term, const char *before)
-{
-    const char *share = term->measure == SPL_TERM_QUANTILE ? "q" : "";
-    put(w, "%s%s", before, share);
-    put_number(w, term->least);
-    if (term->most != term->least) {
-        put(w, "..%s", share);
-        put_number(w, term->most);
-    }
-}
-
-static void put_term(struct writer *w, const struct spl_term *term, const double *corners)
-{
-    const char *share = term->measure == SPL_TERM_QUANTILE ? "q" : "";
-    bool low = isfinite(term->least), high = isfinite(term->most),
-         list = low && high && term->with_least && term->with_most;
-    put(w, term->outside ? "!" : "");
-    if (low && high && !list) {
-        put(w, "%s", share);
-        put_number(w, term->least);
-        put(w, term->with_least ? "<=" : "<");
-    }
-    put_measure(w, term, corners);
-    if (spl_term_is_inside(term))
-        return;
-    if (list) {
-        put_item(w, term, ":");
-    } else if (high) {
-        put(w, "<%s%s", term->with_most ? "=" : "", share);
-        put_number(w, term->most);
-    } else if (low) {
-        put(w, ">%s%s", term->with_least ? "=" : "", share);
-        put_number(w, term->least);
-    } else {
-        put(w, ":*");
-    }
-}
-
-/* Terms [first, end). Items of a list are written as one where they are outside, as alone they would say something
- * else; of others any item may be a term. */
-static void put_terms(struct writer *w, const struct spl_terms *terms, uint32_t first, uint32_t end)
-{
-    for (uint32_t i = first; i < end; i++) {
-        const struct spl_term *term = &terms->terms[i];
-        if (i > first && term->joint == SPL_TERM_ITEM && term->outside) {
-            put_item(w, term, ",");
-            continue;
-        }
-        put(w, "%s", i == first ? "" : term->joint == SPL_TERM_AND ? " and " : " or ");
-        put_term(w, term, terms->corners[0]);
-    }
-}
-
-static uint32_t count_of(const struct spl_terms *terms)
-{
-    return terms->count < SPL_TERMS_MAX ? terms->count : SPL_TERMS_MAX;
-}
-
-int spl_terms_print(const struct spl_terms *terms, char *text, size_t bytes)
-{
-    struct writer w = {text, bytes, 0};
-    if (bytes)
-        *text = '\0';
-    put_terms(&w, terms, 0, count_of(terms));
-    return (int)w.used;
-}
-
-int spl_terms_print_condition(const struct spl_terms *terms, uint32_t first, uint32_t *next, char *text, size_t bytes)
-{
-    struct writer w = {text, bytes, 0};
-    uint32_t end = first + 1;
-    while (end < count_of(terms) && terms->terms[end].joint != SPL_TERM_AND)
-        end++;
-    if (bytes)
-        *text = '\0';
-    put_terms(&w, terms, first, end);
-    *next = end;
-    return (int)w.used;
-}
-
-int spl_soft_parse(const char *text, struct spl_soft_params *out, struct spl_error *err)
-{
-    return spl_terms_parse(text, "soft", &out->what, err);
-}
-
-int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes)
-{
-    return spl_terms_print(&soft->what, text, bytes);
 }

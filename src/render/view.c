@@ -33,14 +33,15 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         memcpy((char *)view + sizeof size, (const char *)&known + sizeof size, bytes - sizeof size);
 }
 
-/* Pixels of the faces that the view is looked up in; 0 where it is in none. Tracing a lens takes a quarter of a
- * millisecond, and is asked for several times of a request and of each view of a batch: the last one is kept. */
+/* Pixels of the faces that the view is looked up in; 0 where it is in none. Tracing a lens takes up to two milliseconds,
+ * and is asked for several times of a request and of each view of a batch: the last ones are kept. */
 static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, struct spl_error *err)
 {
     static _Thread_local struct {
         struct spl_camera camera;
         uint64_t pixels;
-    } last;
+    } kept[SPL_VIEW_LENSES_KEPT];
+    static _Thread_local unsigned next;
     struct spl_camera camera = view->camera;
     struct spl_faces faces;
     *pixels = 0;
@@ -50,14 +51,17 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
         return SPL_OK;
     memset(camera.eye, 0, sizeof camera.eye);
     memset(camera.rotation, 0, sizeof camera.rotation);
-    if (memcmp(&camera, &last.camera, sizeof camera)) {
-        int rc = spl_faces_init(&faces, &camera, SPL_VIEW_SIDE_MAX, err);
-        if (rc)
-            return rc;
-        memcpy(&last.camera, &camera, sizeof camera); // its padding, too
-        last.pixels = spl_faces_get_pixels(&faces);
-    }
-    *pixels = last.pixels;
+    for (unsigned i = 0; i < SPL_VIEW_LENSES_KEPT; i++)
+        if (!memcmp(&camera, &kept[i].camera, sizeof camera)) {
+            *pixels = kept[i].pixels;
+            return SPL_OK;
+        }
+    int rc = spl_faces_init(&faces, &camera, SPL_VIEW_SIDE_MAX, err);
+    if (rc)
+        return rc;
+    *pixels = kept[next].pixels = spl_faces_get_pixels(&faces);
+    memcpy(&kept[next].camera, &camera, sizeof camera); // its padding, too
+    next = (next + 1) % SPL_VIEW_LENSES_KEPT;
     return SPL_OK;
 }
 

@@ -6,7 +6,10 @@
 
 #include "base/error.h"
 
-enum { SPL_VIEW_SIDE_MAX = 32768 };
+enum {
+    SPL_VIEW_SIDE_MAX = 32768,
+    SPL_VIEW_LENSES_KEPT = 16, /* bent cameras of which a thread keeps how many samples they take */
+};
 
 /* Reads `given` by its size, with defaults where it ends, and checks it: errors as of spl_view_check(). Pure; any
  * thread. */

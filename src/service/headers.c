@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/decimal.h"
 #include "service/view/bundle.h"
@@ -114,6 +115,9 @@ void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera
     spl_headers_add(headers, "Splatd-Camera", "%s", spl_decimal_shorten(text));
 }
 
+/* Of a header that repeats terms; longer ones are left out, for headers have to fit into a connection's pool. */
+enum { terms_most = 1500 };
+
 /* Terms as an array, condition by condition or term by term; their texts have nothing that JSON would escape. */
 static void write_terms(const struct spl_terms *terms, bool conditions, char *out, size_t bytes)
 {
@@ -134,7 +138,8 @@ static void add_clip(struct spl_headers *headers, const struct spl_terms *clip)
 {
     char terms[SPL_TERMS_TEXT_MAX + 3 * SPL_TERMS_MAX] = "";
     write_terms(clip, true, terms, sizeof terms);
-    spl_headers_add(headers, "Splatd-Clip", "{\"clip\":[%s]}", terms);
+    if (strlen(terms) <= terms_most)
+        spl_headers_add(headers, "Splatd-Clip", "{\"clip\":[%s]}", terms);
 }
 
 /* What is soft, the same. */
@@ -143,6 +148,8 @@ static void add_soft(struct spl_headers *headers, const struct spl_soft_params *
     char terms[SPL_TERMS_TEXT_MAX + 3 * SPL_TERMS_MAX] = "";
     char opacity[SPL_DECIMAL_MAX], cover[SPL_DECIMAL_MAX], blend[SPL_DECIMAL_MAX];
     write_terms(&soft->what, false, terms, sizeof terms);
+    if (strlen(terms) > terms_most)
+        return;
     spl_headers_add(headers, "Splatd-Soft",
                     "{\"soft\":[%s],\"soft_model\":\"%s\",\"soft_opacity\":%s,\"soft_cover\":%s,"
                     "\"soft_blend\":%s,\"of\":\"%s\"}",

@@ -17,7 +17,7 @@ struct request;
 enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
-    connection_pool = 14 * 1024, /* libmicrohttpd's pool; see oversize.c */
+    connection_pool = 17 * 1024, /* libmicrohttpd's pool; see oversize.c */
 };
 
 enum phase {

@@ -15,7 +15,7 @@
 
 enum {
     value_memory = 64,       /* of the pool, for each header, parameter and cookie beside its text */
-    reply_memory = 2 * 1024, /* of the pool, for a reply's headers */
+    reply_memory = 5 * 1024, /* of the pool, for a reply's headers */
     parameters_max = 64,
 };
 

@@ -289,6 +289,26 @@ static void picks_lie_where_the_image_says(void **state)
     assert_true(pick.hit);
 }
 
+/* No ray of it goes anywhere: nothing is drawn, in no time. */
+static void what_sees_nothing_is_empty(void **state)
+{
+    (void)state;
+    struct spl_view view = all_around(0);
+    struct spl_pick pick;
+    assert_int_equal(spl_camera_set_fisheye(&view.camera, 180, 2048, 2048, NULL), SPL_OK);
+    view.camera.cx = -1e6;
+    view.supersample = 4;
+    view.layers = 1u << SPL_LAYER_RANGE | 1u << SPL_LAYER_COVERAGE;
+    struct spl_frame frame = render(&view);
+    const float *range = frame.images[SPL_LAYER_RANGE].pixels, *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;
+    for (size_t i = 0; i < 2048 * 2048; i++)
+        assert_true(isnan(range[i]) && coverage[i] == 0);
+    assert_int_equal(frame.stats.splats_drawn, 0);
+    spl_frame_finish(&frame);
+    assert_int_equal(spl_renderer_pick(renderer, ball, &view, 1, 1, &pick, NULL), SPL_OK);
+    assert_false(pick.hit);
+}
+
 int main(int argc, char **argv)
 {
     struct spl_renderer_options options = {
@@ -305,6 +325,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_cubes_faces_are_pinholes),
         cmocka_unit_test(layers_hold_their_kind),
         cmocka_unit_test(picks_lie_where_the_image_says),
+        cmocka_unit_test(what_sees_nothing_is_empty),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     spl_renderer_remove(renderer, ball);

@@ -1,6 +1,7 @@
 """What is drawn, over HTTP: it comes back in a header, from every route that takes it, counts in ETags only where something
 is said, goes on to views of a batch and to tours, and is refused by name where it is wrong."""
 import json
+import math
 import struct
 
 from harness import FAKE, REAL, VIEW, Daemon, run
@@ -34,6 +35,24 @@ def test_what_is_drawn_comes_back():
         batch = d.ask(VIEW + "s", "POST", json.dumps({"width": 8, "height": 8, "clip": "z<1", "class": [0],
                                                       "views": [{}, {"clip": []}, {"clip": [], "class": []}]}))
         assert batch.status == 200 and batch.body.count(b"Splatd-Clip: ") == 2, batch.body[:2000]
+
+
+def test_what_is_long_is_drawn_all_the_same():
+    """Replies' headers have to fit beside the request's: what does not is left out."""
+    corners = ",".join(f"{3 * math.cos(a)!r},{3 * math.sin(a)!r}" for a in (i * math.pi / 32 for i in range(64)))
+    boxes = " or ".join(f"box:{-1 - math.pi / n!r},{-math.e / n!r},{-math.sqrt(n)!r},{math.pi + n!r},{math.e + n!r},{math.pi / 2 + n!r}"
+                        for n in range(1, 16))
+    terms = f"polygon:{corners} or {boxes}"
+    with Daemon(REAL) as d:
+        for body in ({"clip": terms}, {"clip": terms, "soft": terms}, {"clip": terms, "class": "!7"}):
+            reply = d.post({"width": 16, "height": 16, **body})
+            assert reply.status == 200 and reply.headers["Splatd-Clip"] is None, reply.headers
+        lines = d.view(width=16, height=16, clip="polygon:" + corners)
+        assert lines.status == 200, lines.body
+        near = d.view(**NEAR, clip="polygon:-9,-9,9,-9,9,9,-9,9@1..1e9", layer="depth", format="raw")
+        assert near.body == d.view(**NEAR, clip="polygon:-9,-9,9,-9,9,9,-9,9@1..9", layer="depth", format="raw").body
+        far = d.view(**NEAR, clip="box:-1e9,-1e9,1,1e9,1e9,1e9", layer="depth", format="raw")
+        assert far.body == near.body
 
 
 def test_what_is_left_out_is_not_there():

@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, run, together
+from harness import FAKE, REAL, SANITIZED, VIEW, Daemon, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 LARGE = VIEW + "?width=2048&height=2048&supersample=4&format=jpeg"  # 64 Mi samples, 16 tiles
@@ -51,7 +51,7 @@ def test_a_small_view_of_much_work_holds_up_no_other():
             begun = time.monotonic()
             path = "/v1/datasets/heap/view?width=640&height=360&eye=6,0,0&target=0,0,0"
             replies, threads = begin_large(d, 2, path)
-            for _ in range(1 if os.environ["SPLATD_SANITIZED"] == "1" else 3):
+            for _ in range(1 if SANITIZED else 3):
                 assert d.ask(fresh(SMALL)).status == 200
             # on a machine of which others have most; 15 s each would be those of the two
             assert not replies and time.monotonic() - begun < 14, "small views waited for what is much work"

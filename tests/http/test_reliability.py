@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run, together
+from harness import FAKE, REAL, SANITIZED, VIEW, WALL, Daemon, eventually, run, together
 from random_requests import random_request
 
 WALL_2 = os.environ["SPLATD_WALL_2"]
@@ -182,14 +182,14 @@ def test_soak():
               f"resident MB at the start and after each sixth: {sixths}")
         print(f"  the loop's longest turn: {float(turns['seconds']) * 1000:.1f} ms by the clock, "
               f"{float(turns['cpu_seconds']) * 1000:.1f} ms of processor time", flush=True)
-        assert os.environ["SPLATD_SANITIZED"] == "1" or float(turns["cpu_seconds"]) < 0.05, turns
+        assert SANITIZED or float(turns["cpu_seconds"]) < 0.05, turns
         leaked = (memory[-1][1] - memory[steady][1] - (2 << 20)) / (asked * (1 - steady / len(memory)))
         print(f"  {max(leaked, 0):.0f} bytes of memory a request beyond 2 MiB", flush=True)
         # A picture of 160 x 90 has 57,600; AddressSanitizer keeps books of its own, and is given a second. Those of
         # ThreadSanitizer are four times what our code has ever touched: a part of a buffer that is touched late looks
         # like a leak of five times its size, and says nothing of ours. The other builds judge the same code.
         if os.environ["SPLATD_SANITIZER"] != "thread":
-            assert leaked < (16384 if os.environ["SPLATD_SANITIZED"] == "1" else 4096), (leaked, memory)
+            assert leaked < (16384 if SANITIZED else 4096), (leaked, memory)
         assert descriptors[-1][1] <= descriptors[steady][1] + 2, descriptors  # a connection may still be closing
         if seconds >= 1800:  # glibc takes and gives in steps of 128 KiB, each 1.7 MB/h over ten minutes, 0.6 over thirty
             assert grown < 2e6 and abs(opened) < 1, (grown, opened)

@@ -12,7 +12,7 @@ import zipfile
 import zlib
 
 import openapi
-from harness import REAL, VIEW, WALL, Daemon, run
+from harness import DEADLINE_MS, REAL, VIEW, WALL, Daemon, run
 
 PICK = VIEW.replace("/view", "/pick")
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
@@ -118,7 +118,7 @@ def test_status_says_how_it_is():
         assert status["counters"]["frames"] == 1 and status["counters"]["replies_2xx"] == 1
         assert status["memory"]["device_bytes"] > 0 and status["memory"]["resident_bytes"] > 0
         assert status["queues"]["render"] == {"length": 0, "capacity": 32}
-        assert status["limits"]["deadline_ms"] == 10000
+        assert status["limits"]["deadline_ms"] == DEADLINE_MS
 
 
 def test_default_view_is_a_jpeg():
@@ -334,6 +334,15 @@ def views_all_around(d):
     assert d.view(**at, projection="cube", width=97, height=16).json()["field"] == "width"
     assert d.view(**at, projection="fisheye", fov=361).json()["field"] == "fov"
     assert d.view(**at, fov=200).json()["field"] == "fov"
+    for field in ("fx", "fy", "cx", "cy"):  # beyond what faces have pixels for
+        wrong = d.view(**at, projection="fisheye", **{"fx": 30, "fy": 30, field: 1e20})
+        assert wrong.status == 400 and wrong.json()["field"] == field, wrong.body
+    assert d.view(**at, projection="orthographic", fx="1e-320").json()["field"] == "fx"
+    none = d.view(**at, projection="fisheye", fov=180, cx=-1e6, width=64, **npy)
+    assert none.status == 200 and set(none.body[-64 * 64 * 4:]) == set(struct.pack("<f", float("nan"))), none.body[:200]
+    tilted = [d.view(eye="3,0.2,1", target="0,0,0.4", up=up, projection="equirectangular", width=64).headers["Splatd-Camera"]
+              for up in ("0,0,1", "0,0,1e-170", "0,0,1e200")]
+    assert len(set(tilted)) == 1, tilted
     whole = d.view(**at, projection="equirectangular", azimuth="-180,180,64", elevation="88,-88,45", **npy)
     rings = d.view(**at, projection="equirectangular", azimuth="180,-180,64", elevation="-88,88,45", **npy)
     assert whole.status == rings.status == 200, (whole.body, rings.body)

@@ -86,7 +86,7 @@ def room_for_one_of_two(source=TEXTURED):
         with Daemon(REAL, "--memory-limit", str(limit), "--deadline", "2000", datasets=[one, LARGE],
                     **reads.environment) as d:
             def drive_out():
-                assert d.ask(f"{large}&near={1e-6 * next(fresh_near):.6f}").headers["Splatd-Complete"] == "true"
+                eventually(lambda: d.ask(f"{large}&near={1e-6 * next(fresh_near):.6f}").headers["Splatd-Complete"] == "true")
             fresh_near = iter(range(1, 100))
             drive_out()
             yield d, reads, view, drive_out

@@ -63,3 +63,13 @@ int spl_soft_check(const struct spl_soft_params *soft, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "of", "of %d does not exist", (int)soft->of);
     return spl_terms_check(&soft->what, "soft", err);
 }
+
+int spl_soft_parse(const char *text, struct spl_soft_params *out, struct spl_error *err)
+{
+    return spl_terms_parse(text, "soft", &out->what, err);
+}
+
+int spl_soft_print(const struct spl_soft_params *soft, char *text, size_t bytes)
+{
+    return spl_terms_print(&soft->what, text, bytes);
+}

@@ -185,6 +185,21 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
     return 0;
 }
 
+/* `query` with what browsers write otherwise in one, "<>' and what is not ASCII, as they write it: they would ask for
+ * bytes that were not signed. NULL without memory; the caller frees it. */
+static char *write_as_browsers_do(const char *query)
+{
+    char *out = spl_alloc(3 * strlen(query) + 1, 1, NULL), *to = out;
+    for (; out && *query; query++) {
+        const unsigned char c = (unsigned char)*query;
+        if (strchr("\"<>'", c) || c < 0x21 || c > 0x7e)
+            to += sprintf(to, "%%%02X", c);
+        else
+            *to++ = *query;
+    }
+    return out;
+}
+
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err)
 {
     char sig[SPL_DIGEST_TEXT], exp[32], page[page_max];
@@ -198,9 +213,12 @@ int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expire
     if (spl_sign_is_signed(query) || strstr(query, "exp="))
         return spl_fail(err, SPL_E_USAGE, "'%.200s' has exp or sig already", url);
     snprintf(exp, sizeof exp, "%sexp=%" PRId64, *query ? "&" : "", expires_s);
-    char *signed_query = NULL;
-    if (asprintf(&signed_query, "%s%s", query, exp) < 0)
+    char *written = write_as_browsers_do(query), *signed_query = NULL;
+    if (!written || asprintf(&signed_query, "%s%s", written, exp) < 0) {
+        free(written);
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
+    }
+    free(written);
     const char *signed_path = path, *fragment = path + strcspn(path, "#");
     if (find_id(path, pages)) {
         struct spl_error why = {0};

@@ -7,8 +7,10 @@
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
+#include "render/view.h"
 #include "service/request/body.h"
 #include "service/request/values.h"
 
@@ -33,10 +35,25 @@ static int resolve_view(const struct values *common, json_t *json, const struct 
     return 0;
 }
 
+/* Whether no view before it has its lens: each is traced once, on the loop, for up to two milliseconds. */
+static bool has_own_lens(const struct spl_views_request *views, const struct spl_view *view)
+{
+    const struct spl_camera *a = &view->camera;
+    for (size_t i = 0; i < views->count; i++) {
+        const struct spl_camera *b = &views->views[i].view.camera;
+        if (a->projection == b->projection && a->width == b->width && a->height == b->height && a->fx == b->fx &&
+            a->fy == b->fy && a->cx == b->cx && a->cy == b->cy && !memcmp(&a->lens, &b->lens, sizeof a->lens) &&
+            a->near == b->near && a->far == b->far && view->supersample == views->views[i].view.supersample)
+            return false;
+    }
+    return true;
+}
+
 static int resolve_all(const struct values *common, json_t *list, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_views_request *out, struct spl_error *err)
 {
     uint64_t pixels = 0, samples = 0;
+    unsigned lenses = 0;
     if (!(out->views = spl_alloc(json_array_size(list), sizeof *out->views, err)))
         return SPL_E_NOMEM;
     for (; out->count < json_array_size(list); out->count++) {
@@ -49,6 +66,11 @@ static int resolve_all(const struct values *common, json_t *list, const struct s
         snprintf(field, sizeof field, "views[%zu]%s%s", out->count, why.field[0] ? "." : "", why.field);
         if (rc)
             return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);
+        lenses += spl_camera_is_bent(&view->view.camera) && has_own_lens(out, &view->view);
+        if (lenses > SPL_VIEW_LENSES_KEPT)
+            return spl_fail_field(err, SPL_E_INPUT, "views",
+                                  "views[%zu] is beyond the %d lenses and panoramas of a batch that differ in more than "
+                                  "their pose; ask for them in several batches", out->count, SPL_VIEW_LENSES_KEPT);
         pixels += (uint64_t)view->view.camera.width * view->view.camera.height;
         samples += spl_view_get_samples(&view->view);
     }

@@ -214,6 +214,22 @@ void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct sp
 }
 
 /* False when the pipeline has no place, or the tour has ended. */
+/* A camera's faces differ from frame to frame, and tracing those of all would take too long where the tour is taken. */
+static int check_faces(const struct spl_service *service, const struct spl_view *view, struct spl_error *err)
+{
+    if (!spl_camera_is_bent(&view->camera))
+        return SPL_OK;
+    const struct spl_camera_limits limits = spl_view_get_limits(service);
+    int rc = spl_view_check(view, err);
+    if (!rc && limits.samples && spl_view_get_samples(view) > limits.samples)
+        rc = spl_fail(err, SPL_E_LIMIT, "a frame of %llu samples; the limit is %llu",
+                      (unsigned long long)spl_view_get_samples(view), (unsigned long long)limits.samples);
+    if (!rc && limits.bytes && spl_view_get_frame_bytes(view) > limits.bytes)
+        rc = spl_fail(err, SPL_E_LIMIT, "a frame of %llu bytes; the limit is %llu",
+                      (unsigned long long)spl_view_get_frame_bytes(view), (unsigned long long)limits.bytes);
+    return rc;
+}
+
 static bool submit(struct spl_tour *tour, size_t frame)
 {
     struct spl_tours *tours = tour->tours;
@@ -239,6 +255,11 @@ static bool submit(struct spl_tour *tour, size_t frame)
     if (tour->spec.fades)
         spl_fade_apply(tour->spec.fades[frame], &job->request.view);
     spl_view_set_unit(&job->request, entry->info);
+    if (check_faces(tours->service, &job->request.view, &err)) {
+        spl_tour_fail(tour, &err);
+        spl_job_destroy(job);
+        return false;
+    }
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = SPL_NEVER; // views go first, however long that takes
     job->behind = true;

@@ -48,12 +48,17 @@ static void add(struct form *form, uint64_t word)
     form->words[form->count++] = word;
 }
 
-static void add_number(struct form *form, double number)
+static uint64_t bits_of(double number)
 {
     uint64_t word;
     number += 0.0; // -0 becomes 0
     memcpy(&word, &number, sizeof word);
-    add(form, word);
+    return word;
+}
+
+static void add_number(struct form *form, double number)
+{
+    add(form, bits_of(number));
 }
 
 static void add_camera(struct form *form, const struct spl_camera *camera)
@@ -74,13 +79,27 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
         add_number(form, i < 6 ? camera->lens.k[i] : i < 8 ? camera->lens.p[i - 6] : camera->lens.reach);
 }
 
-/* Their one text stands for what is soft, or drawn; another order of terms is another key. */
+/* What is soft, or drawn; another order of terms is another key. Not their text: a batch has 256 views, whose numbers take
+ * longer to print than the loop has. */
 static void add_terms(struct form *form, const struct spl_terms *terms)
 {
-    char text[SPL_TERMS_TEXT_MAX + 1];
+    enum { name_words = (SPL_TERM_NAME_MAX + 7) / 8, term_words = 12 + name_words };
+    uint64_t words[SPL_TERMS_MAX * term_words + 2 * SPL_TERMS_CORNERS_MAX] = {0}, *word = words;
     XXH128_hash_t hash = {0};
+    for (uint32_t i = 0; i < terms->count; i++, word += term_words) {
+        const struct spl_term *term = &terms->terms[i];
+        word[0] = (uint64_t)term->measure | (uint64_t)term->corners << 8 | (uint64_t)(i ? term->joint : 0) << 32 |
+                  (uint64_t)term->with_least << 40 | (uint64_t)term->with_most << 41 | (uint64_t)term->outside << 42;
+        word[1] = bits_of(term->least);
+        word[2] = bits_of(term->most);
+        for (int k = 0; k < 9; k++)
+            word[3 + k] = bits_of(term->shape[k]);
+        memcpy(word + 12, term->name, strnlen(term->name, sizeof term->name));
+    }
+    for (uint32_t i = 0; i < 2 * terms->corner_count; i++)
+        *word++ = bits_of(terms->corners[i / 2][i % 2]);
     if (terms->count)
-        hash = XXH3_128bits(text, (size_t)spl_terms_print(terms, text, sizeof text));
+        hash = XXH3_128bits(words, (size_t)((char *)word - (char *)words));
     add(form, hash.high64);
     add(form, hash.low64);
 }

@@ -168,6 +168,8 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
 void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *request, double ms, double soft_ms)
 {
     const struct spl_view *view = &request->view;
+    if (view->clip.count || spl_camera_is_bent(&view->camera))
+        return; /* profiles are of whole datasets and pinholes */
     uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params;
     params &= ~(SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps)); /* which are settings */
     params &= ~SPL_PARAMS_OF_ALL;

@@ -226,6 +226,68 @@ static void faces_have_the_same_rays_where_they_meet(void **state)
     }
 }
 
+/* Rays from `from` to `to` degrees along one axis: its focal length and principal point. */
+static void set_rays(double from, double to, uint32_t count, double *focal, double *middle)
+{
+    *focal = (count - 1) / ((to - from) * M_PI / 180);
+    *middle = 0.5 - from * M_PI / 180 * *focal;
+}
+
+/* A scan's rings and columns need not be whole turns: some turn in the middle of a face, some end at a pole. */
+static void a_scans_rays_are_on_their_faces(void **state)
+{
+    (void)state;
+    uint64_t random = 7;
+    for (int i = 0; i < 60; i++) {
+        static const double known[][4] = {{-10, 10, 60, 90}, {-175, 185, 60, 80}, {20, -160, -90, 30}, {0, 350, 89, -89}};
+        double scan[4];
+        for (int k = 0; k < 4; k++) {
+            random = random * 6364136223846793005u + 1442695040888963407u;
+            const double share = (double)(random >> 11) / 9007199254740992.0;
+            scan[k] = i < 4 ? known[i][k] : k < 2 ? 360 * share - 180 : 180 * share - 90;
+        }
+        struct spl_camera camera = start();
+        camera.projection = SPL_EQUIRECTANGULAR;
+        camera.width = i < 4 ? 700 : 40 + (uint32_t)(random >> 55);
+        camera.height = i < 4 ? 1500 : 40 + (uint32_t)(random >> 40 & 255);
+        set_rays(scan[0], scan[1], camera.width, &camera.fx, &camera.cx);
+        set_rays(-scan[2], -scan[3], camera.height, &camera.fy, &camera.cy);
+        struct spl_faces faces;
+        if (spl_faces_init(&faces, &camera, 32768, NULL))
+            continue; /* finer than there is room for */
+        for (uint32_t y = 0; y < camera.height; y++)
+            for (uint32_t x = 0; x < camera.width; x++) {
+                double ray[3], place[2], along;
+                if (!spl_camera_get_ray(&camera, x + 0.5, y + 0.5, ray))
+                    continue;
+                const struct spl_camera *face = &faces.cameras[spl_faces_place(&faces, ray, place, &along)];
+                if (!(place[0] >= 2 && place[0] <= face->width - 2.0 && place[1] >= 2 && place[1] <= face->height - 2.0))
+                    fail_msg("azimuth %g to %g, elevation %g to %g: ray %u, %u of %u x %u is at %g, %g of a face of %u x %u",
+                             scan[0], scan[1], scan[2], scan[3], x, y, camera.width, camera.height, place[0], place[1],
+                             face->width, face->height);
+            }
+    }
+}
+
+/* No face, rather than one of a side without pixels. */
+static void what_sees_nothing_has_no_faces(void **state)
+{
+    (void)state;
+    struct spl_camera camera = fisheye(180, 64, 64);
+    struct spl_faces faces;
+    camera.cx = -1e6;
+    assert_int_equal(spl_camera_check(&camera, NULL), 0);
+    assert_int_equal(spl_faces_init(&faces, &camera, 4096, NULL), 0);
+    assert_int_equal(spl_faces_get_pixels(&faces), 0);
+    camera = fisheye(180, 64, 64);
+    camera.fx = camera.fy = camera.cx = 1e9;
+    camera.cy = -1e9;
+    assert_int_equal(spl_camera_check(&camera, NULL), 0);
+    if (!spl_faces_init(&faces, &camera, 4096, NULL))
+        for (int i = 0; i < SPL_FACES; i++)
+            assert_true(!faces.cameras[i].width == !faces.cameras[i].height);
+}
+
 static void faults_are_named(void **state)
 {
     (void)state;
@@ -249,6 +311,14 @@ static void faults_are_named(void **state)
     camera.lens.p[0] = 0.1;
     assert_int_equal(spl_camera_check(&camera, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "params");
+    static const char *const far[] = {"fx", "fy", "cx", "cy"}; /* where a float's pixels end */
+    for (int i = 0; i < 4; i++) {
+        err = (struct spl_error){0};
+        camera = fisheye(90, 9, 9);
+        *(double *[]){&camera.fx, &camera.fy, &camera.cx, &camera.cy}[i] = i < 2 ? 1e20 : -1e20;
+        assert_int_equal(spl_camera_check(&camera, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, far[i]);
+    }
     err = (struct spl_error){0};
     camera = fisheye(90, 9, 9);
     camera.projection = SPL_EQUIRECTANGULAR;
@@ -264,6 +334,8 @@ int main(void)
         cmocka_unit_test(only_what_is_asked_for_is_drawn),
         cmocka_unit_test(faces_are_as_fine_as_images),
         cmocka_unit_test(faces_have_the_same_rays_where_they_meet),
+        cmocka_unit_test(a_scans_rays_are_on_their_faces),
+        cmocka_unit_test(what_sees_nothing_has_no_faces),
         cmocka_unit_test(faults_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

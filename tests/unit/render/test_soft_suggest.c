@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "render/soft/hints.h"
+#include "render/terms_hints.h"
 #include "render/soft/share.h"
 #include "render/soft/suggest.h"
 

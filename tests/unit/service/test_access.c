@@ -195,6 +195,11 @@ static void urls_are_signed_with_or_without_host_and_query(void **state)
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?from=http://y/z", expires, &whole, &err), 0);
     assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
     free(whole);
+    /* as a browser asks for it */
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?clip='z'<2.5>\"&title=\xc3\xa4~%20+", expires, &whole, &err), 0);
+    assert_non_null(strstr(whole, "?clip=%27z%27%3C2.5%3E%22&title=%C3%A4~%20+&exp="));
+    assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
+    free(whole);
     const char *const bad[] = {"",     "v1/x", "https://host", "https://host?/x", "://h/x",
                                "/a#b", "/a b", path,           "/v1/datasets/a?exp=3",
                                "/v1/datasets/a#b", "/v1/datasets/a b", "/v1/datasets", "/v1/datasets/a/tours",

@@ -1,6 +1,6 @@
 /* Names are compared by how many letters one is from the other (Levenshtein), and a start of one counts as it. Bounded
  * by the lengths of names; nothing is allocated. */
-#include "render/soft/hints.h"
+#include "render/terms_hints.h"
 
 #include <ctype.h>
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "dataset/classes.h"
 #include "dataset/streams.h"
 
-bool spl_soft_hint_sign(const char *name, const char *at, char hint[SPL_SOFT_HINT_MAX])
+bool spl_terms_hint_sign(const char *name, const char *at, char hint[SPL_TERMS_HINT_MAX])
 {
     const bool not = *at == '!';
     double value;
@@ -21,21 +21,21 @@ bool spl_soft_hint_sign(const char *name, const char *at, char hint[SPL_SOFT_HIN
     at += strspn(at, "!=");
     const char *end = spl_decimal_parse(at + strspn(at, " "), &value);
     if (!end)
-        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no %s; write '%s:' and a value, a range or a list of them",
+        snprintf(hint, SPL_TERMS_HINT_MAX, "there is no %s; write '%s:' and a value, a range or a list of them",
                  not ? "!=" : "=", name);
     else if (not)
-        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no !=; write what is meant: '%s<%s or %s>%s'", name,
+        snprintf(hint, SPL_TERMS_HINT_MAX, "there is no !=; write what is meant: '%s<%s or %s>%s'", name,
                  spl_decimal_print(value, text), name, text);
     else
-        snprintf(hint, SPL_SOFT_HINT_MAX, "there is no =; write '%s:%s'", name, spl_decimal_print(value, text));
+        snprintf(hint, SPL_TERMS_HINT_MAX, "there is no =; write '%s:%s'", name, spl_decimal_print(value, text));
     return true;
 }
 
-bool spl_soft_hint_list(const char *name, const char *at, char hint[SPL_SOFT_HINT_MAX])
+bool spl_terms_hint_list(const char *name, const char *at, char hint[SPL_TERMS_HINT_MAX])
 {
     if (strcmp(name, "class") || !isalpha((unsigned char)*at) || (*at == 'q' && !isalpha((unsigned char)at[1])))
         return false;
-    snprintf(hint, SPL_SOFT_HINT_MAX, "classes are numbers: %s", SPL_CLASSES_LISTED);
+    snprintf(hint, SPL_TERMS_HINT_MAX, "classes are numbers: %s", SPL_CLASSES_LISTED);
     return true;
 }
 
@@ -93,8 +93,8 @@ static int axis_of(const char *name)
     return -1;
 }
 
-bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_info *info,
-                        char hint[SPL_SOFT_HINT_MAX])
+bool spl_terms_hint_name(const struct spl_term *term, const struct spl_dataset_info *info,
+                        char hint[SPL_TERMS_HINT_MAX])
 {
     const char *near = find_near(term->name, info);
     const int axis = axis_of(term->name);
@@ -103,10 +103,10 @@ bool spl_soft_hint_name(const struct spl_term *term, const struct spl_dataset_in
         const bool above = isfinite(term->least) || !isfinite(term->most);
         const double end = above ? term->least : term->most;
         spl_decimal_print(isfinite(end) && term->measure == SPL_TERM_ATTRIBUTE ? end : 0, at);
-        snprintf(hint, SPL_SOFT_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<', at);
+        snprintf(hint, SPL_TERMS_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<', at);
         return true;
     }
     if (near)
-        snprintf(hint, SPL_SOFT_HINT_MAX, "did you mean '%s'?", near);
+        snprintf(hint, SPL_TERMS_HINT_MAX, "did you mean '%s'?", near);
     return near;
 }
