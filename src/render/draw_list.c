@@ -11,7 +11,18 @@
 
 #define ENTRIES_MAX (1u << 28)
 
-enum { base_work = 8 }; /* of what covers no sample */
+enum {
+    base_work = 8, /* of what covers no sample */
+    cut_words = 48 /* of shapes that a sample is asked of, as much work as it: 64 corners and 15 boxes are nine times that */
+};
+
+/* Samples, with the time that shapes take which cut them. */
+static uint64_t with_cut(const struct spl_draw_list *list, uint32_t cut, uint64_t looks)
+{
+    const struct spl_draw_cut *found = cut ? spl_draw_list_find_cut(list, cut) : NULL;
+    looks = looks < UINT32_MAX ? looks : UINT32_MAX;
+    return looks + (found ? looks * found->words / cut_words : 0);
+}
 
 static int grow(void **array, size_t *capacity, size_t wanted, size_t size, struct spl_error *err)
 {
@@ -118,7 +129,7 @@ int spl_draw_list_add(struct spl_draw_list *list, const struct spl_draw_origin *
         return rc;
     list->chunks[list->chunk_count] = *chunk;
     list->bounds[list->chunk_count] = *bounds;
-    list->work_of_chunk[list->chunk_count] = splats(chunk) * (base_work + (looks < UINT32_MAX ? looks : UINT32_MAX));
+    list->work_of_chunk[list->chunk_count] = splats(chunk) * (base_work + with_cut(list, origin->cut, looks));
     list->key_of_chunk[list->chunk_count++] = key_of(origin, chunk);
     list->entry_count += entries;
     if (origin->role == SPL_ROLE_SOLID)
@@ -174,7 +185,7 @@ const struct spl_draw_cut *spl_draw_list_find_cut(const struct spl_draw_list *li
 int spl_draw_list_add_cut(struct spl_draw_list *list, uint32_t cut, const uint32_t *words, uint32_t count,
                           struct spl_error *err)
 {
-    struct spl_draw_cut added = {.cut = cut};
+    struct spl_draw_cut added = {.cut = cut, .words = count};
     int rc = grow((void **)&list->cuts, &list->cut_capacity, list->cut_count + 1, sizeof *list->cuts, err);
     rc = rc ? rc : spl_draw_list_add_tests(list, words, count, &added.word, err);
     if (!rc)

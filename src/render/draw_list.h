@@ -55,7 +55,7 @@ struct spl_draw_map {
 
 /* What samples of chunks that shapes cut are asked of: the terms' bits, and where it is among the tests. */
 struct spl_draw_cut {
-    uint32_t cut, word;
+    uint32_t cut, word, words; /* how many */
 };
 
 struct spl_draw_list {
