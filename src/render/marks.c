@@ -236,6 +236,21 @@ static void turn_axes(const double degrees[3], double axes[9])
     memcpy(axes, rows, sizeof rows);
 }
 
+/* From where to where a shape reaches along a world axis: its middle, and half of it. Of an inside that is much larger than
+ * the dataset only what lies around the dataset: from a middle far away floats would not tell where the near end is. */
+static void place_extent(const struct spl_marks *marks, const struct spl_marks_term *term, int axis, double least,
+                         double most, double *middle, double *half)
+{
+    const double low = fmax(least, marks->middle[axis] - 2 * marks->reach),
+                 high = fmin(most, marks->middle[axis] + 2 * marks->reach);
+    if (term->least == -INFINITY && term->most == 0 && most - least > 8 * marks->reach && low < high) {
+        least = low;
+        most = high;
+    }
+    *middle = least + (most - least) / 2;
+    *half = (most - least) / 2;
+}
+
 /* The middle of a polygon, how far it reaches from there, and its corners from there. */
 static void place_polygon(const struct spl_marks *marks, const struct spl_marks_term *term, struct spl_marks_view *view,
                           double middle[3], double half[3])
@@ -252,9 +267,10 @@ static void place_polygon(const struct spl_marks *marks, const struct spl_marks_
         for (uint32_t i = 0; i < term->corners; i++)
             view->corners[term->first_corner + i][a] = corners[2 * i + (uint32_t)a] - middle[a];
     }
-    const bool high = isfinite(term->shape[0]);
-    middle[2] = high ? term->shape[0] + (term->shape[1] - term->shape[0]) / 2 : 0;
-    half[2] = high ? (term->shape[1] - term->shape[0]) / 2 : INFINITY;
+    middle[2] = 0;
+    half[2] = INFINITY;
+    if (isfinite(term->shape[0]))
+        place_extent(marks, term, 2, term->shape[0], term->shape[1], &middle[2], &half[2]);
 }
 
 /* The shape's axes and its middle, world; of a box how far it reaches from there; of a coordinate `base`, which is at one
@@ -266,16 +282,19 @@ static void place_shape(const struct spl_marks *marks, const struct spl_marks_te
     const double *s = term->shape;
     for (int i = 0; i < 9; i++)
         axes[i] = i % 4 == 0;
+    const bool turned = s[6] || s[7] || s[8];
     for (int i = 0; i < 3; i++) {
         middle[i] = term->measure == SPL_TERM_BOX ? s[i] + (s[i + 3] - s[i]) / 2 : s[i];
         shape->half[i] = term->measure == SPL_TERM_BOX ? (s[i + 3] - s[i]) / 2 : 0;
+        if (term->measure == SPL_TERM_BOX && !turned) /* others turn around their own middle */
+            place_extent(marks, term, i, s[i], s[i + 3], &middle[i], &shape->half[i]);
     }
     if (term->measure == SPL_TERM_POLYGON) {
         place_polygon(marks, term, view, middle, shape->half);
         return;
     }
     if (term->measure == SPL_TERM_BOX) {
-        if (s[6] || s[7] || s[8])
+        if (turned)
             turn_axes(s + 6, axes);
         return;
     }
@@ -287,27 +306,6 @@ static void place_shape(const struct spl_marks *marks, const struct spl_marks_te
         shape->base = isfinite(term->least) ? term->least : isfinite(term->most) ? term->most : 0;
         for (int i = 0; i < 3; i++)
             middle[i] = s[3 + i] ? shape->base : camera->eye[i];
-    }
-}
-
-/* Of a box or polygon that is much larger than the dataset only what lies around the dataset: from a middle that is far away
- * floats would not tell where its near side is. */
-static void trim(const struct spl_marks *marks, const struct spl_marks_term *term, const double axes[9],
-                 double middle[3], double half[3])
-{
-    if (term->least != -INFINITY || term->most != 0)
-        return;
-    for (int i = term->measure == SPL_TERM_POLYGON ? 2 : 0; i < 3; i++) {
-        const double *a = axes + 3 * i, reach = 2 * marks->reach;
-        double at = 0;
-        for (int c = 0; c < 3; c++)
-            at += a[c] * (marks->middle[c] - middle[c]);
-        const double low = fmax(-half[i], at - reach), high = fmin(half[i], at + reach);
-        if (!(half[i] > 4 * marks->reach && isfinite(half[i]) && low < high))
-            continue;
-        for (int c = 0; c < 3; c++)
-            middle[c] += a[c] * (low + high) / 2;
-        half[i] = (high - low) / 2;
     }
 }
 
@@ -342,8 +340,6 @@ uint32_t spl_marks_see(const struct spl_marks *marks, const struct spl_camera *c
             continue;
         *shape = (struct spl_marks_shape){.word = first_word + used};
         place_shape(marks, term, camera, view, shape, axes, middle);
-        if (term->measure == SPL_TERM_BOX || term->measure == SPL_TERM_POLYGON)
-            trim(marks, term, axes, middle, shape->half);
         for (int i = 0; i < 3; i++) {
             const double *a = axes + 3 * i;
             for (int c = 0; c < 3; c++) { /* the axis, turned as the camera is; from the eye to the middle */

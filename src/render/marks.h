@@ -42,7 +42,7 @@ struct spl_marks {
     struct spl_marks_term terms[SPL_TERMS_MAX];
     double corners[SPL_TERMS_CORNERS_MAX][2];
     const struct spl_stream *streams; /* the dataset's */
-    double middle[3], reach;          /* a sphere that holds it */
+    double middle[3], reach;          /* a sphere that holds it; 0, 0 = not known */
 };
 
 /* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `left` is

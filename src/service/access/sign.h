@@ -38,7 +38,8 @@ int spl_sign_check(const struct spl_sign_key *key, const char *path, const char 
 const char *spl_sign_path_of(const char *url);
 
 /* Appends exp and sig to `url`, with or without scheme and host, and before its fragment, which only
- * a page has; "<>' and what is not ASCII in its query become %22 and so on, as browsers write them. The caller frees *out. SPL_E_USAGE for what is no URL, is signed already, or cannot be signed. */
+ * a page has; "<>' and what is not ASCII in its query become %22 and so on, as browsers write them.
+ * The caller frees *out. SPL_E_USAGE for what is no URL, is signed already, or cannot be signed. */
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err);
 
 #endif
