@@ -34,7 +34,7 @@ static double image_of(const struct spl_distortion *d, double r)
     return spl_distortion_get_image(d, r, &(double){0});
 }
 
-/* No lens, or a fisheye's polynomial of terms that all grow, as that of most tests and of cameras that nobody calibrated. */
+/* No lens, or a fisheye's polynomial of terms that all grow. */
 static bool grows_for_certain(const struct spl_distortion *d)
 {
     for (int i = 0; i < 4; i++)
