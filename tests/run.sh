@@ -47,41 +47,21 @@ built() {
     [ "$(cat "$out/$1.built")" = yes ] || { failed=$((failed + 1)); return 1; }
 }
 
-# name, suites…: runs them one after the other; what failed is shown with its output. Tests have four times their limit:
-# machines are shared, and others build beside them. Most tests over HTTP wait most of
-# their time: twice as many at once as there are processors. `only` names those of a suite.
+# name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
+# shown with its output, and every suite is counted. Tests have four times their limit: machines are shared, and others
+# build beside them. `only` names those that run.
 suites() {
-    local name=$1 suite log=$out/$1/meson-logs/testlog counts at_once
-    shift
-    for suite in "$@"; do
-        local begin=$SECONDS
-        at_once=$(nproc)
-        case $suite in http | deploy) at_once=$((2 * at_once)) ;; esac
-        rm -f "$log".{json,txt}
-        ${run_under-} meson test -C "$out/$name" --no-rebuild --suite "$suite" --print-errorlogs ${only-} \
-            --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$suite.log" 2>&1 || true
-        counts=$(python3 - "$log.json" <<'PY'
-import json, os, sys
-passed = failed = skipped = 0
-if os.path.exists(sys.argv[1]):
-    for line in open(sys.argv[1], encoding="utf-8"):
-        result = json.loads(line)["result"]
-        passed += result in ("OK", "EXPECTEDFAIL")
-        skipped += result == "SKIP"
-        failed += result not in ("OK", "EXPECTEDFAIL", "SKIP")
-print(passed, failed, skipped)
-PY
-        )
-        read -r p f s <<<"$counts"
-        # Meson says so itself when a folder holds no tests; any other silence is a failure.
-        if [ $((p + f + s)) = 0 ] && ! grep -q 'No suitable tests' "$out/$name-$suite.log"; then
-            f=1
-        fi
-        [ "$f" = 0 ] || cat "$out/$name-$suite.log"
-        passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
-        printf '%-10s %-8s %d passed, %d failed, %d skipped in %d s\n' "$name" "$suite" "$p" "$f" "$s" \
-            $((SECONDS - begin))
-    done
+    local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/testlog told p f s
+    shift 2
+    rm -f "$log".{json,txt}
+    ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" --print-errorlogs ${only-} \
+        --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$1.log" 2>&1 || true
+    told=$(python3 tests/counts.py "$name" "$log.json" "$@")
+    echo "${told%$'\n'*}"
+    read -r p f s <<<"${told##*$'\n'}"
+    [ "$f" = 0 ] || cat "$out/$name-$1.log"
+    passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
+    printf '%-10s %-8s in %d s\n' "$name" "" $((SECONDS - begin))
 }
 
 # Does a program built with this sanitiser start here? Containers without ptrace cannot look for leaks, and kernels with
@@ -108,6 +88,8 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/tsan.supp:halt_on_error=1:second_dea
 printf 'int dlclose(void *handle) { (void)handle; return 0; }\n' >"$out/keep-loaded.c"
 gcc -shared -fPIC "$out/keep-loaded.c" -o "$out/keep-loaded.so"
 
+# Hundreds of programs are linked: gold, of binutils, takes a third of the time.
+if command -v ld.gold >/dev/null; then export CC_LD=gold; fi
 # Of what is built without a backend only its stub differs, and the choice of a device: the rest was compiled before.
 export CCACHE_DIR=$out/ccache CCACHE_DEPEND=1
 few="src/splatd tests/gpu/test-gpu-gpu tests/gpu/test-gpu-exact"
@@ -129,17 +111,29 @@ if [ "$mode" != --quick ]; then
     others=$!
     trap 'kill $others 2>/dev/null || true' EXIT
 fi
+here=$(nproc)
+# Units and fuzzers run where AddressSanitizer looks on; here those that it shortens.
+units=(whole)
+[ "$mode" = "" ] || units=(unit fuzz)
 if built normal; then
-    suites normal rules unit http gpu golden library deploy e2e fault stability
+    suites normal "$here" "${units[@]}" rules gpu golden library fault stability e2e
+    suites normal $((2 * here)) http deploy # which wait most of their time
 fi
-if [ "$mode" = --quick ]; then
-    suites normal fuzz # which otherwise runs where AddressSanitizer looks on
-    finish
-    exit
-fi
+[ "$mode" != --quick ] || { finish; exit; }
 
+# Of what the normal build has run, sanitisers run what strangers send and what many threads do, and --full all of it.
+attacks=(bad_input mutate framing reliability change tours wait batch)
+crowds=(load reliability wait change catalog tours)
 if built asan; then
-    timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so" suites asan unit http gpu fuzz fault # golden draws what gpu draws
+    timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so"
+    suites asan "$here" unit fuzz fault
+    only=${attacks[*]/#/http-}
+    [ "$mode" != --full ] || only=""
+    suites asan $((2 * here)) http
+    only="gpu-vulkan gpu-egl exact-vulkan exact-egl residency-vulkan residency-egl"
+    [ "$mode" != --full ] || only=""
+    suites asan "$here" gpu
+    only="" timeouts="" run_under=""
 fi
 if built tsan; then
     if sanitiser_runs thread env; then
