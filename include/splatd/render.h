@@ -41,6 +41,8 @@ struct spl_view {
     struct spl_terms clip;      /* conditions, all of which hold for what is drawn, solid or soft; none: all is drawn */
     struct spl_shade_params shade; /* of colours: how what is solid is shaded, the same */
     struct spl_color_params color; /* what they show, the same */
+    bool surrounded;            /* a piece of something larger, as a map's tile is: what lies beyond the borders acts on
+                                   pixels at them as in the middle (eye-dome lighting, smoothing, specks that close) */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

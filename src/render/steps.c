@@ -136,7 +136,10 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     int rc = find_resident(steps, err);
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
-    reach->apron += spl_shade_get_reach(view, spl_dataset_get_info(steps->dataset)) + reach->align - 1;
+    const uint32_t shade = spl_shade_get_reach(view, spl_dataset_get_info(steps->dataset));
+    if (view->surrounded)
+        reach->guard += (apron + shade + 3) / 4 * 4; // as guards are: whole groups of lanes
+    reach->apron += shade + reach->align - 1;
     reach->apron -= reach->apron % reach->align;
     if (!rc)
         rc = spl_tiling_init(&job->tiling, view, mapped && samples > mapped_samples ? mapped_samples : samples, err);

@@ -42,9 +42,10 @@ static int dispatch(struct spl_tile *tile, uint32_t kinds, bool lit, struct spl_
     const int64_t size[2] = {(int64_t)view->camera.width * side, (int64_t)view->camera.height * side};
     const uint32_t drawn[2] = {params.width, params.height};
     uint32_t *const low[2] = {&params.fill_level, &params.fill_from}, *const end[2] = {&params.fill_to, &params.fill_stride};
-    for (int i = 0; i < 2; i++) { /* what of the tile lies in the image */
-        *low[i] = from[i] < 0 ? (uint32_t)-from[i] : 0;
-        *end[i] = size[i] - from[i] < drawn[i] ? (uint32_t)(size[i] - from[i]) : drawn[i];
+    for (int i = 0; i < 2; i++) { /* what of the tile lies in the image, or around one that goes on */
+        const bool cut = !view->surrounded;
+        *low[i] = cut && from[i] < 0 ? (uint32_t)-from[i] : 0;
+        *end[i] = cut && size[i] - from[i] < drawn[i] ? (uint32_t)(size[i] - from[i]) : drawn[i];
     }
     params.entries = (uint32_t)tile->samples;
     params.map_near = (float)view->shade.strength;

@@ -129,6 +129,59 @@ static void small_tiles_give_the_same_image(void **state)
     done(dataset);
 }
 
+/* Pixels of a piece that are not those of the whole. */
+static size_t find_others(const struct spl_frame *whole, const struct spl_frame *piece, uint32_t left, uint32_t top)
+{
+    const struct spl_image *a = &whole->images[SPL_LAYER_COLOR], *b = &piece->images[SPL_LAYER_COLOR];
+    size_t others = 0;
+    for (uint32_t y = 0; y < b->height; y++)
+        for (uint32_t x = 0; x < b->width; x++) {
+            const uint8_t *p = (const uint8_t *)a->pixels + 4 * ((size_t)(top + y) * a->width + left + x);
+            const uint8_t *q = (const uint8_t *)b->pixels + 4 * ((size_t)y * b->width + x);
+            others += abs(p[0] - q[0]) > 1 || abs(p[1] - q[1]) > 1 || abs(p[2] - q[2]) > 1 || p[3] != q[3];
+        }
+    return others;
+}
+
+/* A piece of an image knows what lies around it, or its borders are shaded and smoothed otherwise. */
+static void a_surrounded_piece_is_as_in_the_whole(void **state)
+{
+    (void)state;
+    enum { left = 83, top = 61, width = 40, height = 32 };
+    struct spl_dataset *dataset = random_cube(20000, origin, 0.02);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        for (int samples = 1; samples <= 2; samples++) {
+            struct spl_view view = looking(origin, 3, 203, 151), piece;
+            view.method = method;
+            view.supersample = samples;
+            view.fill.kernel = 8;
+            assert_int_equal(spl_shade_parse("edl", &view.shade, NULL), SPL_OK);
+            view.shade.radius = 5;
+            view.layers = 1u << SPL_LAYER_COLOR;
+            piece = view;
+            piece.camera.width = width;
+            piece.camera.height = height;
+            piece.camera.cx -= left;
+            piece.camera.cy -= top;
+            struct spl_frame whole, alone, surrounded;
+            assert_int_equal(spl_renderer_render(renderer, dataset, &view, &whole, NULL), SPL_OK);
+            assert_int_equal(spl_renderer_render(renderer, dataset, &piece, &alone, NULL), SPL_OK);
+            piece.surrounded = true;
+            assert_int_equal(spl_renderer_render(renderer, dataset, &piece, &surrounded, NULL), SPL_OK);
+            const size_t others = find_others(&whole, &surrounded, left, top), before = find_others(&whole, &alone, left, top);
+            print_message("%s, %d: of %d pixels %zu differ, %zu alone\n", spl_method_name(method), samples, width * height,
+                          others, before);
+            const size_t most = method == SPL_METHOD_FILL ? width * height / 20 : 2; /* its filter looks on and on */
+            if (others > most || before < 4 * others + 50)
+                fail_msg("%s", spl_method_name(method));
+            spl_frame_finish(&whole);
+            spl_frame_finish(&alone);
+            spl_frame_finish(&surrounded);
+        }
+    done(dataset);
+}
+
 /* A wall seen aslant, at a half and a quarter of the samples: the same plane, at any size of image. */
 static void coarse_frames_show_the_same_place(void **state)
 {
@@ -186,6 +239,7 @@ int main(int argc, char **argv)
         frames_test(tiles_leave_no_seams),
         frames_test(a_kernel_too_large_for_its_tiles_is_refused),
         frames_test(small_tiles_give_the_same_image),
+        frames_test(a_surrounded_piece_is_as_in_the_whole),
         frames_test(coarse_frames_show_the_same_place),
     };
     return frames_run(argc, argv, "tiles", tests, sizeof tests / sizeof *tests);

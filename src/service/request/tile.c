@@ -34,5 +34,7 @@ int spl_tile_request_from_query(const char *query, size_t length, const struct s
     set(&values, PARAM_format, &format, 1);
     if (!values.v[PARAM_background].given)
         set(&values, PARAM_transparent, &yes, 1);
-    return spl_values_resolve(&values, defaults, limits, out, err);
+    rc = spl_values_resolve(&values, defaults, limits, out, err);
+    out->view.surrounded = true;
+    return rc;
 }

@@ -182,6 +182,8 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
         add(&form, UINT64_MAX);
         add_terms(&form, &view->clip);
     }
+    if (view->surrounded)
+        add(&form, UINT64_MAX - 1);
     XXH128_hash_t hash = XXH3_128bits(form.words, form.count * sizeof *form.words);
     return (struct spl_key){.words = {hash.high64, hash.low64}};
 }

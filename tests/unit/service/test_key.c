@@ -238,6 +238,9 @@ static void version_and_renderer_are_part_of_it(void **state)
     assert_false(spl_key_equal(&key, &other));
     other = spl_key_make(&request, &plain, 1);
     assert_true(spl_key_equal(&key, &other));
+    request.view.surrounded = true; /* a map's tile of the same place */
+    other = spl_key_make(&request, &plain, 1);
+    assert_false(spl_key_equal(&key, &other));
 
     struct spl_device_info a = {.backend = "vulkan", .name = "one", .driver = "1.0"}, b = a;
     assert_true(spl_renderer_hash(&a) == spl_renderer_hash(&b));
