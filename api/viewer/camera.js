@@ -44,6 +44,27 @@ export function ray(camera, [width, height], [x, y]) {
   return add(forward, add(times(right, (x - width / 2) / f), times(down, (y - height / 2) / f)));
 }
 
+/** What a pixel sees: from where, and in which direction. */
+export function beam(camera, size, [x, y]) {
+  if (!camera.flat) return {origin: camera.eye, direction: ray(camera, size, [x, y])};
+  const {right, down, forward} = axes(camera),
+    pixel = distance(camera) / focal(camera, size[1]);
+  const beside = add(times(right, (x - size[0] / 2) * pixel), times(down, (y - size[1] / 2) * pixel));
+  return {origin: add(camera.eye, beside), direction: forward};
+}
+
+/** Both ends of what is before the eye of a straight line between two world points, as project() has them; or null. */
+export function segment(camera, size, a, b) {
+  const {forward} = axes(camera),
+    near = 1e-3 * distance(camera),
+    depth = (p) => dot(sub(p, camera.eye), forward);
+  if (camera.flat) return [project(camera, size, a), project(camera, size, b)];
+  const [za, zb] = [depth(a), depth(b)];
+  if (za < near && zb < near) return null;
+  const cut = (p, q, zp, zq) => (zp >= near ? p : add(p, times(sub(q, p), (near - zp) / (zq - zp))));
+  return [project(camera, size, cut(a, b, za, zb)), project(camera, size, cut(b, a, zb, za))];
+}
+
 /** Rodrigues: `v` turned by `angle` about the unit vector `axis`. */
 function turn(v, axis, angle) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];

@@ -3,17 +3,19 @@
 // asks it for {splatd: "token", token} where the service wants one: tokens do not belong into addresses. What `splatd
 // sign` has added to its own address lets it look at its dataset without one; it passes that on to what it asks.
 
+import {Annotations} from "./annotations.js";
 import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
 import {named, toWorld} from "./place.js";
 import {askJson, setPass, setToken} from "./service.js";
-import {softOf} from "./soft_setting.js";
+import {keptOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
 
 const id = decodeURIComponent(location.pathname.split("/").pop());
 const stage = new Stage(document.getElementById("stage"));
+const annotations = new Annotations(stage, document.querySelector(".marks"));
 stage.drag = "orbit";
 attach(stage);
 
@@ -26,16 +28,17 @@ async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
     const wanted = parse(location.hash);
-    const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, ...setting} = {
+    const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, mark, ...setting} = {
       ...named(dataset, wanted, stage.size),
       ...(await toWorld(dataset, wanted)),
     };
     const given = Object.entries({eye, target, up, fov, projection, view_height}).filter(([, value]) => value !== undefined);
     document.title = dataset.title ?? id;
     stage.element.ariaLabel = `View of ${id}`;
-    stage.settings = budget ? {layer, budget, ...softOf(setting)} : {layer, ...setting};
+    stage.settings = budget ? {layer, budget, ...keptOf(setting)} : {layer, ...setting};
     stage.report(null);
     stage.open(dataset, Object.fromEntries(given));
+    annotations.open(mark);
   } catch (problem) {
     stage.report(problem);
     if (problem.kind === "token" && !asked) parent.postMessage({splatd: "token"}, "*");

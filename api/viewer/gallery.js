@@ -14,6 +14,7 @@ export class Gallery {
     this.busy = 0;
     this.turn = 0; // of show(): what belongs to an older one is dropped
     this.urls = [];
+    this.kept = {};
     this.seen = new IntersectionObserver((entries) => {
       for (const {target, isIntersecting} of entries)
         if (isIntersecting) {
@@ -48,9 +49,10 @@ export class Gallery {
     this.show(this.datasets);
   }
 
-  /** As GET /v1/datasets lists them. */
-  show(datasets) {
+  /** As GET /v1/datasets lists them; `kept`: what the fragment says of what is drawn, for pictures and links. */
+  show(datasets, kept = this.kept) {
     this.clear();
+    this.kept = kept;
     this.datasets = datasets;
     this.element.hidden = false;
     this.list.append(...datasets.map((dataset) => this.card(dataset)));
@@ -63,7 +65,7 @@ export class Gallery {
       shot = document.createElement("span"),
       name = document.createElement("strong"),
       about = document.createElement("small");
-    link.href = `#${query({dataset: id})}`;
+    link.href = `#${query({dataset: id, ...this.kept})}`;
     shot.className = "shot";
     name.textContent = title ?? id;
     about.textContent =
@@ -94,15 +96,18 @@ export class Gallery {
     this.busy++;
     try {
       const width = devicePixelRatio > 1 ? 640 : 320;
-      const background = getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", "");
-      const reply = await ask(`${dataset.thumbnail}?${query({width, background, v: dataset.version})}`);
+      const {clip, class: classes, background: own} = this.kept;
+      const background = own ?? getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", "");
+      const drawn = wish.whole ? {} : {clip, class: classes};
+      const reply = await ask(`${dataset.thumbnail}?${query({width, background, ...drawn, v: dataset.version})}`);
       const url = URL.createObjectURL(await reply.blob());
       if (turn !== this.turn) return URL.revokeObjectURL(url);
       this.urls.push(url);
       img.src = url;
     } catch (problem) {
       if (turn !== this.turn) return;
-      if (problem.seconds && ++wish.tries < TRIES)
+      if (problem.kind === "refused" && !wish.whole) this.waiting.push({...wish, whole: true}); // it has no such attribute
+      else if (problem.seconds && ++wish.tries < TRIES)
         setTimeout(() => {
           if (turn !== this.turn) return;
           this.waiting.push(wish);

@@ -3,8 +3,10 @@
 import {findParameter} from "./methods.js";
 
 const VECTORS = ["eye", "target", "up"],
-  TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade", "projection"],
-  NUMBERS = ["fov", "view_height", "lod", "supersample"];
+  TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade", "projection", "clip", "class",
+    "background"],
+  NUMBERS = ["fov", "view_height", "near", "far", "lod", "supersample"];
+const JOINTS = {soft: " or ", clip: " and "}; // of what may be given several times
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 
 /** Is it a number, as a parameter of a view? */
@@ -17,7 +19,8 @@ export function parse(fragment) {
     const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
     if (VECTORS.includes(name) && numbers.length === 3 && numbers.every(Number.isFinite)) found[name] = numbers;
     else if (isNumber(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
-    else if (name === "soft") found.soft = found.soft ? `${found.soft} or ${text}` : text;
+    else if (JOINTS[name]) found[name] = found[name] ? found[name] + JOINTS[name] + text : text;
+    else if (name === "mark") (found.mark ??= []).push(text);
     else if (isText(name)) found[name] = text;
   }
   return found;

@@ -1,30 +1,43 @@
-// The page: fills the controls from what the service says and ties them to the stage.
+// The page: ties the parts of the panel to the stage, and opens what the fragment names.
 
-import {add, distance, fromSide, same, sub, unit} from "./camera.js";
+import {Annotations} from "./annotations.js";
 import {Chart} from "./chart.js";
+import {Classes} from "./classes.js";
+import {Clip} from "./clip.js";
+import {Handles} from "./clip_handles.js";
+import {Colors} from "./colors.js";
+import {showDataset, showFrame} from "./facts.js";
 import {Gallery} from "./gallery.js";
 import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
-import {Controls, choose, counts, findMethod, listed, loadTable, offered} from "./methods.js";
+import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
+import {choices, Picture} from "./picture.js";
 import {named, toWorld} from "./place.js";
-import {Points, coordinates, lengthText, withUnit} from "./points.js";
+import {Points} from "./points.js";
+import {showPoints} from "./points_panel.js";
 import {Problem, askJson, query, setToken} from "./service.js";
+import {attachSides} from "./sides.js";
 import {Soft} from "./soft.js";
-import {opacityOf, softOf} from "./soft_setting.js";
+import {keptOf, opacityOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
+import {Views} from "./views.js";
 
 const $ = (id) => document.getElementById(id);
-const SETTINGS = ["layer", "method", "lod", "supersample", "budget"]; // and the parameters of methods
 
 const stage = new Stage($("stage"));
-const points = new Points(stage, document.querySelector(".marks"));
+const points = new Points(stage, $("marks"));
+const annotations = new Annotations(stage, $("names"));
 const chart = new Chart($("chart"));
 const tour = new Tour(stage);
 const gallery = new Gallery($("gallery"));
+const clip = new Clip(stage);
+const classes = new Classes();
+const views = new Views(stage, say);
+new Handles(stage, clip, $("handles"), $("box"));
 attach(stage);
 
 function say(text) {
@@ -33,68 +46,61 @@ function say(text) {
   $("said").textContent = text;
 }
 
-function choices(select, names, value) {
-  select.replaceChildren(...names.map((name) => new Option(name, name, false, name === value)));
+let dataset = null; // that the controls are set for
+let parts = null; // {picture, colors, soft}, once there is a table of methods
+let planes = {}; // near and far of the fragment, which have no control
+
+/** What the controls say, as parameters of a view. */
+function readSettings(before) {
+  stage.coarse = $("moving").value;
+  const {picture, colors, soft} = parts;
+  return {...picture.read(before), ...colors.read(), ...soft.read(), ...clip.read(), ...classes.read(), ...planes};
 }
 
-const thousands = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+/** Sets the controls to what a fragment or a view by name says. */
+function show(wanted) {
+  const {picture, colors, soft} = parts;
+  picture.open(dataset, wanted);
+  showKept(wanted);
+  soft.open(dataset, wanted);
+  $("soft").open ||= Boolean(wanted.soft);
+  colors.open(dataset, wanted);
+}
 
-let dataset = null; // that the controls are set for
-let parameters = null; // their Controls, once there is a table of them
-let colors = {}; // what the fragment says of colours that has no control
-let soft = null; // the part of the panel for what is soft, as long
+function showKept(wanted) {
+  clip.open(dataset, wanted.clip);
+  classes.open(dataset, wanted.class);
+  planes = Object.fromEntries(["near", "far"].filter((name) => name in wanted).map((name) => [name, wanted[name]]));
+}
 
-/** What the controls say, as parameters of a view; a budget chooses the others. In place of what the browser's own check
- * refuses stands what `before` has. */
-function readSettings(before) {
-  const all = [...SETTINGS, ...parameters.names],
-    control = (name) => parameters.get(name) ?? $(name);
-  const read = (name) => (before && !control(name).checkValidity() ? before[name] : control(name).value) ?? "";
-  const settings = Object.fromEntries(all.map((name) => [name, read(name)]));
-  for (const name of all) control(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
-  for (const parameter of listed()) {
-    const {name} = parameter,
-      shown = counts(parameter, settings.method, dataset);
-    parameters.offer(name, shown);
-    if (!shown || settings[name] === "") delete settings[name]; // the service chooses
-  }
-  $("method-help").textContent = findMethod(settings.method).description;
-  stage.coarse = $("moving").value;
-  for (const name of ["color_by", "shade"]) if ($(name).value) settings[name] = $(name).value;
-  return {...settings, ...colors, ...soft.read()};
+function makeParts() {
+  if (parts) return;
+  parts = {picture: new Picture(), colors: new Colors(), soft: new Soft()};
+  for (const part of [parts.colors, parts.soft, classes, clip])
+    part.addEventListener("change", () => stage.dataset && stage.set(readSettings(stage.settings)));
+  clip.addEventListener("input", () => stage.dataset && stage.slide(readSettings(stage.settings)));
 }
 
 function writeLink() {
   const {eye, target, up, fov, projection, view_height} = stage.params();
   const {budget, ...setting} = stage.settings;
-  history.replaceState(
-    null,
-    "",
-    `#${query({
-      dataset: stage.dataset.id,
-      eye,
-      target,
-      up,
-      fov,
-      projection,
-      view_height,
-      layer: setting.layer,
-      ...(budget ? {budget, ...softOf(setting)} : setting),
-    })}`,
-  );
+  const camera = {eye, target, up, fov, projection, view_height};
+  const drawn = budget ? {budget, ...keptOf(setting)} : setting;
+  const fragment = query({dataset: stage.dataset.id, ...camera, layer: setting.layer, ...drawn, ...annotations.read()});
+  history.replaceState(null, "", `#${fragment}`);
 }
 
 let opening = 0; // counts calls of open(): the last one wins
 let opened = 0; // the one whose dataset and camera the stage has
 
 /** The gallery in place of a view, or the other way round. */
-function showGallery(datasets) {
+function showGallery(datasets, kept) {
   for (const part of [stage.element, $("panel")]) part.hidden = Boolean(datasets);
   if (!datasets) return gallery.hide();
   stage.close();
   stage.report(null);
   document.title = "Datasets – splatd";
-  gallery.show(datasets);
+  gallery.show(datasets, kept);
   clearTimeout(again);
   if (datasets.some(({state}) => state === "loading")) again = setTimeout(() => gallery.shown && open(), 3000);
 }
@@ -113,7 +119,7 @@ async function open() {
     const wanted = parse(fragment);
     const ids = datasets.map(({id}) => id);
     if (turn !== opening) return;
-    if (!wanted.dataset && datasets.length > 1) return showGallery(datasets);
+    if (!wanted.dataset && datasets.length > 1) return showGallery(datasets, keptOf(wanted));
     if (gallery.shown) showGallery(null);
     const id = wanted.dataset ?? datasets[0]?.id;
     if (!id) throw new Problem("gone", "No dataset is served yet", 5);
@@ -127,37 +133,13 @@ async function open() {
     Object.assign(wanted, named(found, wanted, stage.size), await toWorld(found, wanted));
     if (turn !== opening) return;
     dataset = found;
-    parameters ??= new Controls($("method-help"));
-    if (!soft) {
-      soft = new Soft();
-      soft.addEventListener("change", () => stage.dataset && stage.set(readSettings(stage.settings)));
-    }
+    makeParts();
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;
-    choices($("layer"), dataset.layers, wanted.layer ?? "color");
-    const shown = ["height", "normal", ...dataset.attributes.map(({name}) => name)];
-    $("color_by").replaceChildren(new Option("its own", ""), ...shown.map((name) => new Option(name)));
-    choose($("color_by"), wanted.color_by ?? "");
-    choose($("shade"), wanted.shade ?? "");
-    colors = Object.fromEntries(["ramp", "range", "edl_strength", "edl_radius"].filter((name) => name in wanted).map((name) => [name, wanted[name]]));
-    choices($("method"), dataset.methods, offered(wanted.method, dataset));
-    $("lod").value = wanted.lod ?? 1;
-    choose($("supersample"), wanted.supersample ?? 1);
-    for (const parameter of listed()) parameters.set(parameter, wanted[parameter.name]);
-    soft.open(dataset, wanted);
-    $("soft").open ||= Boolean(wanted.soft);
-    choose($("budget"), wanted.budget ?? "");
+    show(wanted);
     stage.settings = readSettings();
-    const size = dataset.bounds.max.map((x, i) => (x - dataset.bounds.min[i]).toFixed(1)).join(" × ");
-    $("about").textContent =
-      `${describeContents(dataset)}, ${withUnit(size, dataset.unit)}, ` +
-      `drawn by ${device.name.replace(/ \(.*/, "")}`;
-    $("description").textContent = dataset.description ?? "";
-    $("description").hidden = !dataset.description;
-    choices($("views"), ["", ...dataset.views.map(({name}) => name)], "");
-    $("views").options[0].textContent = "the first";
-    choose($("views"), wanted.view ?? "");
-    $("views-label").hidden = !dataset.views.length;
+    showDataset(dataset, device);
+    views.open(dataset, wanted.view);
     document.title = `${dataset.title ?? id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
@@ -166,7 +148,9 @@ async function open() {
     );
     opened = turn;
     stage.open(dataset, camera);
+    clip.show(); // what it cuts depends on where one looks
     points.clear();
+    annotations.open(wanted.mark);
     tour.open(id);
     chart.open(dataset);
   } catch (problem) {
@@ -174,85 +158,6 @@ async function open() {
     stage.close();
     stage.report(problem);
   }
-}
-
-/** "10 651 of 998 728 points, maps of 4 stations, of 2 at a time" */
-function describeContents({points, leaf_splats: left, pruned, maps}) {
-  const some = maps && maps.at_once < maps.stations ? `, of ${maps.at_once} at a time` : "";
-  return (
-    (pruned ? `${thousands(left)} of ${thousands(pruned.of)} points` : `${thousands(points)} points`) +
-    (maps ? `, maps of ${thousands(maps.stations)} station${maps.stations === 1 ? "" : "s"}${some}` : "")
-  );
-}
-
-function showFrame({detail: frame}) {
-  const distances = ["depth", "range"].includes(stage.settings.layer) && frame.near !== null;
-  $("legend").hidden = !distances;
-  $("primitives").hidden = stage.settings.layer !== "primitive";
-  const [near, far] = $("legend").querySelectorAll("span");
-  if (distances)
-    [near.textContent, far.textContent] = [frame.near, frame.far].map((x) =>
-      withUnit(x.toFixed(x < 10 ? 2 : 1), dataset.unit),
-    );
-  const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
-  const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
-  $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;
-  chart.show(frame, frame.full ? stage.settings : {});
-  if (!frame.full) return;
-  const {chosen, promised, demand} = frame;
-  $("chosen").textContent = chosen
-    ? `Chosen: ${chosen.method}, level ${chosen.lod}, samples a side ${chosen.supersample}` +
-      (chosen.maps ? `, maps ${chosen.maps}` : "") +
-      (dataset.textures?.methods.includes(chosen.method) ? `, ${chosen.atoms} atoms` : "") +
-      `${promised.psnr ? `; ${promised.psnr} dB promised` : ""}${demand === "met" ? "" : `; ${demand}`}`
-    : "";
-  if (opened === opening) writeLink(); // else it names what comes next
-}
-
-/** [term, text] rows into a <dl>. */
-function fill(list, rows) {
-  list.replaceChildren(
-    ...rows.flat().map((text, i) => {
-      const cell = document.createElement(i % 2 ? "dd" : "dt");
-      cell.textContent = text;
-      return cell;
-    }),
-  );
-}
-
-/** As what a point is drawn, and how far off the points are that its panel stands for. */
-function describePrimitive({primitive, plane}) {
-  if (!primitive) return [];
-  const off = plane && [plane.error_mean, plane.error_most].map((x) => lengthText(x, dataset.unit));
-  return [
-    ["drawn as", primitive],
-    ...(plane
-      ? [
-          ["normal", coordinates(plane.normal)],
-          ["points off it", `${off[0]}, at most ${off[1]}`],
-        ]
-      : []),
-  ];
-}
-
-function showPoints({detail}) {
-  const rows = points.list.map(({position}, i) => ["AB"[i], coordinates(position)]);
-  if (points.distance !== null) rows.push(["A – B", points.distanceText]);
-  fill($("points"), rows);
-  fill($("primitive"), describePrimitive(points.list.at(-1) ?? {}));
-  const had = Object.entries(points.list.at(-1)?.attributes ?? {}).filter(([, value]) => value !== null);
-  fill(
-    $("attributes"),
-    had.map(([name, value]) => [name.replaceAll("_", " "), `${+value.toPrecision(9)}`]),
-  );
-  $("clear").disabled = !points.list.length;
-  if (typeof detail === "string") say(detail);
-  else
-    say(
-      points.distance === null
-        ? `Point at ${coordinates(detail.position)}`
-        : `Point at ${coordinates(detail.position)}; distance ${points.distanceText}`,
-    );
 }
 
 /** Double click: turns towards what is there, which is then what one orbits. */
@@ -276,16 +181,21 @@ async function copied(text, what) {
   say((await copy(text)) ? `${what} copied` : text);
 }
 
-stage.addEventListener("frame", showFrame);
+stage.addEventListener("frame", ({detail: frame}) => {
+  showFrame(frame, stage.settings, dataset);
+  chart.show(frame, frame.full ? stage.settings : {});
+  if (frame.full && opened === opening) writeLink(); // else it names what comes next
+});
 stage.addEventListener("click", ({detail}) => points.add(detail));
 stage.addEventListener("dblclick", lookAt);
-points.addEventListener("change", showPoints);
+showPoints(points, annotations, say);
+annotations.addEventListener("change", () => stage.shown?.full && opened === opening && writeLink());
 notices(stage, $("notice"), $("again"), open, "enter it in the panel, under Token");
 stage.addEventListener("state", ({detail: problem}) => {
   $("token").hidden = problem?.kind !== "token";
   if (!$("token").hidden) fold($("toggle"), $("panel"), true); // the field lies there
 });
-tour.addEventListener("fade", () => soft?.showOpacity(opacityOf(stage.settings)));
+tour.addEventListener("fade", () => parts?.soft.showOpacity(opacityOf(stage.settings)));
 editTour(tour, say);
 renderTours(tour, say);
 
@@ -299,36 +209,16 @@ stage.drag = document.querySelector("[name=drag]:checked").value; // browsers ke
 $("dataset").addEventListener("change", () => {
   location.hash = query({dataset: $("dataset").value, layer: $("layer").value});
 });
-$("views").addEventListener("change", () => {
-  const view = $("views").value;
-  if (stage.dataset) stage.setCamera(view ? named(stage.dataset, {view}, stage.size) : stage.home);
+views.addEventListener("choose", ({detail: view}) => {
+  const wanted = view ? named(dataset, {view: view.name}, stage.size) : {};
+  show({...parts.picture.read(), ...wanted});
+  stage.set(readSettings());
+  stage.setCamera(view ? {eye: wanted.eye, target: wanted.target, up: wanted.up, fov: wanted.fov} : stage.home);
 });
 $("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
-const SIDES = ["top", "front", "side"];
-let round = null; // the camera before it looked from a side
-/** Which side it looks from, or null. */
-function side() {
-  const towards = ({eye, target}) => unit(sub(target, eye)).map((x) => Number(x.toFixed(6)) + 0);
-  const from = (name) => same(towards(stage.camera), towards(fromSide(stage.camera, name, stage.home)));
-  return (stage.camera.flat && SIDES.find(from)) || null;
-}
-for (const name of SIDES)
-  $(name).addEventListener("click", () => {
-    if (!stage.dataset) return;
-    const now = stage.camera;
-    if (!now.flat) round = now;
-    const {eye, target, up, fov} = round ?? stage.home; // whence it is left again
-    const scale = distance(now) / distance({eye, target});
-    if (side() !== name) stage.setCamera(fromSide(now, name, stage.home));
-    else stage.setCamera({eye: add(now.target, sub(eye, target).map((x) => x * scale)), target: now.target, up, fov});
-  });
-stage.addEventListener("camera", () => {
-  const seen = side();
-  for (const name of SIDES) $(name).ariaPressed = String(name === seen);
-});
+attachSides(stage, $);
 $("link").addEventListener("click", () => copied(location.href, "Link"));
 $("curl").addEventListener("click", () => stage.dataset && copied(curl(stage.url(), stage.settings.layer), "Command"));
-$("clear").addEventListener("click", () => points.clear());
 $("token").addEventListener("submit", (event) => {
   event.preventDefault();
   setToken($("token").querySelector("input").value);

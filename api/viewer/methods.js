@@ -36,7 +36,7 @@ export const counts = ({name, textures, maps, primitives}, method, dataset) =>
 /** What of a view's setting picks take, so that they find what the picture shows: its method, and what changes what is
  * seen where. */
 export function pickable(setting) {
-  const names = ["method", "soft", ...table.parameters.filter(({textures, colors}) => !textures && !colors).map(({name}) => name)];
+  const names = ["method", "clip", "class", "soft", ...table.parameters.filter(({textures, colors}) => !textures && !colors).map(({name}) => name)];
   return Object.fromEntries(names.filter((name) => name in setting).map((name) => [name, setting[name]]));
 }
 

@@ -2,24 +2,43 @@
 // here thinks; and by the names that the dataset's views have.
 
 import {fitted} from "./camera.js";
-import {Problem, askJson, query} from "./service.js";
+import {Problem, ask, askJson, query} from "./service.js";
 
 /** `wanted` with eye and target in the world; they are in its coordinate system `crs` where it names one. */
 export async function toWorld(dataset, {crs, ...wanted}) {
   if (!crs) return wanted;
+  const clip = wanted.clip && (await clipToWorld(dataset, crs, wanted));
   const find = async (name) => {
     const place = await askJson(`${dataset.uri}/place?${query({crs, position: wanted[name]})}`);
     return [name, place.world];
   };
   const named = ["eye", "target"].filter((name) => wanted[name]);
-  return {...wanted, ...Object.fromEntries(await Promise.all(named.map(find)))};
+  return {...wanted, ...(clip && {clip}), ...Object.fromEntries(await Promise.all(named.map(find)))};
 }
 
-/** The camera of the view that `wanted` names, in an image of this size; nothing where it names none. */
+/** What is cut away as the service says that it has understood it. */
+async function clipToWorld(dataset, crs, {eye, target, clip}) {
+  const reply = await ask(`${dataset.view}?${query({crs, eye, target, clip})}`, {method: "HEAD"}),
+    said = reply.headers.get("Splatd-Clip");
+  if (!said) throw new Problem("refused", "What is cut away is too long to be turned into the dataset's coordinates");
+  return JSON.parse(said).clip.join(" and ");
+}
+
+/** Camera and settings of the view that `wanted` names, in an image of this size; nothing where it names none. */
 export function named(dataset, {view: name}, size) {
   if (name === undefined) return {};
   const view = dataset.views.find((one) => one.name === name);
   if (!view) throw new Problem("gone", `${dataset.id} has no view '${name}'`);
-  const {eye, target, up, fov} = view;
-  return {eye, target, up, fov: fitted([fov, fov], size)};
+  const {eye, target, up, fov, settings} = view;
+  const text = (value, joint) => [value].flat().join(joint);
+  return {
+    ...settings,
+    ...(settings?.clip && {clip: text(settings.clip, " and ")}),
+    ...(settings?.soft && {soft: text(settings.soft, " or ")}),
+    ...(settings && "class" in settings && {class: text(settings.class, ",")}),
+    eye,
+    target,
+    up,
+    fov: fitted([fov, fov], size),
+  };
 }

@@ -63,9 +63,19 @@ export async function download(path, name) {
   if (link.href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-/** Parameters of a view as a query, vectors joined by commas; what is null or "" is left out. */
+/** Saves a text as a file. */
+export function save(text, type, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], {type}));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** Parameters of a view as a query, vectors joined by commas, texts of a list one by one; what is null or "" is left out. */
 export function query(params) {
   return Object.entries(params)
+    .flatMap(([name, value]) => (typeof value?.[0] === "string" && Array.isArray(value) ? value.map((one) => [name, one]) : [[name, value]]))
     .filter(([, value]) => value != null && value !== "")
     .map(([name, value]) => `${name}=${[value].flat().map(encodeURIComponent).join(",")}`)
     .join("&");

@@ -63,10 +63,8 @@ function namedKinds(text, kinds) {
   return named.includes(null) ? null : named;
 }
 
-/** What a class of a scan is, by ASPRS; a dataset's own numbers have no name. */
-const CLASSES = ["not classified", "unclassified", "ground", "low vegetation", "medium vegetation", "high vegetation",
-  "building", "low noise", , "water", "rail", "road", , "guard wire", "wire", "tower", "connector", "bridge", "high noise"];
-const nameOf = ({name}, value) => (name === "class" && CLASSES[value] ? `${value} ${CLASSES[value]}` : `${value}`);
+/** A class has the name that the service has for it. */
+const nameOf = ({name}, value) => (name ? `${value} ${name}` : `${value}`);
 
 /** As a share is read: 0.4 %, 12 %. */
 const percent = (share) => `${(100 * share).toFixed(share > 0 && share < 0.1 ? 1 : 0)} %`;
@@ -228,10 +226,11 @@ export class Soft extends EventTarget {
   list(attribute) {
     const {values} = attribute;
     $("soft-kinds").replaceChildren(
-      ...values.kinds.map(({value, count}) => {
+      ...values.kinds.map((kind) => {
+        const {value, count} = kind;
         const [label, box] = [document.createElement("label"), document.createElement("input")];
         Object.assign(box, {type: "checkbox", value});
-        label.append(box, ` ${nameOf(attribute, value)} `, Object.assign(document.createElement("small"), {
+        label.append(box, ` ${nameOf(kind, value)} `, Object.assign(document.createElement("small"), {
           textContent: percent(count / values.count),
         }));
         return label;

@@ -7,7 +7,7 @@
 
 import {fitted, fromParams, params, rounded, same, warp} from "./camera.js";
 import {Problem, ask, query} from "./service.js";
-import {softOf} from "./soft_setting.js";
+import {keptOf} from "./soft_setting.js";
 
 const REST_MS = 160;
 const COARSE = {auto: {budget: "60ms"}, half: {supersample: 0.5}, quarter: {supersample: 0.25}, full: {}};
@@ -114,12 +114,26 @@ export class Stage extends EventTarget {
 
   /** Asks for a full frame of what is there now. */
   refresh() {
+    this.paint();
     this.version++;
     this.unblock();
     if (this.shown) this.shown.full = false;
     if (this.flight) this.flight.abort.abort();
     this.bend();
     this.pump();
+  }
+
+  /** What lies around a picture has its background. */
+  paint() {
+    const {background = ""} = this.settings,
+      hex = background.match(/^(?:#|0x)?([\da-f]{6}|[\da-f]{8})$/i);
+    this.element.style.setProperty("--ground", hex ? `#${hex[1]}` : background);
+  }
+
+  /** Changes them as part of a motion of something else than the camera. */
+  slide(settings) {
+    this.drift(settings);
+    if (this.dataset) this.setCamera(this.camera);
   }
 
   /** What was refused for good may be asked again once something is different. */
@@ -147,7 +161,7 @@ export class Stage extends EventTarget {
     // A budget chooses the rest, but in motion not the method nor how it fills: what changes from frame to frame flickers.
     const {lod, supersample, atoms, ...kept} = setting;
     let quality = {...setting, ...(full ? {} : coarse)};
-    if (full && budget) quality = {budget, ...softOf(setting)};
+    if (full && budget) quality = {budget, ...keptOf(setting)};
     else if (!full && coarse.budget) quality = {...kept, ...coarse};
     return {
       ...params(rounded(this.camera), 1000 * this.least),
@@ -155,7 +169,7 @@ export class Stage extends EventTarget {
       height: Math.max(1, Math.floor(height * ratio)),
       layer,
       ...quality,
-      background: getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
+      background: this.settings.background ?? getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
       format: "jpeg",
     };
   }

@@ -1,5 +1,7 @@
 // The list of keyframes and its buttons.
 
+import {save} from "./service.js";
+
 const $ = (id) => document.getElementById(id);
 
 function button(label, name, action, disabled = false) {
@@ -78,11 +80,7 @@ export function editTour(tour, say) {
   $("play").addEventListener("click", () => (tour.playing ? tour.stop() : tour.play()));
   $("closed").addEventListener("change", () => tour.setClosed($("closed").checked));
   $("download").addEventListener("click", () => {
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([JSON.stringify(tour.document(), null, 1)], {type: "application/json"}));
-    link.download = `${tour.stage.dataset.id}-tour.json`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    save(JSON.stringify(tour.document(), null, 1), "application/json", `${tour.stage.dataset.id}-tour.json`);
   });
   tour.stage.element.addEventListener("pointerdown", () => tour.stop());
 }

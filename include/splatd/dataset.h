@@ -60,11 +60,12 @@ struct spl_stream_values {
 };
 
 /* A view that somebody has put down under a name: at most 63 letters, digits, '.', '_' and '-', the first no '.'. */
-enum { SPL_VIEW_NAME_BYTES = 64, SPL_SAVED_VIEWS_MAX = 64 };
+enum { SPL_VIEW_NAME_BYTES = 64, SPL_SAVED_VIEWS_MAX = 64, SPL_VIEW_SETTINGS_BYTES = 1024 };
 struct spl_saved_view {
     char name[SPL_VIEW_NAME_BYTES];
     double eye[3], target[3], up[3]; /* world */
     double fov; /* degrees, vertical; across where an image is narrower than high */
+    char settings[SPL_VIEW_SETTINGS_BYTES]; /* what of the dataset it shows and how, as a JSON object; "" = all, as ever */
 };
 
 struct spl_dataset_info {

@@ -48,6 +48,24 @@ static int get_vector(const json_t *json, const char *name, double out[3], struc
                                  array ? "" : ", and is missing");
 }
 
+/* As short as JSON is, keys in one order: equal settings are equal texts. */
+static int get_settings(const json_t *json, struct spl_saved_view *view, struct spl_error *err)
+{
+    if (!json || (json_is_object(json) && !json_object_size(json)))
+        return SPL_OK;
+    if (!json_is_object(json))
+        return spl_fail_field(err, SPL_E_INPUT, "settings", "settings must be an object of a view's parameters");
+    const size_t length = json_dumpb(json, view->settings, sizeof view->settings - 1,
+                                     JSON_COMPACT | JSON_SORT_KEYS | JSON_REAL_PRECISION(17));
+    if (length && length < sizeof view->settings) {
+        view->settings[length] = '\0';
+        return SPL_OK;
+    }
+    view->settings[0] = '\0';
+    return spl_fail_field(err, SPL_E_INPUT, "settings", "settings have %zu bytes; %d are taken", length,
+                          SPL_VIEW_SETTINGS_BYTES - 1);
+}
+
 int spl_saved_view_from_json(const json_t *json, const double up[3], bool named, bool strict,
                              struct spl_saved_view *view, struct spl_error *err)
 {
@@ -60,10 +78,10 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
     json_object_foreach((json_t *)json, key, value)
     {
         bool known = !strcmp(key, "eye") || !strcmp(key, "target") || !strcmp(key, "up") || !strcmp(key, "fov") ||
-                     (named && !strcmp(key, "name"));
+                     !strcmp(key, "settings") || (named && !strcmp(key, "name"));
         if (strict && !known)
             return spl_fail_field(err, SPL_E_INPUT, key,
-                                  "unknown field '%.60s' of a saved view; known are eye, target, up and fov", key);
+                                  "unknown field '%.60s' of a saved view; known are eye, target, up, fov and settings", key);
     }
     const json_t *fov = json_object_get(json, "fov"), *name = json_object_get(json, "name");
     if (named && (!json_is_string(name) || json_string_length(name) >= sizeof view->name))
@@ -81,6 +99,8 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
         return spl_fail_field(err, SPL_E_INPUT, "fov", "fov must be a number of degrees");
     if (fov)
         view->fov = json_number_value(fov);
+    if ((rc = get_settings(json_object_get(json, "settings"), view, err)))
+        return rc;
     return spl_saved_view_check(view, named, err);
 }
 
@@ -131,8 +151,14 @@ static json_t *vector(const double v[3])
 
 json_t *spl_saved_view_to_json(const struct spl_saved_view *view)
 {
-    return json_pack("{s:s, s:o, s:o, s:o, s:f}", "name", view->name, "eye", vector(view->eye), "target",
-                     vector(view->target), "up", vector(view->up), "fov", view->fov);
+    json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:f}", "name", view->name, "eye", vector(view->eye), "target",
+                             vector(view->target), "up", vector(view->up), "fov", view->fov);
+    if (json && view->settings[0] &&
+        json_object_set_new(json, "settings", json_loads(view->settings, 0, NULL))) {
+        json_decref(json);
+        return NULL;
+    }
+    return json;
 }
 
 json_t *spl_saved_views_to_json(const struct spl_saved_view *views, uint32_t count)

@@ -18,8 +18,9 @@ bool spl_view_name_is_valid(const char *name);
  * `named`, name. */
 int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct spl_error *err);
 
-/* {"eye": [3], "target": [3], "up": [3], "fov": degrees}; up and fov may be left out: `up`, 60. "name" is read where
- * `named`, and must be there. Other keys are refused by name where `strict`. SPL_E_INPUT names the key. */
+/* {"eye": [3], "target": [3], "up": [3], "fov": degrees, "settings": {}}; up, fov and settings may be left out: `up`, 60,
+ * none. What settings say is the service's to know. "name" is read where `named`, and must be there. Other keys are refused
+ * by name where `strict`. SPL_E_INPUT names the key. */
 int spl_saved_view_from_json(const json_t *json, const double up[3], bool named, bool strict,
                              struct spl_saved_view *view, struct spl_error *err);
 

@@ -8,6 +8,7 @@
 #include <stddef.h>
 
 #include <splatd/camera.h>
+#include <splatd/dataset.h>
 
 #include "base/error.h"
 #include "geom/distortion.h"
@@ -35,7 +36,8 @@ enum spl_value_place {
     SPL_PICK_BODY = 16,
     SPL_PLACE = 32,
     SPL_THUMBNAIL = 64,
-    SPL_TILE = 128
+    SPL_TILE = 128,
+    SPL_SAVED = 256
 };
 
 enum spl_camera_param {
@@ -66,7 +68,7 @@ struct spl_camera_places {
 /* Who knows a dataset's views by name. */
 struct spl_camera_defaults;
 struct spl_camera_names {
-    /* Puts the view into eye, target, up, fov and fit of `out`. SPL_E_INPUT, field "view", where there is none. */
+    /* Puts the view into eye, target, up, fov, fit and settings of `out`. SPL_E_INPUT, field "view", where there is none. */
     int (*find)(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
                 struct spl_error *err);
 };
@@ -77,6 +79,7 @@ struct spl_camera_defaults {
     double fit[2]; /* degrees across and upright that an image of any shape shows; 0 = fov in all of them */
     const struct spl_camera_places *places; // may be NULL: nothing is known but the world
     const struct spl_camera_names *names;   // may be NULL: there are none
+    char settings[SPL_VIEW_SETTINGS_BYTES]; /* of the view by its name, beside its camera: a JSON object, or "" */
 };
 
 /* Caps on an image's size; no camera can lift them. What more there is to an image than its camera is judged by those

@@ -2,6 +2,7 @@
 dataset: its surface is x = 0.2 sin(y), so that coordinates can be checked."""
 import base64
 import contextlib
+import csv
 import http.server
 import json
 import math
@@ -261,7 +262,7 @@ def test_clicks_give_coordinates_and_a_distance():
         time.sleep(0.4)  # not a double click
         tab.run("document.querySelector('#stage').focus()")
         tab.key("Enter")
-        tab.until("document.querySelectorAll('#points dd').length === 3")
+        tab.until("document.querySelectorAll('#points dd').length === 2")
         had = tab.run("[...document.querySelectorAll('#attributes dt')].map(e => e.textContent)")
         assert had == [a["name"] for a in daemon.ask("/v1/datasets/wall").json()["attributes"]] and had, had
         assert tab.run("[...document.querySelectorAll('#primitive dd')].map(e => e.textContent)") == ["splat"]
@@ -273,13 +274,13 @@ def test_clicks_give_coordinates_and_a_distance():
         said = tab.text("#said")
         told = float(re.search(r"distance ([\d.]+) us-ft$", said).group(1))
         assert abs(told - far(a, b)) < 0.003, (said, a, b)
-        assert tab.text(".marks text") == f"{said.rpartition('distance ')[2]}"
+        assert tab.text("#marks text") == f"{said.rpartition('distance ')[2]}"
         assert re.search(r"[\d.]+ × [\d.]+ × [\d.]+ us-ft, drawn", tab.text("#about")), tab.text("#about")
-        circle = tab.run("+document.querySelector('.marks circle').getAttribute('cx')")
+        circle = tab.run("+document.querySelector('#marks circle').getAttribute('cx')")
         tab.drag((x, y), (x + 50, y))
-        assert tab.run("+document.querySelector('.marks circle').getAttribute('cx')") != circle
+        assert tab.run("+document.querySelector('#marks circle').getAttribute('cx')") != circle
         tab.key("Escape")
-        tab.until("!document.querySelector('.marks').children.length && document.querySelector('#clear').disabled")
+        tab.until("!document.querySelector('#marks').children.length && document.querySelector('#clear').disabled")
         settled(tab)
         before = link(tab)
         tab.click(x + 60, y - 40, times=2)
@@ -446,7 +447,7 @@ def test_everything_has_a_name_and_takes_the_focus():
         assert ("spinbutton", "Seconds after keyframe 1") in names and ("combobox", "Layer") in names
         tab.run("document.activeElement.blur()")
         seen = set()
-        for _ in range(60):
+        for _ in range(90):
             tab.key("Tab")
             seen.add(tab.run("(e => { e.mark ??= Math.random(); return e.mark; })(document.activeElement)"))
             visible = tab.run(
@@ -578,6 +579,7 @@ def test_the_chart_has_the_frame_on_it():
             )
         )
         with Daemon(REAL, datasets=[str(dataset)]) as other, page(f"http://127.0.0.1:{other.port}/") as tab:
+            tab.run("document.querySelector('#advanced').open = true")
             tab.press_on("#accuracy")
             tab.until(
                 "document.querySelector('#chart img').naturalWidth > 0 && !document.querySelector('.here').hidden"
@@ -852,7 +854,7 @@ def test_a_method_that_the_page_has_never_heard_of():
 
 # As the service describes an attribute whose values it knows: many small ones and a long tail, and a class of two.
 SPREAD = {"count": 1600, "p99": 0.08, "kinds": None, "quantiles": [0.1 * (i / 64) ** 4 for i in range(65)]}
-CLASSES = {"count": 1600, "p99": 5, "kinds": [{"value": 2, "count": 1200}, {"value": 5, "count": 400}],
+CLASSES = {"count": 1600, "p99": 5, "kinds": [{"value": 2, "count": 1200, "name": "ground"}, {"value": 5, "count": 400, "name": "high vegetation"}],
            "quantiles": [2] * 49 + [5] * 16}
 
 
@@ -949,6 +951,206 @@ def test_what_is_soft():
         tab.choose("#soft-what", "")
         next_link(tab, lambda now: "of" not in now and not any(name.startswith("soft") for name in now))
         assert not tab.run("document.querySelector('#control-of').offsetHeight")
+
+
+TERM = "z<1.5 and !polygon:5,5,6,5,6,6"
+ROUND = "document.querySelector('#handles')"
+
+
+def sent(tab):
+    """The parameters of the newest view that was asked for."""
+    return dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(tab.run(VIEWS)[-1][0]).query))
+
+
+def test_what_the_link_says_of_what_is_drawn_is_kept():
+    """Text, planes and background: in every frame, with a budget, in picks, curl, the link, and in a frame of another page."""
+    kept = {"clip": TERM, "near": "0.5", "far": "9", "background": "ffeedd"}
+    said = f"clip=z%3C1.5&clip=!polygon:5,5,6,5,6,6&near=0.5&far=9&background=ffeedd"
+    with page(f"{SITE}/{FACING}&{said}") as tab:
+        assert kept.items() <= sent(tab).items() and kept.items() <= link(tab).items(), (sent(tab), link(tab))
+        assert tab.run("document.querySelector('#clip-rest').value") == TERM and tab.run("document.querySelector('#clip').open")
+        assert tab.run("getComputedStyle(document.querySelector('#stage')).backgroundColor") == "rgb(255, 238, 221)"
+        tab.choose("#budget", "500ms")
+        next_link(tab, lambda now: now.get("budget"))
+        assert kept.items() <= sent(tab).items() and kept.items() <= link(tab).items(), (sent(tab), link(tab))
+        x, y = middle(tab)
+        tab.click(x, y)
+        tab.until("document.querySelectorAll('#points dd').length === 1")
+        pick = tab.run("performance.getEntriesByType('resource').map(e => e.name).filter(n => n.includes('/pick?'))")[-1]
+        assert {"clip": TERM, "near": "0.5", "far": "9"}.items() <= dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(pick).query)).items()
+        tab.click(x, y - 200)  # what is cut away is not there
+        tab.until("document.querySelector('#said').textContent === 'Nothing there'")
+        command = tab.run("""(async () => { let said; navigator.clipboard.writeText = async (text) => { said = text; };
+            document.querySelector('#curl').click(); await new Promise(done => setTimeout(done, 50)); return said; })()""")
+        assert urllib.parse.quote(TERM, safe=",!") in command and "background=ffeedd" in command, command
+        tab.press_on("#clip-clear")
+        next_link(tab, lambda now: "clip" not in now and now["background"] == "ffeedd")
+    with page(f"{SITE}/embed/wall{FACING.replace('dataset=wall&', '')}&{said}&mark=0,0,1,The%20%3Cb%3Ewall", size=(400, 300)) as tab:
+        assert kept.items() <= sent(tab).items(), sent(tab)
+        assert tab.text(".marks text") == "The <b>wall"
+
+
+def test_a_clip_box_has_handles():
+    handle = "document.querySelectorAll('.handle')[{}].getBoundingClientRect()"
+    with page(f"{SITE}/{FACING}", size=(1280, 800)) as tab:
+        digest = settled(tab)
+        assert tab.run(f"{ROUND}.hidden")
+        tab.run("document.querySelector('#box-on').click()")
+        box = next_link(tab, lambda now: "clip" in now)["clip"]
+        x0, y0, z0, x1, y1, z1 = map(float, re.fullmatch(r"box:([-\d.,]+)", box)[1].split(","))
+        digest = settled(tab, digest)
+
+        def at(i):
+            return tab.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({handle.format(i)})")
+        x, y = at(3)  # high y, at the right
+        focal = 400 / math.tan(math.radians(25))
+        tab.drag((x, y), (x - 80, y), hold=f"!{ROUND}.hidden")
+        moved_box = next_link(tab, lambda now: now.get("clip") not in (None, box))["clip"]
+        now = list(map(float, moved_box[4:].split(",")))
+        assert now[:4] == [x0, y0, z0, x1] and now[5] == z1 and abs(y1 - now[4] - 80 / focal * (3 - (x0 + x1) / 2)) < 0.02, (box, moved_box)
+        assert settled(tab, digest) and abs(at(3)[0] - (x - 80)) < 2, "it is where it was dragged to"
+        tab.run("document.querySelectorAll('.handle')[5].focus()")
+        tab.key("ArrowDown")
+        lower = float(next_link(tab, lambda link: link["clip"] != moved_box)["clip"].split(",")[5])
+        assert lower < z1 and tab.run("document.activeElement.getAttribute('aria-valuetext')") == f"{lower:.3f} us-ft"
+        assert ("slider", "High z face of the clip box") in tab.names()
+        tab.choose("#box-keep", "outside")
+        assert next_link(tab, lambda link: link["clip"][0] == "!")
+        tab.run("(e => { e.value = 30; e.dispatchEvent(new Event('input')); })(document.querySelector('#box-turn'))")
+        turned = next_link(tab, lambda link: link["clip"].endswith(",30"))["clip"]
+        assert not daemon.view(width=8, height=8, clip=turned).status != 200
+        tab.choose("#clip-rest", "z<1.8")
+        url = next_link(tab, lambda link: link["clip"] == f"{turned} and z<1.8") and tab.run("location.href")
+        settled(tab)
+    with page(url, size=(390, 844), phone=True) as tab:
+        assert tab.run("[document.querySelector('#box-keep').value, document.querySelector('#box-turn').value]") == ["outside", "30"]
+        x, y = tab.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({handle.format(4)})")
+        tab.touch([(x, y)], [(x, y - 15)], [(x, y - 40)])
+        higher = next_link(tab, lambda link: link["clip"].split(" and ")[0] != turned)["clip"]
+        assert float(higher.split(",")[2]) > float(turned.split(",")[2]) and far(link(tab)["eye"], (3, 0, 1)) < 1e-3, "the view stays"
+        tab.choose("#section-axis", "z")
+        assert re.search(r" and z:[\d.]+\.\.[\d.]+ and z<1.8$", next_link(tab, lambda link: " and z:" in link["clip"])["clip"])
+        tab.choose("#section-thick", "0.4")
+        tab.run("(e => { e.value = 1; e.dispatchEvent(new Event('input')); })(document.querySelector('#section-at'))")
+        next_link(tab, lambda link: any(abs(float(found[1]) - 0.8) < 0.02 and abs(float(found[2]) - 1.2) < 0.02
+                                        for found in [re.search(r"z:([\d.]+)\.\.([\d.]+)", link["clip"])] if found))
+        tab.choose("#section-axis", "view")
+        assert "-0.2<plane:" in next_link(tab, lambda link: "plane:" in link["clip"])["clip"]
+        assert tab.run("document.documentElement.scrollWidth <= innerWidth")
+        tab.press_on("#clip-clear")
+        next_link(tab, lambda link: "clip" not in link)
+        assert tab.run(f"{ROUND}.hidden")
+        again = """import('/viewer/clip_terms.js').then(({parseClip, formatClip}) => JSON.parse('%s').map(text =>
+            formatClip(parseClip(text), 3, [0, 0, 0])))"""
+        texts = ["box:0,0,0,1,2,3", "!box:0,0,0,1,2,3,-12.5", "z:1..2", "-1<plane:1,2,3,0,0,1<1", "z<2 or x>1", "!z:1..2", "box:0,0,0,0,1,1",
+                 "box:0,0,0,1,1,1 and box:2,0,0,3,1,1 and z:0..1e+2"]
+        assert tab.run(again % json.dumps(texts)) == [*texts[:3], "-1<plane:0,0,3,0,0,1<1", *texts[4:7], "box:0,0,0,1,1,1 and z:0..100 and box:2,0,0,3,1,1"]
+
+
+def rows(tab, which):
+    return dict(tab.run(f"[...document.querySelectorAll('{which} dt')].map(e => [e.textContent, e.nextElementSibling.textContent])"))
+
+
+def test_classes_measures_annotations_and_views():
+    """Of a floor of 20 x 10 m with a step of 1 m on it, in a directory: its views may be saved."""
+    evil = "=1+1,\"<img src=x onerror=alert(1)>\""
+    with tempfile.TemporaryDirectory() as folder:
+        home = pathlib.Path(folder, "home")
+        home.mkdir()
+        scan = pathlib.Path(folder, "scan.csv")
+        scan.write_text("x,y,z,class\n" + "".join(f"{x / 4},{y / 4},{int(x > 60)},{6 if x > 60 else 2}\n" for x in range(81) for y in range(41)))
+        subprocess.run([REAL, "pack", scan, "-o", home / "site.spld"], check=True, capture_output=True)
+        tokens = pathlib.Path(folder, "tokens")
+        tokens.write_text("a-token-of-the-tests view,admin\n")
+        tokens.chmod(0o600)
+        chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
+        with Daemon(REAL, "--tokens", str(tokens), datasets=[str(home)]) as other:
+            above = "eye=10,5,30&target=10,5,0&up=0,1,0&projection=orthographic&view_height=12"
+            site = f"http://127.0.0.1:{other.port}"
+            keep = "sessionStorage.setItem('splatd-token', 'a-token-of-the-tests')"
+            with page(f"{site}/#dataset=site&{above}&color_by=class", size=(1280, 800), before=keep) as tab:
+                digest = settled(tab)
+                tab.until("document.querySelector('#colors-legend').naturalWidth > 0")
+                assert tab.run("document.querySelector('#colors-legend').alt") == "Legend: colours show class"
+                labels = tab.run("[...document.querySelectorAll('#classes-list label')].map(e => e.textContent.trim())")
+                assert labels == ["2 ground 75 %", "6 building 25 %"], labels
+                assert tab.run("getComputedStyle(document.querySelector('#classes-list i')).backgroundColor") == "rgb(170, 85, 0)"
+                tab.run("document.querySelector('#classes-list input[value=\"6\"]').click()")
+                assert next_link(tab, lambda now: "class" in now)["class"] == "!6"
+                assert settled(tab, digest) and sent(tab)["class"] == "!6"
+                tab.run("document.querySelector('#classes').open = true")
+                tab.press_on("#classes-none")
+                next_link(tab, lambda now: now["class"] == "!2,6")
+                tab.run("location.hash = location.hash.replace(/class=[^&]*$|class=![^&]*/, 'class=6')")
+                tab.until("document.querySelectorAll('#classes-list :checked').length === 1")
+                tab.run("document.querySelector('#classes-list input[value=\"2\"]').click()")
+                next_link(tab, lambda now: "class" not in now)
+                settled(tab)
+                width, height = tab.run("[document.querySelector('#stage').clientWidth, document.querySelector('#stage').clientHeight]")
+                metre = height / 12
+                for i, (px, py) in enumerate(((8, 4), (12, 4), (12, 7))):
+                    tab.click(width / 2 + (px - 10) * metre, height / 2 - (py - 5) * metre)
+                    tab.until(f"document.querySelectorAll('#points dd').length === {i + 1}")
+                    time.sleep(0.4)  # not a double click
+                number = {name: float(text.split()[0].rstrip("°")) for name, text in rows(tab, "#measures").items()}
+                assert abs(number["Length"] - 7) < 0.02 and abs(number["B – C"] - 3) < 0.02 and abs(number["In plan, A – C"] - 5) < 0.02, number
+                assert rows(tab, "#attributes")["class"] == "2 ground" and rows(tab, "#surface")["normal"].endswith("1.000")
+                assert "length 7.0" in tab.text("#said") and tab.run("document.querySelector('#said').ariaLive") == "polite"
+                tab.choose("#measure", "angle")
+                assert abs(float(rows(tab, "#measures")["Angle at B"].rstrip("°")) - 90) < 0.3
+                tab.choose("#measure", "area")
+                area = rows(tab, "#measures")["Area"]
+                assert abs(float(area.split()[0]) - 6) < 0.05 and area.split()[1] in ("m²", "unit²"), area
+                tab.run(f"document.querySelector('#mark-name').value = {json.dumps(evil)}")
+                tab.press_on("#mark-add")
+                assert tab.text("#annotations strong") == evil == tab.text("#names text") and not tab.run("document.querySelector('#annotations img')")
+                now = link(tab)["mark"].split(",", 3)
+                assert now[3] == evil and far(list(map(float, now[:3])), (12, 7, 0)) < 0.05, now
+                tab.press_on("#csv")
+                table = list(csv.DictReader(appeared(folder, "site-points.csv").read_text().splitlines()))
+                assert [row["kind"] for row in table] == ["point"] * 3 + ["annotation"] + ["measure"] * 3, table
+                assert table[3]["name"] == "'" + evil and table[0]["class"] == "2" and abs(float(table[1]["x"]) - 12) < 0.02, table
+                assert table[4]["name"] == "Area" and abs(float(table[4]["value"]) - 6) < 0.05 and table[4]["unit"].endswith("²")
+                tab.press_on("#geojson")
+                made = json.loads(appeared(folder, "site-points.geojson").read_text())
+                assert "not longitude" in made["note"] and "not longitude" in tab.text("#said"), "a scan without a coordinate system"
+                kinds = [feature["geometry"]["type"] for feature in made["features"]]
+                assert kinds == ["Point"] * 4 + ["Polygon"] and made["features"][3]["properties"]["name"] == evil
+                ring = made["features"][4]["geometry"]["coordinates"][0]
+                assert ring[0] == ring[-1] and len(ring) == 4 and sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, ring[1:])) > 0
+                tab.choose("#clip-rest", "x<18")
+                tab.choose("#shade", "edl")
+                settled(tab)
+                tab.run("document.querySelector('#advanced').open = true; document.querySelector('#view-name').value = 'from-above'")
+                tab.press_on("#saving button")
+                tab.until("document.querySelector('#said').textContent === 'Saved as from-above'")
+                assert not tab.run("document.querySelector('#views-label').hidden")
+                url = tab.run("location.href")
+            auth = {"Authorization": "Bearer a-token-of-the-tests"}
+            [view] = other.ask("/v1/datasets/site", headers=auth).json()["views"]
+            assert view["settings"] == {"clip": "x<18", "color_by": "class", "shade": "edl"}, view
+            with page(f"{site}/#dataset=site&view=from-above", before=keep) as tab:
+                assert view["settings"].items() <= sent(tab).items() and tab.run("document.querySelector('#clip-rest').value") == "x<18"
+                tab.choose("#views", "")
+                next_link(tab, lambda now: "clip" not in now)
+                tab.choose("#views", "from-above")
+                next_link(tab, lambda now: now.get("clip") == "x<18" and now.get("shade") == "edl")
+            with page(url, before=keep) as tab:
+                assert tab.text("#annotations strong") == evil and link(tab)["clip"] == "x<18"
+                tab.press_on("#annotations button")
+                assert "mark" not in link(tab) and not tab.text("#names")
+
+
+def test_geojson_in_degrees():
+    if os.environ["SPLATD_PROJ"] != "1":
+        return
+    with tempfile.TemporaryDirectory() as folder, page(f"{SITE}/{FACING}&mark=0,0,1,here") as tab:
+        chromium.send("Browser.setDownloadBehavior", behavior="allow", downloadPath=folder)
+        tab.press_on("#geojson")
+        made = json.loads(appeared(folder, "wall-points.geojson").read_text())
+        [feature] = made["features"]
+        assert "note" not in made and feature["properties"]["world"] == [0, 0, 1]
+        assert far(feature["geometry"]["coordinates"], list(map(float, lonlat((0, 0, 1)).split(",")))) < 1e-6, feature
 
 
 def test_a_tour_keeps_and_fades_what_is_soft():

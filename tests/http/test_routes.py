@@ -518,6 +518,10 @@ def test_openapi_knows_every_parameter_and_route():
     assert listed["pick"] == {name for name, _, places in rows if "PICK" in places} | camera
     assert listed["getTile"] == {name for name, _, places in rows if "TILE" in places}
     assert schemas["ViewRequest"] == {name for name, _, places in rows if "BODY" in places} | {"camera"}
+    assert listed["getThumbnail"] == {name for name, _, places in rows if "THUMBNAIL" in places}
+    saved = re.search(r"^    SavedSettings:\n(.*?)(?=^    \w)", text, re.M | re.S)[1]
+    kept = {row[0] for row in params if row[-1] in (*colors[1:], "SPL_CHANGES_SOFT")}
+    assert set(re.findall(r"^        (\w+):", saved, re.M)) == {name for name, _, places in rows if "SAVED" in places} | kept
     assert listed["showPlace"] == {name for name, _, places in rows if "PLACE" in places}
     assert schemas["Camera"] == {name for name, _, places in rows if "CAMERA" in places}
     assert all(f"Alias {alias}." in text for _, alias, _ in rows if alias)

@@ -151,6 +151,64 @@ def test_views_are_saved_and_last():
             assert list(home.iterdir()) == []
 
 
+def test_a_saved_view_keeps_what_it_shows():
+    size = "width=64&height=48"
+    shows = {"clip": ["z<1.2", "!box:0,0,0,1,1,1"], "class": "!7", "color_by": "height", "ramp": "turbo", "range": "0..2",
+             "shade": "edl", "background": "white"}
+    with serving(binary=REAL, files=(WALL,)) as (home, start):
+        with start() as d:
+            plain = get(d, f"view=door&{size}&eye=3,0,1&target=0,0,1&fov=50")
+            assert plain.status == 400 and plain.json()["field"] == "view"
+            put(d, "plain", DOOR)
+            reply = put(d, "door", {**DOOR, "settings": shows})
+            assert reply.status == 201 and reply.json() == {"name": "door", **DOOR, "settings": shows, "from": "service"}, reply.body
+            assert "settings" not in views(d)["plain"] and views(d)["door"]["settings"] == shows
+        with start() as d:  # another process reads the file
+            named = get(d, f"view=door&{size}")
+            said = "clip=z%3C1.2&clip=!box:0,0,0,1,1,1&class=!7&color_by=height&ramp=turbo&range=0..2&shade=edl&background=white"
+            spelt = get(d, f"eye=3,0,1&target=0,0,1&fov=50&up=0,0,1&{size}&{said}")
+            assert named.body == spelt.body and named.headers["ETag"] == spelt.headers["ETag"], (named.headers, spelt.headers)
+            plain = get(d, f"view=plain&{size}")
+            assert plain.body != named.body and plain.headers["Splatd-Clip"] is None
+            other = get(d, f"view=door&{size}&clip=z%3C1&color_by=rgb")  # a request may say otherwise
+            assert json.loads(other.headers["Splatd-Clip"])["clip"] == ["z<1", "!class:7"], other.headers
+            body = {"view": "door", "width": 64, "height": 48, "clip": [], "class": []}
+            assert d.ask("/v1/datasets/wall/view", "POST", json.dumps(body), AUTH).headers["Splatd-Clip"] is None
+            pick = "/v1/datasets/wall/pick?x=32&y=16&width=64&height=48&view="
+            assert d.ask(pick + "plain", headers=AUTH).json()["position"][2] > 1.2
+            assert d.ask(pick + "door", headers=AUTH).json()["position"] is None
+            if os.environ["SPLATD_PROJ"] == "1":  # they are of the world whatever crs says
+                eye = d.ask("/v1/datasets/wall/place?crs=EPSG:4326&world=3,0,1", headers=AUTH).json()["position"]
+                far = get(d, f"view=door&{size}&crs=EPSG:4326&eye={','.join(map(repr, eye))}")
+                assert far.status == 200 and far.headers["Splatd-Clip"] == named.headers["Splatd-Clip"], far.body
+            for settings, field in [
+                ({"clip": "nonsense"}, "settings.clip"), ({"clip": "q0.5<intensity"}, "settings.clip"), ({"class": "a"}, "settings.class"),
+                ({"clip": "unheard_of:2"}, "settings.clip"), ({"color_by": "unheard_of"}, "settings.color_by"), ({"width": 9}, "settings.width"),
+                ({"lod": 2}, "settings.lod"), ({"nothing": 2}, "settings.nothing"), ("z<1", "settings"), ({"shade": "x"}, "settings.shade"),
+                ({"clip": "z<1 or " * 200 + "z<1"}, "settings"),
+            ]:
+                reply = put(d, "wrong", {**DOOR, "settings": settings})
+                assert reply.status == 400 and reply.json()["field"] == field, (settings, reply.body)
+            assert list(views(d)) == ["door", "plain"]
+        file = home / "wall.views.json"
+        saved = json.loads(file.read_text())
+        saved["views"][0]["settings"] = {"clip": "nonsense"}  # by hand
+        file.write_text(json.dumps(saved))
+        with start() as d:
+            wrong = get(d, f"view=door&{size}")
+            assert wrong.status == 400 and wrong.json()["field"] == "view" and "nonsense" in wrong.json()["detail"], wrong.body
+
+
+def test_thumbnails_show_what_is_kept():
+    with serving(binary=REAL, files=(WALL,)) as (home, start), start() as d:
+        def thumbnail(query):
+            return d.ask(f"/v1/datasets/wall/thumbnail.jpg?width=64{query}", headers=AUTH)
+        whole, part = thumbnail(""), thumbnail("&clip=z%3C1&class=!7")
+        assert whole.body != part.body and json.loads(part.headers["Splatd-Clip"])["clip"] == ["z<1", "!class:7"]
+        for wrong, field in (("&clip=nonsense", "clip"), ("&class=x", "class"), ("&color_by=height", "color_by")):
+            assert thumbnail(wrong).json()["field"] == field
+
+
 def test_a_saved_view_hides_one_of_the_pack():
     with tempfile.TemporaryDirectory() as folder:
         assert pack(folder, "--view", "low=eye=10,-9,2,target=10,5,0").returncode == 0

@@ -1,7 +1,9 @@
 /* Datasets as JSON. Owned by the loop's thread. */
+#include <math.h>
 #include <string.h>
 
 #include "dataset/dataset.h"
+#include "render/paint.h"
 #include "render/soft/suggest.h"
 #include "service/datasets/library.h"
 
@@ -85,8 +87,21 @@ static json_t *describe_maps(const struct spl_catalog_entry *entry)
                      count(atomic_load(&entry->maps_at_once)), "limit_bytes", count(atomic_load(&entry->limit_bytes)));
 }
 
+/* A value and how many have it; a class also as what pictures by class show of it. */
+static json_t *describe_kind(double value, uint64_t n, bool class)
+{
+    json_t *kind = json_pack("{s:f, s:o}", "value", value, "count", count(n));
+    const uint32_t number = (uint32_t)fmin(fmax(value, 0), SPL_PALETTE_COLORS - 1), color = spl_class_get_color(number);
+    const char *name = spl_class_get_name(number);
+    if (class) {
+        set(kind, "name", name ? json_string(name) : json_null());
+        set(kind, "color", json_sprintf("#%02x%02x%02x", color & 255, color >> 8 & 255, color >> 16 & 255));
+    }
+    return kind;
+}
+
 /* How an attribute's values are distributed, from which pages choose what is soft; null where the file does not say. */
-static json_t *describe_values(const struct spl_stream_values *values)
+static json_t *describe_values(const struct spl_stream_values *values, bool classes)
 {
     if (!values)
         return json_null();
@@ -94,8 +109,7 @@ static json_t *describe_values(const struct spl_stream_values *values)
     for (int i = 0; i <= SPL_VALUES_QUANTILES; i++)
         json_array_append_new(quantiles, json_real(values->quantiles[i]));
     for (uint32_t i = 0; i < values->kind_count; i++)
-        json_array_append_new(kinds, json_pack("{s:f, s:I}", "value", values->kinds[i].value, "count",
-                                               (json_int_t)values->kinds[i].count));
+        json_array_append_new(kinds, describe_kind(values->kinds[i].value, values->kinds[i].count, classes));
     if (!values->kind_count) {
         json_decref(kinds);
         kinds = json_null();
@@ -111,7 +125,8 @@ static json_t *describe_attributes(const struct spl_dataset_info *info)
     for (uint32_t s = 0; s < info->stream_count; s++)
         json_array_append_new(all, json_pack("{s:s, s:s, s:o}", "name", info->streams[s].name, "unit",
                                              info->streams[s].unit, "values",
-                                             describe_values(spl_dataset_info_get_values(info, s))));
+                                             describe_values(spl_dataset_info_get_values(info, s),
+                                                             !strcmp(info->streams[s].name, "class"))));
     return all;
 }
 

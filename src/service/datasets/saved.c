@@ -42,6 +42,7 @@ static int find(const struct spl_camera_names *names, const char *name, struct s
         memcpy(out->eye, view->eye, sizeof out->eye);
         memcpy(out->target, view->target, sizeof out->target);
         memcpy(out->up, view->up, sizeof out->up);
+        memcpy(out->settings, view->settings, sizeof out->settings);
         out->fov = out->fit[0] = out->fit[1] = view->fov;
     }
     pthread_mutex_unlock(&saved->mutex);

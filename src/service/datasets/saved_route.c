@@ -19,6 +19,7 @@
 #include "service/reply.h"
 #include "service/request/body.h"
 #include "service/state.h"
+#include "service/view/views.h"
 
 enum { values_max = 64 };
 
@@ -148,6 +149,18 @@ static void begin(struct request *request, const struct spl_call *call, const st
     uv_queue_work(&service->loop, &saving->work, run, after); // fails without a callback only
 }
 
+/* May what it shows be asked for of this dataset? */
+static int check_settings(struct request *request, const struct spl_call *call, const struct spl_saved_view *view,
+                          struct spl_error *err)
+{
+    struct spl_view_request shown;
+    const struct spl_camera_limits limits = spl_view_get_limits(request->service);
+    int rc = spl_view_request_from_saved(view, &call->entry->defaults, &limits, &shown, err);
+    if (rc)
+        return spl_view_blame(err);
+    return spl_view_check_part(&shown, call->entry->info, "settings", err);
+}
+
 /* Called before the body, as every PUT is, and again when that is there. */
 void spl_put_saved_view(struct request *request, const struct spl_call *call)
 {
@@ -163,7 +176,7 @@ void spl_put_saved_view(struct request *request, const struct spl_call *call)
     int rc = json ? spl_saved_view_from_json(json, call->entry->info->default_up, false, true, &view, &err)
                   : SPL_E_INPUT;
     json_decref(json);
-    if (rc) {
+    if (rc || (rc = check_settings(request, call, &view, &err))) {
         spl_reply_error(request, &err);
         return;
     }

@@ -15,7 +15,7 @@ static int resolve_point(const struct values *values, enum param param, const ch
     return 0;
 }
 
-static int resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+static int resolve(struct values *values, const struct spl_camera_defaults *defaults,
                    const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
     *out = (struct spl_view_request){.picks = true};

@@ -187,7 +187,7 @@ void spl_values_resolve_version(const struct values *values, struct spl_view_req
     out->version = v->given ? (uint64_t)v->n[0] << 32 | (uint64_t)v->n[1] : 0;
 }
 
-int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
+int spl_values_choose_view(struct values *values, const struct spl_camera_defaults **defaults,
                            struct spl_camera_defaults *own, struct spl_error *err)
 {
     const struct spl_value *view = &values->v[PARAM_view];
@@ -198,10 +198,10 @@ int spl_values_choose_view(const struct values *values, const struct spl_camera_
     *own = **defaults;
     int rc = own->names->find(own->names, view->word, own, err);
     *defaults = own;
-    return rc;
+    return rc ? rc : spl_values_inherit_saved(values, own->settings, err);
 }
 
-int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+int spl_values_resolve(struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err)
 {
     *out = (struct spl_view_request){0};

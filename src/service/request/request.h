@@ -43,7 +43,12 @@ int spl_view_request_from_json(const char *body, size_t length, const struct spl
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
 
-/* GET …/thumbnail.jpg: the default view; `query` holds width, background and v. */
+/* What a view is saved with, checked as if it were asked for. SPL_E_INPUT: settings.NAME. */
+int spl_view_request_from_saved(const struct spl_saved_view *view, const struct spl_camera_defaults *defaults,
+                                const struct spl_camera_limits *limits, struct spl_view_request *out,
+                                struct spl_error *err);
+
+/* GET …/thumbnail.jpg: the default view; `query` holds width, background, clip, class and v. */
 int spl_thumbnail_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
                                      const struct spl_camera_limits *limits, struct spl_view_request *out,
                                      struct spl_error *err);

@@ -137,6 +137,9 @@ int spl_values_resolve_terms(const struct values *values, const struct spl_camer
     int rc = join_clips(values, &view->clip, err);
     if (rc || !crs->given) /* what crs needs was checked with the camera */
         return rc;
-    rc = spl_terms_to_world(&view->soft.what, "soft", (uint32_t)crs->n[0], defaults->places, err);
-    return rc ? rc : spl_terms_to_world(&view->clip, "clip", (uint32_t)crs->n[0], defaults->places, err);
+    if (!values->world_soft)
+        rc = spl_terms_to_world(&view->soft.what, "soft", (uint32_t)crs->n[0], defaults->places, err);
+    if (!rc && !values->world_clip)
+        rc = spl_terms_to_world(&view->clip, "clip", (uint32_t)crs->n[0], defaults->places, err);
+    return rc;
 }

@@ -36,7 +36,8 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
                        : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
-                       : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background and v"
+                       : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background, clip, class and v"
+                       : place == SPL_SAVED                 ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"

@@ -49,6 +49,7 @@ struct values {
     struct spl_soft_params soft;     /* terms alone, of PARAM_soft */
     struct spl_terms clip, classes;  /* of PARAM_clip, PARAM_class */
     struct spl_color_params color;   /* what they show alone, of PARAM_color_by */
+    bool world_soft, world_clip;     /* they come from a saved view, which knows no crs */
 };
 
 /* 0..15, -1 for anything else. */
@@ -84,16 +85,20 @@ int spl_values_add_terms(struct values *values, int param, const char *text, str
 int spl_values_add_terms_json(struct values *values, int param, const json_t *json, struct spl_error *err);
 /* Those of `common` where it has none of its own. */
 void spl_values_inherit_terms(struct values *values, const struct values *common);
-/* `defaults`, or with `view` those of that view, in *own. SPL_E_INPUT, field "view". */
-int spl_values_choose_view(const struct values *values, const struct spl_camera_defaults **defaults,
+/* `defaults`, or with `view` those of that view, in *own; what its settings say and the request does not is given from then
+ * on. SPL_E_INPUT, field "view". */
+int spl_values_choose_view(struct values *values, const struct spl_camera_defaults **defaults,
                            struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */
 int spl_values_resolve_terms(const struct values *values, const struct spl_camera_defaults *defaults,
                              struct spl_view *view, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */
-int spl_values_resolve(const struct values *values, const struct spl_camera_defaults *defaults,
+int spl_values_resolve(struct values *values, const struct spl_camera_defaults *defaults,
                        const struct spl_camera_limits *limits, struct spl_view_request *out, struct spl_error *err);
+
+/* saved.c: what a saved view's settings, a JSON object as text, say and `values` do not. SPL_E_INPUT. */
+int spl_values_inherit_saved(struct values *values, const char *settings, struct spl_error *err);
 
 /* The parts of it that picks share: method, lod, margin, what method fill takes; the version. */
 void spl_values_resolve_splats(const struct values *values, struct spl_view *view);
