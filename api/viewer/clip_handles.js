@@ -18,7 +18,7 @@ export class Handles {
     holder.append(...this.handles);
     clip.addEventListener("shown", () => this.draw());
     stage.addEventListener("camera", () => this.draw());
-    stage.addEventListener("frame", () => this.draw());
+    for (const name of ["frame", "state"]) stage.addEventListener(name, () => this.draw());
   }
 
   make(face) {

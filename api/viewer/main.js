@@ -82,8 +82,8 @@ function makeParts() {
 }
 
 function writeLink() {
-  const {eye, target, up, fov, projection, view_height} = stage.params();
-  const {budget, ...setting} = stage.settings;
+  const {eye, target, up, fov, projection, view_height, near, far} = stage.params();
+  const {budget, ...setting} = {...stage.settings, near, far};
   const camera = {eye, target, up, fov, projection, view_height};
   const drawn = budget ? {budget, ...keptOf(setting)} : setting;
   const fragment = query({dataset: stage.dataset.id, ...camera, layer: setting.layer, ...drawn, ...annotations.read()});

@@ -5,7 +5,7 @@
 // cancelled, which lets the service drop it. Events: "camera" (it changed), "frame" (detail: what the reply said),
 // "state" (detail: a Problem, or null when all is well).
 
-import {fitted, fromParams, params, rounded, same, warp} from "./camera.js";
+import {distance, fitted, fromParams, params, rounded, same, warp} from "./camera.js";
 import {Problem, ask, query} from "./service.js";
 import {keptOf} from "./soft_setting.js";
 
@@ -46,6 +46,7 @@ export class Stage extends EventTarget {
     this.flight = null; // {abort, full, version}
     this.version = 0; // of settings and size
     this.restAt = 0;
+    this.ahead = 0; // by how much the eye of an orthographic camera was put back when it was opened
     this.timer = 0;
     this.failures = 0;
     this.blocked = false; // nothing is asked before the timer
@@ -78,6 +79,7 @@ export class Stage extends EventTarget {
     this.first = this.home;
     this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
     this.camera = fromParams(camera ?? {}, this.first);
+    this.ahead = this.camera.flat && camera.eye && camera.target ? distance(this.camera) - distance(camera) : 0;
     this.dispatchEvent(new Event("camera"));
     this.refresh();
   }
@@ -94,6 +96,7 @@ export class Stage extends EventTarget {
   setCamera(camera) {
     if (!this.dataset || !camera.eye.every(Number.isFinite) || !camera.target.every(Number.isFinite)) return;
     this.camera = camera;
+    if (!camera.flat) this.ahead = 0;
     this.restAt = performance.now() + REST_MS;
     this.unblock();
     if (this.flight?.full) this.flight.abort.abort();
@@ -152,6 +155,12 @@ export class Stage extends EventTarget {
     return performance.now() < this.restAt;
   }
 
+  /** near and far of them, which count from the eye: that of an orthographic camera is asked for from elsewhere. */
+  planes(setting, back) {
+    const given = ["near", "far"].filter((name) => this.camera.flat && setting[name] !== undefined);
+    return Object.fromEntries(given.map((name) => [name, Math.max(0, Number((setting[name] + this.ahead + back).toFixed(6)))]));
+  }
+
   /** The parameters of a view of this camera: `full` as at rest, else as in motion. */
   params(full = true) {
     const [width, height] = this.size;
@@ -163,12 +172,14 @@ export class Stage extends EventTarget {
     let quality = {...setting, ...(full ? {} : coarse)};
     if (full && budget) quality = {budget, ...keptOf(setting)};
     else if (!full && coarse.budget) quality = {...kept, ...coarse};
+    const back = 1000 * this.least;
     return {
-      ...params(rounded(this.camera), 1000 * this.least),
+      ...params(rounded(this.camera), back),
       width: Math.max(1, Math.floor(width * ratio)),
       height: Math.max(1, Math.floor(height * ratio)),
       layer,
       ...quality,
+      ...this.planes(setting, back),
       background: this.settings.background ?? getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
       format: "jpeg",
     };
