@@ -30,6 +30,13 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
                                       names[v], vectors[v][c]);
     if (!(view->fov > 0 && view->fov <= 179))
         return spl_fail_field(err, SPL_E_INPUT, "fov", "fov %g is outside 0 to 179 degrees", view->fov);
+    if (view->settings[0]) { // a library's caller may say anything
+        json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, 0, NULL) : NULL;
+        const bool good = json_is_object(settings);
+        json_decref(settings);
+        if (!good)
+            return spl_fail_field(err, SPL_E_INPUT, "settings", "settings must be a JSON object, as text");
+    }
     struct spl_error why = {0};
     int rc = spl_camera_look_at(&camera, view->eye, view->target, view->up, &why);
     return rc ? spl_fail_field(err, SPL_E_INPUT, why.field, "%s", why.message) : SPL_OK;

@@ -14,8 +14,8 @@ enum { SPL_SAVED_VIEW_FOV = 60 }; /* where none is said */
 
 bool spl_view_name_is_valid(const char *name);
 
-/* Finite, within the world, a direction to look in and a field of view. SPL_E_INPUT names eye, target, up, fov or, where
- * `named`, name. */
+/* Finite, within the world, a direction to look in and a field of view; settings are JSON. SPL_E_INPUT names eye, target, up,
+ * fov, settings or, where `named`, name. */
 int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct spl_error *err);
 
 /* {"eye": [3], "target": [3], "up": [3], "fov": degrees, "settings": {}}; up, fov and settings may be left out: `up`, 60,

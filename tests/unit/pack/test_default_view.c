@@ -193,7 +193,8 @@ static void what_is_said_stands(void **state)
     add_box(&cloud, 10, 5, 3, 0.3, false);
     const struct spl_saved_view first = {.eye = {1, 2, 3}, .target = {4, 2, 3}, .fov = 50};
     const struct spl_saved_view views[] = {{.name = "door", .eye = {1, 1, 1}, .target = {2, 2, 1}, .up = {0, 1, 0}},
-                                           {.name = "back", .eye = {9, 1, 1}, .target = {2, 2, 1}, .fov = 70}};
+                                           {.name = "back", .eye = {9, 1, 1}, .target = {2, 2, 1}, .fov = 70,
+                                            .settings = "{ \"class\": \"2\", \"clip\": [\"z<2\"] }"}};
     struct spl_pack_options options = {
         .title = "The hall", .description = "Two\nlines", .default_view = &first, .views = views, .view_count = 2};
     assert_int_equal(pack_with(&cloud, false, &options, &err), 0);
@@ -206,6 +207,8 @@ static void what_is_said_stands(void **state)
     assert_true(info->default_fov == 50 && info->default_fit[0] == 50);
     assert_int_equal(info->view_count, 2);
     assert_string_equal(info->views[0].name, "back");
+    assert_string_equal(info->views[0].settings, "{\"class\":\"2\",\"clip\":[\"z<2\"]}");
+    assert_string_equal(info->views[1].settings, "");
     assert_true(info->views[0].up[2] == 1 && info->views[1].up[1] == 1 && info->views[1].fov == 60);
     assert_int_equal(spl_dataset_get_default_camera(dataset, 300, 600, &camera, &err), 0);
     assert_true(fabs(camera.fy - 150 / tan(25 * M_PI / 180)) < 1e-9); /* 50 degrees across */
@@ -222,7 +225,7 @@ static void what_is_said_wrongly_is_refused_by_name(void **state)
     memset(long_title, 'a', sizeof long_title - 1);
     static const struct spl_saved_view blind = {.eye = {1, 2, 3}, .target = {1, 2, 3}},
                                        wide = {.eye = {1, 0, 0}, .fov = 180}, turned = {.eye = {1, 0, 0}, .fov = -1},
-                                       nameless = {.eye = {1, 0, 0}},
+                                       nameless = {.eye = {1, 0, 0}}, unsettled = {.name = "a", .eye = {1, 0, 0}, .settings = "[]"},
                                        hidden = {.name = ".a", .eye = {1, 0, 0}}, far = {.eye = {NAN, 0, 0}};
     static const struct spl_saved_view twice[] = {{.name = "a", .eye = {1, 0, 0}}, {.name = "a", .eye = {2, 0, 0}}};
     const struct {
@@ -238,6 +241,7 @@ static void what_is_said_wrongly_is_refused_by_name(void **state)
         {{.default_view = &turned}, "default-view"},
         {{.default_view = &far}, "default-view"},
         {{.views = &nameless, .view_count = 1}, "view"},
+        {{.views = &unsettled, .view_count = 1}, "view"},
         {{.views = &hidden, .view_count = 1}, "view"},
         {{.views = twice, .view_count = 2}, "view"},
         {{.views = twice, .view_count = SPL_SAVED_VIEWS_MAX + 1}, "view"},

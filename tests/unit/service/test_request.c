@@ -133,12 +133,17 @@ static void the_field_of_view_follows_the_shape(void **state)
     assert_true(fabs(t[1] - tan(30 * M_PI / 180)) < 1e-9);
 }
 
+struct door {
+    struct spl_camera_names names;
+    const char *settings; /* of the view */
+};
+
 static int find_door(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
                      struct spl_error *err)
 {
-    (void)names;
     if (strcmp(name, "door"))
         return spl_fail_field(err, SPL_E_INPUT, "view", "no");
+    snprintf(out->settings, sizeof out->settings, "%s", ((const struct door *)(const void *)names)->settings);
     out->eye[0] = 7;
     out->fov = out->fit[0] = out->fit[1] = 70;
     return 0;
@@ -147,11 +152,11 @@ static int find_door(const struct spl_camera_names *names, const char *name, str
 static void a_view_by_name_stands_for_what_is_left_out(void **state)
 {
     (void)state;
-    const struct spl_camera_names names = {find_door};
+    const struct door plain = {{find_door}, ""};
     struct spl_camera_defaults named = defaults;
     struct spl_view_request r, other;
     struct spl_error err = {0};
-    named.names = &names;
+    named.names = &plain.names;
     const char *door = "view=door&width=300&height=200", *body = "{\"view\": \"door\", \"width\": 300, \"height\": 200}";
     assert_int_equal(spl_view_request_from_query(door, strlen(door), &named, &limits, &r, &err), 0);
     assert_int_equal(spl_view_request_from_json(body, strlen(body), &named, &limits, &other, &err), 0);
@@ -176,6 +181,55 @@ static void a_view_by_name_stands_for_what_is_left_out(void **state)
     assert_string_equal(err.field, "view");
 }
 
+/* Printed, as a request has them. */
+static void assert_clip(const struct spl_view_request *r, const char *text)
+{
+    char printed[SPL_TERMS_TEXT_MAX + 1];
+    spl_terms_print(&r->view.clip, printed, sizeof printed);
+    assert_string_equal(printed, text);
+}
+
+static void what_a_view_shows_stands_for_what_is_left_out(void **state)
+{
+    (void)state;
+    struct door door = {{find_door}, "{\"clip\":[\"z<2\",\"x>1\"],\"class\":\"!7\",\"color_by\":\"height\",\"range\":\"0..3\",\"shade\":\"edl\","
+                                     "\"edl_radius\":4,\"soft\":\"z>5\",\"soft_opacity\":0.5,\"background\":\"white\"}"};
+    struct spl_camera_defaults named = defaults;
+    const struct spl_camera_places places = {move};
+    struct spl_view_request r;
+    struct spl_error err = {0};
+    named.names = &door.names;
+    named.places = &places;
+    const char *text = "view=door";
+    assert_int_equal(spl_view_request_from_query(text, strlen(text), &named, &limits, &r, &err), 0);
+    assert_clip(&r, "z<2 and x>1 and !class:7");
+    assert_true(r.view.color.by == SPL_COLOR_BY_HEIGHT && r.view.color.has_range && r.view.shade.radius == 4);
+    assert_true(r.view.soft.what.count == 1 && r.view.soft.opacity == 0.5 && r.view.background[0] == 255);
+    text = "view=door&clip=y<1&color_by=normal&background=black&edl_radius=1";
+    assert_int_equal(spl_view_request_from_query(text, strlen(text), &named, &limits, &r, &err), 0);
+    assert_clip(&r, "y<1 and !class:7");
+    assert_true(r.view.color.by == SPL_COLOR_BY_NORMAL && r.view.shade.radius == 1 && r.view.background[0] == 0);
+    text = "{\"view\": \"door\", \"clip\": [], \"class\": []}";
+    assert_int_equal(spl_view_request_from_json(text, strlen(text), &named, &limits, &r, &err), 0);
+    assert_int_equal(r.view.clip.count, 0);
+    text = "x=1&y=1&view=door";
+    assert_int_equal(spl_pick_request_from_query(text, strlen(text), &named, &limits, &r, &err), 0);
+    assert_clip(&r, "z<2 and x>1 and !class:7");
+    text = "view=door&crs=EPSG:4326&eye=1,2,3"; // of the world they stay
+    assert_int_equal(spl_view_request_from_query(text, strlen(text), &named, &limits, &r, &err), 0);
+    assert_clip(&r, "z<2 and x>1 and !class:7");
+    text = "view=door&crs=EPSG:4326&eye=1,2,3&clip=z<1"; // what the request says is of its own
+    assert_int_equal(spl_view_request_from_query(text, strlen(text), &named, &limits, &r, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "clip");
+    static const char *const broken[] = {"{", "[]", "{\"width\": 5}", "{\"clip\": 5}", "{\"clip\": \"q\"}"};
+    for (size_t i = 0; i < sizeof broken / sizeof *broken; i++) {
+        door.settings = broken[i];
+        err = (struct spl_error){0};
+        assert_int_equal(spl_view_request_from_query("view=door", 9, &named, &limits, &r, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "view");
+    }
+}
+
 static void a_thumbnail_is_small(void **state)
 {
     (void)state;
@@ -186,9 +240,12 @@ static void a_thumbnail_is_small(void **state)
     assert_true(r.view.camera.eye[0] == 10 && r.view.supersample == 2);
     assert_int_equal(spl_thumbnail_request_from_query("width=640", 9, &defaults, &limits, &r, &err), 0);
     assert_true(r.view.camera.width == 640 && r.view.camera.height == 360);
+    const char *cut = "clip=z<2&class=2,6";
+    assert_int_equal(spl_thumbnail_request_from_query(cut, strlen(cut), &defaults, &limits, &r, &err), 0);
+    assert_clip(&r, "z<2 and class:2 or class:6");
     static const struct {
         const char *text, *field;
-    } wrong[] = {{"width=15", "width"}, {"width=1281", "width"}, {"width=1.5", "width"}, {"height=90", "height"},
+    } wrong[] = {{"width=15", "width"}, {"clip=q", "clip"}, {"class=q", "class"}, {"color_by=class", "color_by"}, {"width=1281", "width"}, {"width=1.5", "width"}, {"height=90", "height"},
                  {"eye=1,2,3", "eye"},  {"v=5", "v"},            {"shade=1", "shade"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         err = (struct spl_error){0};
@@ -696,6 +753,7 @@ int main(void)
         cmocka_unit_test(nothing_given_is_the_default_view),
         cmocka_unit_test(the_field_of_view_follows_the_shape),
         cmocka_unit_test(a_view_by_name_stands_for_what_is_left_out),
+        cmocka_unit_test(what_a_view_shows_stands_for_what_is_left_out),
         cmocka_unit_test(a_thumbnail_is_small),
         cmocka_unit_test(every_parameter_arrives),
         cmocka_unit_test(ogc_names_mean_the_same),
