@@ -1,7 +1,7 @@
 // The clip box in the picture: its edges, and a handle on each face, which is dragged along the face's axis by mouse or
 // finger and moved by arrow keys.
 
-import {along, boxAxes} from "./clip_terms.js";
+import {along, boxAxes, span} from "./clip_terms.js";
 import {FACES} from "./clip.js";
 import {add, beam, distance, dot, focal, project, segment, sub, times} from "./camera.js";
 import {shape} from "./points.js";
@@ -93,6 +93,9 @@ export class Handles {
         at = project(camera, size, middle),
         value = this.clip.faceAt(face);
       handle.hidden = !at;
+      const [low, high] = span(this.stage.dataset.bounds, axes[face.axis]);
+      handle.setAttribute("aria-valuemin", Math.min(low, value).toFixed(this.clip.digits));
+      handle.setAttribute("aria-valuemax", Math.max(high, value).toFixed(this.clip.digits));
       handle.setAttribute("aria-valuenow", value.toFixed(this.clip.digits));
       handle.setAttribute("aria-valuetext", this.clip.lengthText(value));
       if (!at) return;

@@ -71,7 +71,7 @@ export async function toGeoJson(points, annotations, dataset) {
   const features = all.map(({kind, name, position, normal, color, class: kindOf, attributes}, i) =>
     feature(
       {type: "Point", coordinates: coordinates[i]},
-      {kind, name, world: position, normal: normal ?? null, color: color ?? null, class: kindOf ?? null, ...attributes},
+      {...attributes, kind, name, world: position, normal: normal ?? null, color: color ?? null, class: kindOf ?? null},
     ),
   );
   const taken = coordinates.slice(0, points.list.length),

@@ -4,10 +4,9 @@
 import {choose} from "./methods.js";
 import {choices} from "./picture.js";
 import {ask, askJson} from "./service.js";
+import {keptOf} from "./soft_setting.js";
 
 const $ = (id) => document.getElementById(id);
-/** What a saved view keeps beside its camera, as api/default-views.md has it. */
-const KEPT = /^(clip|class|soft(_.*)?|of|color_by|ramp|range|shade|edl_.*|background)$/;
 const FOV_MOST = 179;
 
 export class Views extends EventTarget {
@@ -43,8 +42,9 @@ export class Views extends EventTarget {
     const {dataset, camera, settings} = this.stage,
       {eye, target, up, fov} = camera,
       number = (text) => (typeof text === "string" && text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : text);
-    const kept = Object.entries(settings)
-      .filter(([key, value]) => KEPT.test(key) && value !== "")
+    const {near: _, far: __, ...shown} = keptOf(settings); // planes are a camera's
+    const kept = Object.entries(shown)
+      .filter(([, value]) => value !== "")
       .map(([key, value]) => [key, /^(soft_(opacity|cover|blend)|edl_.*)$/.test(key) ? number(value) : `${value}`]);
     const body = {eye, target, up, fov: Math.min(FOV_MOST, this.across(fov)), ...(kept.length ? {settings: Object.fromEntries(kept)} : {})};
     await ask(`${dataset.uri}/views/${encodeURIComponent(name)}`, {

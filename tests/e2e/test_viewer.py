@@ -612,7 +612,10 @@ def test_several_datasets_are_a_gallery():
         with Daemon(REAL, datasets=[WALL, f"{folder}/site.spld"]) as other:
             site = f"http://127.0.0.1:{other.port}"
             for size, phone, dark in (((1280, 800), False, False), ((390, 844), True, True)):
-                with page(f"{site}/", ready=f"{CARDS}.length === 2 && {PICTURES}", size=size, phone=phone, dark=dark) as tab:
+                address = f"{site}/#clip=x%3C5" if phone else f"{site}/"  # kept in pictures and links
+                with page(address, ready=f"{CARDS}.length === 2 && {PICTURES}", size=size, phone=phone, dark=dark) as tab:
+                    asked = tab.run("performance.getEntriesByType('resource').map(e => e.name).filter(n => n.includes('thumbnail'))")
+                    assert all(("clip=x%3C5" in url) == phone for url in asked + tab.run(f"{CARDS}.map(a => a.href)")) and asked, asked
                     assert tab.run(f"{CARDS}.map(a => a.querySelector('strong').textContent)") == ["The <i>site</i>", "wall"]
                     assert tab.text("title").startswith("Datasets")
                     assert tab.run("document.querySelector('#gallery').scrollWidth <= innerWidth && document.querySelector('#panel').hidden")

@@ -12,7 +12,7 @@
 #include "service/reply.h"
 #include "service/request/values.h"
 
-enum { width = 280, margin = 12, bar = 18, row = 20, title = 22, ticks = 5, stops = 17, kinds_most = 32 };
+enum { width = 280, margin = 12, bar = 18, row = 20, title = 22, ticks = 5, text_room = 5, stops = 17, kinds_most = 32 };
 
 static void begin(FILE *out, const char *name, const char *unit, int height)
 {
@@ -46,12 +46,18 @@ static void draw_ramp(FILE *out, const struct spl_paint *paint)
     }
     fprintf(out, "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" fill=\"url(#ramp)\"/>\n",
             margin, title + 4, width - 2 * margin, bar);
+    char texts[ticks][32];
+    size_t longest = 0;
     for (int i = 0; i < ticks; i++) {
         const double share = i / (double)(ticks - 1);
-        fprintf(out, "<text x=\"%g\" y=\"%d\" text-anchor=\"%s\">%.5g</text>\n", margin + share * (width - 2 * margin),
-                title + 4 + bar + 15, !i ? "start" : i == ticks - 1 ? "end" : "middle",
-                paint->low + share * (paint->high - paint->low));
+        snprintf(texts[i], sizeof texts[i], "%.5g", paint->low + share * (paint->high - paint->low));
+        if (strlen(texts[i]) > longest)
+            longest = strlen(texts[i]);
     }
+    for (int i = 0; i < ticks; i += longest > text_room ? 2 : 1) // every second one where they would touch
+        fprintf(out, "<text x=\"%g\" y=\"%d\" text-anchor=\"%s\">%s</text>\n",
+                margin + i * (width - 2 * margin) / (double)(ticks - 1), title + 4 + bar + 15,
+                !i ? "start" : i == ticks - 1 ? "end" : "middle", texts[i]);
 }
 
 static void draw_swatch(FILE *out, int index, uint32_t color, const char *text)
