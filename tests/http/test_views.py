@@ -181,6 +181,12 @@ def test_a_saved_view_keeps_what_it_shows():
                 eye = d.ask("/v1/datasets/wall/place?crs=EPSG:4326&world=3,0,1", headers=AUTH).json()["position"]
                 far = get(d, f"view=door&{size}&crs=EPSG:4326&eye={','.join(map(repr, eye))}")
                 assert far.status == 200 and far.headers["Splatd-Clip"] == named.headers["Splatd-Clip"], far.body
+            soft = {"soft": ["z>1", "x>9"], "soft_model": "base", "soft_opacity": 0.7, "soft_cover": 0.9, "soft_blend": 0.1, "of": "first",
+                    "edl_strength": 0.25, "edl_radius": 3}
+            assert put(d, "soft", {**DOOR, "settings": soft}).json()["settings"] == soft
+            said = "&".join(["soft=z%3E1+or+x%3E9", *(f"{k}={v}" for k, v in soft.items() if k != "soft")])
+            assert get(d, f"view=soft&{size}", headers={"If-None-Match": get(d, f"view=plain&{size}&{said}").headers["ETag"]}).status == 304
+            assert delete(d, "soft").status == 204
             for settings, field in [
                 ({"clip": "nonsense"}, "settings.clip"), ({"clip": "q0.5<intensity"}, "settings.clip"), ({"class": "a"}, "settings.class"),
                 ({"clip": "unheard_of:2"}, "settings.clip"), ({"color_by": "unheard_of"}, "settings.color_by"), ({"width": 9}, "settings.width"),
