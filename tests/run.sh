@@ -137,19 +137,27 @@ if built asan; then
 fi
 if built tsan; then
     if sanitiser_runs thread env; then
-        timeouts=10 suites tsan unit http
+        runs_here=env
     elif sanitiser_runs thread setarch -R; then
-        timeouts=10 run_under="setarch -R" suites tsan unit http
+        runs_here="setarch -R"
+    fi
+    if [ -n "${runs_here-}" ]; then
+        timeouts=10 run_under=$runs_here
+        suites tsan "$here" unit
+        only=${crowds[*]/#/http-}
+        [ "$mode" != --full ] || only=""
+        suites tsan $((2 * here)) http
+        only="" timeouts="" run_under=""
     else
         echo "note: no thread check, TSan does not start on this kernel"
         skipped=$((skipped + 1))
     fi
 fi
 if built no-vulkan; then
-    only="gpu-egl exact-egl devices" suites no-vulkan gpu # units do not see the backend
+    only="gpu-egl exact-egl devices" suites no-vulkan "$here" gpu # units do not see the backend
 fi
 if built no-egl; then
-    only="gpu-vulkan exact-vulkan devices" suites no-egl gpu # nor this one, nor what stands in for FFmpeg and systemd
+    only="gpu-vulkan exact-vulkan devices" suites no-egl "$here" gpu # nor this one, nor what stands in for FFmpeg and systemd
 fi
 # One program as a test: what it is called, and its command.
 program() {
