@@ -92,9 +92,11 @@ class SplatMap extends HTMLElement {
     const earth = info.splatd.scheme === "mercator", unit = earth ? "°" : ` ${info.splatd.unit}`;
     const control = L.control({position: "bottomleft"}), text = document.createElement("output");
     text.style.cssText = "background:#fffc;padding:2px 6px;font:12px monospace;color:#000";
+    text.hidden = true; // until there is something to say
     control.onAdd = () => text;
     control.addTo(this.map);
     this.map.on("mousemove", ({latlng: {lat, lng}}) => {
+      text.hidden = false;
       text.textContent = `${named(earth ? "lon" : "x", lng, unit)}  ${named(earth ? "lat" : "y", lat, unit)}`;
     });
   }

@@ -12,7 +12,7 @@ import tempfile
 HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
-from harness import FAKE, REAL, Daemon, run, together
+from harness import FAKE, REAL, WALL, Daemon, run, together
 from splatd import Splatd, SplatdError, ring
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
@@ -230,6 +230,19 @@ def test_the_examples_of_the_readmes():
             assert images
             for address in images:
                 assert d.ask(address.replace("hall", "wall")).status == 200, address
+
+
+def test_pictures_need_no_display():
+    """Without a window system, and with variables of one that is not there."""
+    pictures = set()
+    with tempfile.TemporaryDirectory() as folder:
+        for more in {}, {"DISPLAY": ":97", "WAYLAND_DISPLAY": "wayland-97", "XDG_SESSION_TYPE": "x11"}:
+            kept = {name: os.environ[name] for name in os.environ if not re.match("DISPLAY|WAYLAND|XDG_|XAUTH", name)}
+            file = pathlib.Path(folder, "view.png")
+            done = subprocess.run([REAL, "render", WALL, "--size", "64x48", "-o", file], env={**kept, **more}, capture_output=True, timeout=120)
+            assert done.returncode == 0, done.stderr
+            pictures.add(file.read_bytes())
+    assert len(pictures) == 1
 
 
 def test_the_dashboard():
