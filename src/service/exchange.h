@@ -26,6 +26,8 @@ struct request {
     char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
+    char grant[96];                // "exp=…&sig=…" of a signed URL, which its query has no more; else ""
+    int64_t expires_s;             // Unix time, of that; 0 = it is not signed
     bool started;
     bool has_host;  /* of HTTP/1.1, which demands it */
     bool head;      /* the method is HEAD */

@@ -8,12 +8,11 @@ import shlex
 import subprocess
 import sys
 import tempfile
-import types
 
 HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
-from harness import FAKE, REAL, Daemon, run, together
+from harness import FAKE, REAL, WALL, Daemon, run, together
 from splatd import Splatd, SplatdError, ring
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
@@ -233,24 +232,48 @@ def test_the_examples_of_the_readmes():
                 assert d.ask(address.replace("hall", "wall")).status == 200, address
 
 
-def test_notebook_and_dashboard():
-    notebook = json.loads((CLIENTS / "splatd.ipynb").read_text())
+def test_pictures_need_no_display():
+    """Without a window system, and with variables of one that is not there."""
+    pictures = set()
+    with tempfile.TemporaryDirectory() as folder:
+        for more in {}, {"DISPLAY": ":97", "WAYLAND_DISPLAY": "wayland-97", "XDG_SESSION_TYPE": "x11"}:
+            kept = {name: os.environ[name] for name in os.environ if not re.match("DISPLAY|WAYLAND|XDG_|XAUTH", name)}
+            file = pathlib.Path(folder, "view.png")
+            done = subprocess.run([REAL, "render", WALL, "--size", "64x48", "-o", file], env={**kept, **more}, capture_output=True, timeout=120)
+            assert done.returncode == 0, done.stderr
+            pictures.add(file.read_bytes())
+    assert len(pictures) == 1
+
+
+def test_the_dashboard():
+    """Fields that Grafana's panels have (schema 39), addresses that a daemon answers, queries of variables that there are."""
     dashboard = json.loads((CLIENTS / "grafana-dashboard.json").read_text())
+    assert set(dashboard) <= {"title", "uid", "tags", "schemaVersion", "templating", "panels", "time", "refresh", "editable"}, set(dashboard)
+    variables = {v["name"]: v["query"] for v in dashboard["templating"]["list"]}
+    assert all(v["type"] == "textbox" and v["current"] == {"text": v["query"], "value": v["query"]} for v in dashboard["templating"]["list"])
+    options = {"text": {"mode", "content"}, "geomap": {"view", "controls", "basemap", "layers", "tooltip"}}
+    seen, corners = [], set()
     with Daemon(REAL) as d:
-        shown = types.ModuleType("IPython.display")
-        shown.Image, shown.IFrame = (lambda data: data), (lambda src, width, height: src)
-        sys.modules.update({"IPython": types.ModuleType("IPython"), "IPython.display": shown})
-        names = {}
-        for cell in notebook["cells"]:
-            if cell["cell_type"] == "code":
-                *lines, last = "".join(cell["source"]).replace("http://127.0.0.1:8080", url(d)).split("\n")
-                exec("\n".join(lines), names)
-                names["last"] = eval(last, names)
-        assert len({view.bytes for view in names["views"]}) == 8 and 0 < min(names["seen"])
-        assert d.ask(names["last"].removeprefix(url(d))).status == 200 and names["last"].endswith("/embed/wall")
+        variables.update(service="", dataset="wall", view="eye=3,0,1&target=0,0,1", tiles="color_by=height")
+
+        def ask(address):
+            named = re.sub(r"\$\{(\w+)\}|\$(\w+)", lambda found: variables[found[1] or found[2]], address)
+            assert d.ask(named.format(z=0, x=0, y=0)).status == 200, address
+            seen.append(address)
         for panel in dashboard["panels"]:
-            [source] = re.findall(r'src="\$\{service\}([^"]*)"', panel["options"]["content"])
-            assert d.ask(source.replace("${dataset}", "wall")).status == 200, source
+            assert set(panel) == {"id", "type", "title", "gridPos", "options"} and set(panel["options"]) <= options[panel["type"]], panel
+            assert set(panel["gridPos"]) == set("xywh") and panel["gridPos"]["x"] + panel["gridPos"]["w"] <= 24
+            corners.add((panel["gridPos"]["x"], panel["gridPos"]["y"], panel["id"]))
+            if panel["type"] == "text":
+                [source] = re.findall(r'src="\$\{service\}([^"]*)"', panel["options"]["content"])
+                ask(source)
+                continue
+            assert set(panel["options"]["view"]) == {"id", "lat", "lon", "zoom"}
+            for layer in panel["options"]["layers"]:
+                assert set(layer) == {"type", "name", "config", "opacity", "tooltip"} and layer["type"] == "xyz", layer
+                assert set(layer["config"]) == {"url", "attribution", "minZoom", "maxZoom"} and 0 <= layer["config"]["minZoom"] <= layer["config"]["maxZoom"]
+                ask(layer["config"]["url"].removeprefix("${service}"))
+    assert len(corners) == len(dashboard["panels"]) >= 3 and any("/tiles/" in address for address in seen), seen
 
 
 run(globals())

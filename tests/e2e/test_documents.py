@@ -128,4 +128,27 @@ def test_commands():
         assert ran == {"pack", "render", "tour", "info", "synth", "devices", "sign"}, ran
 
 
+def test_pictures():
+    """The commands that make pictures of the documents, on fewer points; what lies there is no larger than a page should load."""
+    with tempfile.TemporaryDirectory() as folder:
+        binaries = pathlib.Path(folder, "bin")
+        binaries.mkdir()
+        (binaries / "splatd").symlink_to(REAL)
+        for name, needs in (("default-views", "ffmpeg"), ("map-viewer", "chromium")):
+            kept = ROOT / f"api/pictures/{name}.jpg"
+            assert 20000 < kept.stat().st_size <= 150 * 1024, (name, kept.stat().st_size)
+            if not shutil.which(needs) or (needs == "chromium" and not pathlib.Path("/usr/share/javascript/leaflet/leaflet.js").exists()):
+                continue
+            done = bash(f'"{ROOT}/api/pictures/{name}.sh" out', folder, POINTS="4000", PATH=f"{binaries}:{os.environ['PATH']}")
+            made = pathlib.Path(folder, "out", f"{name}.jpg")
+            assert done.returncode == 0 and made.read_bytes().startswith(b"\xff\xd8\xff"), (name, done.stderr[-800:])
+            assert size_of(made) == size_of(kept), (name, size_of(made))
+
+
+def size_of(jpeg):
+    data = jpeg.read_bytes()
+    frame = re.search(rb"\xff[\xc0\xc2]..\x08(..)(..)", data, re.S)
+    return tuple(int.from_bytes(frame[i], "big") for i in (2, 1))
+
+
 run(globals())

@@ -1,8 +1,11 @@
 """Who may do what, over HTTP: tokens and their patterns, signed URLs, rates, other origins, files read again by SIGHUP."""
+import base64
 import contextlib
 import hashlib
+import hmac
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import tempfile
@@ -128,6 +131,89 @@ def test_a_signed_url_is_good_for_what_it_says():
         assert d.ask(short, headers=bearer(VIEWER)).status == 403  # it says what it is; the token does not mend it
 
 
+TILES = "/v1/datasets/wall/tiles"
+
+
+def sign_here(path, seconds=3600):
+    """As the documents say that any program can: of tiles the path in the text is that of all."""
+    text = re.sub(r"/tiles(/\{z\}/\{x\}/\{y\}.png|\.json)", "/tiles/", path)
+    text, path = (f"{t}{'&' if '?' in t else '?'}exp={int(time.time()) + seconds}" for t in (text, path))
+    digest = hmac.digest(KEY.strip().encode(), text.encode(), "sha256")
+    return f"{path}&sig={base64.urlsafe_b64encode(digest).decode().rstrip('=')}"
+
+
+def test_a_signed_map_shows_all_its_tiles_and_nothing_else():
+    with tempfile.TemporaryDirectory() as home:
+        other = pathlib.Path(home, "yard.spld")
+        other.write_bytes(pathlib.Path(WALL).read_bytes())
+        with guarded(datasets=(WALL, str(other))) as d:
+            version = d.ask("/v1/datasets/wall", headers=bearer(VIEWER)).json()["version"]
+            url = sign(d, f"https://maps.example{TILES}/{{z}}/{{x}}/{{y}}.png?clip=z<1.2&v={version}")
+            assert "clip=z%3C1.2&v=" in url and "/{z}/{x}/{y}.png?" in url, url
+            grant = url.partition("?")[2]
+            for tile in ("0/0/0.png", "3/7/2.png", "3/7/2@2x.png", "30/1073741823/0.png"):
+                reply = d.ask(f"{TILES}/{tile}?{grant}")
+                assert reply.status == 200 and d.ask(f"{TILES}/{tile}?{grant}", "HEAD").status == 200, (tile, reply.body)
+                kept = reply.headers["Cache-Control"]
+                left = int(kept.removeprefix("private, max-age=").removesuffix(", immutable"))
+                assert 3500 < left <= 3600, kept  # as long as the signature holds
+                again = d.ask(f"{TILES}/{tile}?{grant}", headers={"If-None-Match": reply.headers["ETag"]})
+                assert again.status == 304 and again.headers["Cache-Control"].startswith("private, max-age=3"), again.headers
+                assert d.ask(f"{TILES}/{tile}?clip=z%3C1.2&v={version}", headers=bearer(VIEWER)).headers["ETag"] == reply.headers["ETag"]
+            # TileJSON by the same signature hands it on
+            said = d.ask(f"{TILES}.json?{grant}")
+            assert said.status == 200 and said.json()["tiles"] == [f"{TILES}/{{z}}/{{x}}/{{y}}.png?{grant}"], said.body
+            assert d.ask(sign_here(f"{TILES}.json?clip=z%3C1.2&v={version}")).status == 200
+            plain = sign_here(f"{TILES}/{{z}}/{{x}}/{{y}}.png").partition("?")[2]  # no parameters, and so no version
+            assert d.ask(f"{TILES}/1/0/1.png?{plain}").headers["Cache-Control"] == "no-cache"
+            assert d.ask(f"{TILES}.json?{plain}").json()["tiles"] == [f"{TILES}/{{z}}/{{x}}/{{y}}.png?{plain}"]
+            page = passed_on(sign(d, "/embed/wall"))  # who may look at a dataset at will may do so from above
+            assert d.ask(f"{TILES}/1/0/1.png?class=7&{page}").status == d.ask(f"/v1/datasets/wall/thumbnail.jpg?{page}").status == 200
+            assert d.ask(d.ask(f"{TILES}.json?class=7&{page}").json()["tiles"][0].format(z=0, x=0, y=0)).status == 200
+            # another dataset, other parameters, another time, tricks with the path
+            signature = grant.partition("&sig=")[2]
+            forged = [grant.replace("1.2", "1.3"), grant.replace("clip=z%3C1.2&", ""), "class=2&" + grant, grant.replace("exp=", "exp=9"),
+                      grant[:-1], grant.replace("%3C", "%3c"), grant.replace("&sig=", "&embed="), grant.replace("&exp", "&&exp"),
+                      f"sig={signature}", grant.partition("exp=")[0] + f"sig={signature}"]
+            for query in forged:
+                for path in (f"{TILES}/0/0/0.png", f"{TILES}.json"):
+                    reply = d.ask(f"{path}?{query}")
+                    assert reply.status == 403 and reply.json()["field"] in ("sig", "exp"), (path, query, reply.status, reply.body)
+            for query in (grant + "&clip=z%3C9", grant + "&", ""):
+                assert d.ask(f"{TILES}/0/0/0.png?{query}").status == 401, query
+            for path in ("/v1/datasets/yard/tiles/0/0/0.png", "/v1/datasets/wall/../yard/tiles/0/0/0.png",
+                         "/v1/datasets/wall%2f..%2fyard/tiles/0/0/0.png", "/v1/datasets/wall/%2e%2e/yard/tiles/0/0/0.png",
+                         "/v1/datasets/wal%6c/tiles/0/0/0.png", "/v1/datasets/yard/tiles.json", "/v1/datasets/wall//tiles/0/0/0.png",
+                         f"{TILES}//0/0/0.png", f"{TILES}/0/0/../0/0/0.png", f"{TILES}/../../yard/tiles/0/0/0.png",
+                         f"{TILES}/%2e%2e/%2e%2e/0.png", f"{TILES}/..%2f..%2fyard/tiles/0.png", f"{TILES}/0%2f0%2f0.png/0/0",
+                         f"{TILES}/%30/0/0.png", f"{TILES}/0/0/0.png%00", f"{TILES}/0/0/0.png/", f"{TILES}/0/0/0.jpg", f"{TILES}/",
+                         f"{TILES}/0/0/-1.png", f"{TILES}/{{z}}/{{x}}/{{y}}.png", "/v1/datasets/wall", VIEW, "/v1/datasets", "/v1/status",
+                         "/v1/datasets/wall/thumbnail.jpg", "/V1/datasets/wall/tiles/0/0/0.png", "//v1/datasets/wall/tiles/0/0/0.png"):
+                reply = d.ask(f"{path}?{grant}")
+                assert reply.status in (400, 401, 403, 404), (path, reply.status)
+                assert reply.status != 400 or "%00" in path, path
+            for method, body in (("POST", "{}"), ("PUT", "x"), ("DELETE", None)):
+                assert d.ask(f"{TILES}/0/0/0.png?{grant}", method, body).status in (401, 405)
+            assert d.ask(f"{TILES}/31/0/0.png?{grant}").status == 404  # signed, and no tile
+            # one tile by itself, and a thumbnail
+            one = sign_here(f"{TILES}/1/0/1.png")
+            assert d.ask(one).status == 200 and d.ask(one.replace("/1/0/1", "/1/0/0")).status == 403
+            thumbnail = sign(d, f"/v1/datasets/wall/thumbnail.jpg?width=64&v={version}")
+            reply = d.ask(thumbnail)
+            assert reply.status == 200 and reply.headers["Cache-Control"].startswith("private, max-age=3"), reply.headers
+            assert d.ask(thumbnail.replace("width=64", "width=65")).status == d.ask(thumbnail.replace("wall", "yard")).status == 403
+            assert d.ask(sign_here("/v1/datasets/wall/legend.svg?color_by=height")).status == 200
+            short = sign_here(f"{TILES}/{{z}}/{{x}}/{{y}}.png", 1).replace("{z}/{x}/{y}", "0/0/0")
+            eventually(lambda: d.ask(short).status == 403)
+            assert d.ask(short).json()["field"] == "exp"
+            longer = d.ask(sign_here(f"{TILES}/{{z}}/{{x}}/{{y}}.png?v={version}", 999 * 86400).replace("{z}/{x}/{y}", "0/0/0"))
+            assert longer.headers["Cache-Control"] == "private, max-age=31536000, immutable"
+            d.tokens.write_text(lines())
+            pathlib.Path(d.key).write_text("another-" + KEY)
+            d.process.send_signal(signal.SIGHUP)
+            eventually(lambda: d.ask(f"{TILES}/0/0/0.png?{grant}").status == 403)
+
+
 def passed_on(signed):
     """What the page at a signed /embed/ adds to its requests."""
     return signed.partition("?")[2].partition("#")[0].replace("&sig=", "&embed=")
@@ -188,7 +274,7 @@ def test_splatd_sign_refuses_what_nobody_could_use():
         for path in ("/", "/tours", "/v1/status", "/v1/datasets", "/v1/datasets/", "/v1/tours", "/v1/tours/x/video.mp4",
                      "/v1/datasets/a/views", "/v1/datasets/a/tours", "/v1/datasets/a/view/", "/v1/datasets//view",
                      "/v1/datasets/a/b/view", "/V1/datasets/a", "/embed/", "/embed/a/b", "/embed", "/embed/a?width=16",
-                     "/embed/a%2", "/viewer/main.js", "/v1/datasets/a/view#x", "/x/embed/a"):
+                     "/embed/a%2", "/viewer/main.js", "/v1/datasets/a/tiles/", "/v1/datasets/a/view#x", "/x/embed/a"):
             for url in (path, "https://scans.example" + path):
                 done = subprocess.run([REAL, "sign", url, "--key", key], capture_output=True, text=True, timeout=30)
                 assert done.returncode == 2 and not done.stdout and path in done.stderr, (url, done)

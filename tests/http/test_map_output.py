@@ -243,6 +243,14 @@ def test_every_parameter_of_a_tile():
         for name, value in values.items():
             reply = d.ask(f"/v1/datasets/wall/tiles/0/0/0.png?{name}={value}")
             assert reply.status == 200, (name, reply.body)
+            said = d.ask(f"/v1/datasets/wall/tiles.json?{name}={value}")  # hands it on
+            assert said.status == 200, (name, said.body)
+            tile = d.ask(said.json()["tiles"][0].format(z=0, x=0, y=0))
+            assert tile.status == 200 and tile.headers["ETag"] == reply.headers["ETag"], (name, said.body)
+            assert "immutable" in tile.headers["Cache-Control"]
+        for wrong, field in (("eye=1,2,3", "eye"), ("lod=-1", "lod"), ("v=0123456789abcdef", "v"), ("{x}=1", "{x}")):
+            refused = d.ask(f"/v1/datasets/wall/tiles.json?{wrong}")
+            assert refused.status in (400, 404, 409, 410) and refused.json()["field"] == field, (wrong, refused.body)
 
 
 run(globals())

@@ -210,11 +210,13 @@ static bool refuse(struct request *request, unsigned status, const char *field, 
 static bool check_signature(struct request *request)
 {
     struct spl_error err = {0};
-    size_t kept = 0;
-    if (spl_sign_check(&request->service->access->key, request->uri, request->query, (int64_t)time(NULL), &kept, &err))
+    struct spl_signed found;
+    if (spl_sign_check(&request->service->access->key, request->uri, request->query, (int64_t)time(NULL), &found, &err))
         return refuse(request, MHD_HTTP_FORBIDDEN, err.field, NULL, err.message);
+    snprintf(request->grant, sizeof request->grant, "%s", found.grant);
+    request->expires_s = found.expires_s;
     // the query lies in request->uri, which is ours
-    request->uri[request->query - request->uri + (ptrdiff_t)kept] = '\0';
+    request->uri[request->query - request->uri + (ptrdiff_t)found.kept] = '\0';
     return true;
 }
 

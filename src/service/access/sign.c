@@ -16,9 +16,9 @@
 #include "service/access/secret.h"
 #include "service/request/request.h"
 
-enum { key_least = 32, key_most = 4096, target_max = 16 * 1024, page_max = 512 };
+enum { key_least = 32, key_most = 4096, target_max = 16 * 1024, page_max = 512, pyramid_max = 1024 };
 
-static const char datasets[] = "/v1/datasets/", pages[] = "/embed/";
+static const char datasets[] = "/v1/datasets/", pages[] = "/embed/", tiles[] = "/tiles/", tile_json[] = "/tiles.json";
 
 int spl_sign_key_read(const char *path, struct spl_sign_key *out, struct spl_error *err)
 {
@@ -66,19 +66,64 @@ static size_t find_id(const char *path, const char *prefix)
     return strncmp(path, prefix, length) ? 0 : strcspn(path + length, "/?#");
 }
 
+/* Is `text`[0..length) the name of a tile, "/tiles/3/1/2.png", and nothing that could mean another path? With `holes`,
+ * which templates of URLs have: "/tiles/{z}/{x}/{y}{r}.png". */
+static bool is_tile(const char *text, size_t length, bool holes)
+{
+    static const char digits[] = "0123456789";
+    const char *at = text, *end = text + length;
+    if (length < sizeof tiles || strncmp(text, tiles, sizeof tiles - 1))
+        return false;
+    at += sizeof tiles - 1;
+    for (const char *hole = "zxy"; *hole; hole++) {
+        size_t taken = holes ? 3 * (size_t)(at + 3 <= end && at[0] == '{' && at[1] == *hole && at[2] == '}') : strspn(at, digits);
+        at += taken;
+        if (!taken || (*hole != 'y' && *at++ != '/'))
+            return false;
+    }
+    if (at + 3 < end && (!strncmp(at, "@2x", 3) || (holes && !strncmp(at, "{r}", 3))))
+        at += 3;
+    size_t rest = at < end ? (size_t)(end - at) : 0;
+    return (rest == 4 && !strncmp(at, ".png", 4)) || (rest == 5 && !strncmp(at, ".webp", 5));
+}
+
+/* What all tiles of a dataset are signed as, /v1/datasets/ID/tiles/ with the ID as it stands: the length of it, of the
+ * dataset that `path` names; 0 where that is too long. */
+static size_t name_pyramid(const char *path, char out[pyramid_max])
+{
+    size_t head = sizeof datasets - 1 + find_id(path, datasets);
+    if (head + sizeof tiles > pyramid_max)
+        return 0;
+    memcpy(out, path, head);
+    memcpy(out + head, tiles, sizeof tiles);
+    return head + sizeof tiles - 1;
+}
+
+/* Where the part of `path`[0..length) behind a dataset's id begins; NULL where it is no dataset's. */
+static const char *find_rest(const char *path, size_t length)
+{
+    size_t id = find_id(path, datasets), head = sizeof datasets - 1 + id;
+    return id && head <= length ? path + head : NULL;
+}
+
+static bool is_rest(const char *path, size_t length, const char *wanted)
+{
+    const char *rest = find_rest(path, length);
+    return rest && (size_t)(path + length - rest) == strlen(wanted) && !strncmp(rest, wanted, strlen(wanted));
+}
+
 bool spl_sign_covers(const char *path, size_t length)
 {
-    static const char *const below[] = {"", "/view", "/pick", "/place", "/profile"};
+    static const char *const below[] = {"",         "/view",       "/pick",          "/place",
+                                        "/profile", "/legend.svg", "/thumbnail.jpg", tile_json};
     size_t id = find_id(path, pages);
     if (id)
         return sizeof pages - 1 + id == length;
-    if (!(id = find_id(path, datasets)))
-        return false;
-    const char *rest = path + sizeof datasets - 1 + id;
     for (size_t i = 0; i < sizeof below / sizeof *below; i++)
-        if ((size_t)(rest - path) + strlen(below[i]) == length && !strncmp(rest, below[i], strlen(below[i])))
+        if (is_rest(path, length, below[i]))
             return true;
-    return false;
+    const char *rest = find_rest(path, length);
+    return rest && is_tile(rest, (size_t)(path + length - rest), false);
 }
 
 /* The signed path of the page of the dataset that `path` names behind `prefix`. */
@@ -122,8 +167,22 @@ static int64_t parse_expiry(const char *text, const char *end)
     return value;
 }
 
-int spl_sign_check(const struct spl_sign_key *key, const char *path, const char *query, int64_t now_s, size_t *kept,
-                   struct spl_error *err)
+/* Whether `shown` signs all tiles of the dataset of `path`: its TileJSON or a tile. */
+static bool signs_pyramid(const struct spl_sign_key *key, const char *path, const char *query, size_t query_length,
+                          const char *shown)
+{
+    char right[SPL_DIGEST_TEXT], pyramid[pyramid_max];
+    struct spl_error ignored = {0};
+    size_t length = strlen(path), signed_length;
+    const char *rest = find_rest(path, length);
+    bool one = rest && (!strcmp(rest, tile_json) || is_tile(rest, strlen(rest), false));
+    return one && (signed_length = name_pyramid(path, pyramid)) &&
+           !make(key, pyramid, signed_length, query, query_length, right, &ignored) &&
+           spl_secret_is_equal(shown, right, SPL_DIGEST_TEXT - 1);
+}
+
+int spl_sign_check(const struct spl_sign_key *key, const char *path, const char *query, int64_t now_s,
+                   struct spl_signed *out, struct spl_error *err)
 {
     char right[SPL_DIGEST_TEXT], page[page_max];
     const char *last = last_of(query), *exp = last, *shown = strchr(last, '=');
@@ -143,13 +202,15 @@ int spl_sign_check(const struct spl_sign_key *key, const char *path, const char 
     const char *from = passed_on ? exp : query;
     if (rc || (rc = make(key, path, strlen(path), from, signed_length - (size_t)(from - query), right, err)))
         return rc;
-    if (strlen(++shown) != SPL_DIGEST_TEXT - 1 || !spl_secret_is_equal(shown, right, SPL_DIGEST_TEXT - 1))
+    if (strlen(++shown) != SPL_DIGEST_TEXT - 1 ||
+        (!spl_secret_is_equal(shown, right, SPL_DIGEST_TEXT - 1) &&
+         (path == page || !signs_pyramid(key, path, query, signed_length, shown))))
         return spl_fail_field(err, SPL_E_INPUT, "sig",
                               "the URL was not signed with this service's key, or was changed");
     int64_t expires = parse_expiry(exp + 4, last - 1);
     if (expires < now_s)
         return spl_fail_field(err, SPL_E_INPUT, "exp", "the URL has expired; ask its author for a new one");
-    *kept = exp == query ? 0 : (size_t)(exp - query) - 1;
+    *out = (struct spl_signed){.kept = exp == query ? 0 : (size_t)(exp - query) - 1, .expires_s = expires, .grant = exp};
     return 0;
 }
 
@@ -159,6 +220,13 @@ const char *spl_sign_path_of(const char *url)
     const char *path =
         scheme && !strncmp(url + scheme, "://", 3) ? url + scheme + 3 + strcspn(url + scheme + 3, "/?") : url;
     return *path == '/' ? path : NULL;
+}
+
+/* Is `path`[0..length) a template of all tiles, or their TileJSON? */
+static bool is_pyramid(const char *path, size_t length)
+{
+    const char *rest = find_rest(path, length);
+    return rest && (is_rest(path, length, tile_json) || is_tile(rest, (size_t)(path + length - rest), true));
 }
 
 /* Why `url`, whose path is `path` (may be NULL), cannot be signed. */
@@ -171,10 +239,11 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
                         url);
     size_t length = strcspn(path, "?#");
     bool page = find_id(path, pages);
-    if (!spl_sign_covers(path, length))
+    if (!spl_sign_covers(path, length) && !is_pyramid(path, length))
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick, "
-                        "/place and /profile, and the page /embed/ID; anything else needs a token",
+                        "/place, /profile, /legend.svg and /thumbnail.jpg, its tiles /tiles/{z}/{x}/{y}.png, and the "
+                        "page /embed/ID; anything else needs a token",
                         url);
     if (page && path[length] == '?')
         return spl_fail(err, SPL_E_USAGE,
@@ -202,7 +271,7 @@ static char *write_as_browsers_do(const char *query)
 
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err)
 {
-    char sig[SPL_DIGEST_TEXT], exp[32], page[page_max];
+    char sig[SPL_DIGEST_TEXT], exp[32], page[page_max], pyramid[pyramid_max];
     const char *path = spl_sign_path_of(url);
     *out = NULL;
     int rc = refuse(url, path, err);
@@ -226,6 +295,10 @@ int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expire
             rc = spl_fail(err, SPL_E_USAGE, "'%.200s' cannot be signed: %s", url, why.message);
         signed_path = page;
         signed_length = rc ? 0 : strlen(page);
+    } else if (is_pyramid(path, path_length)) {
+        signed_path = pyramid;
+        if (!(signed_length = name_pyramid(path, pyramid)))
+            rc = spl_fail(err, SPL_E_USAGE, "'%.200s' cannot be signed: its id is too long", url);
     }
     if (!rc)
         rc = make(key, signed_path, signed_length, signed_query, strlen(signed_query), sig, err);

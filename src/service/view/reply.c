@@ -4,8 +4,10 @@
  * counted in spl_views.reply_bytes. Owned by the loop's thread. */
 #include "service/view/reply.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -26,11 +28,16 @@ static void add_validator(struct request *request, const struct spl_key *key)
     char etag[SPL_ETAG_BYTES];
     spl_key_etag(key, etag);
     MHD_add_response_header(request->response, MHD_HTTP_HEADER_ETAG, etag);
-    // what not everybody may see is kept by clients, not by proxies
-    const char *forever =
-        request->service->access ? "private, max-age=31536000, immutable" : "public, max-age=31536000, immutable";
-    MHD_add_response_header(request->response, MHD_HTTP_HEADER_CACHE_CONTROL,
-                            request->versioned ? forever : "no-cache");
+    if (!request->versioned) {
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache");
+        return;
+    }
+    // what not everybody may see is kept by clients, not by proxies, and no longer than its signature holds
+    enum { year_s = 365 * 24 * 3600 };
+    int64_t left_s = request->expires_s ? request->expires_s - (int64_t)time(NULL) : year_s;
+    left_s = left_s < 0 ? 0 : left_s > year_s ? year_s : left_s;
+    spl_reply_add_header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "%s, max-age=%" PRId64 ", immutable",
+                         request->service->access ? "private" : "public", left_s);
 }
 
 static void release_rendering(void *rendering)

@@ -133,14 +133,14 @@ enum { expires = 2000000000 };
  */
 #define SIG "2XBn4JAxAIJXdgiOaQIWbDoR9Qvc7eY8dFymrv6PWI0"
 
-static int check(const struct spl_sign_key *key, const char *url, int64_t now, size_t *kept, struct spl_error *err)
+static int check(const struct spl_sign_key *key, const char *url, int64_t now, struct spl_signed *found, struct spl_error *err)
 {
     char path[400];
     snprintf(path, sizeof path, "%s", url);
     char *mark = strchr(path, '?');
     *mark = '\0';
     *err = (struct spl_error){0};
-    return spl_sign_check(key, path, mark + 1, now, kept, err);
+    return spl_sign_check(key, path, mark + 1, now, found, err);
 }
 
 static void signed_urls_hold_until_they_expire_and_not_when_changed(void **state)
@@ -149,23 +149,23 @@ static void signed_urls_hold_until_they_expire_and_not_when_changed(void **state
     struct spl_sign_key key = make_key(KEY), wrong = make_key("x123456789abcdef0123456789abcdef");
     struct spl_error err = {0};
     char *url = NULL;
-    size_t kept = 0;
+    struct spl_signed found = {0};
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/view?width=64", expires, &url, &err), 0);
     assert_string_equal(url, "/v1/datasets/wall/view?width=64&exp=2000000000&sig=" SIG);
-    assert_int_equal(check(&key, url, expires, &kept, &err), 0);
-    assert_int_equal(kept, strlen("width=64"));
-    assert_int_equal(check(&key, url, expires + 1, &kept, &err), SPL_E_INPUT);
+    assert_int_equal(check(&key, url, expires, &found, &err), 0);
+    assert_int_equal(found.kept, strlen("width=64"));
+    assert_int_equal(check(&key, url, expires + 1, &found, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "exp");
-    assert_int_equal(check(&wrong, url, 0, &kept, &err), SPL_E_INPUT);
+    assert_int_equal(check(&wrong, url, 0, &found, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "sig");
     for (size_t i = strlen("/v1/datasets/wall/view?"); url[i]; i++) { // every byte of the query counts
         url[i] ^= 1;
-        assert_int_equal(check(&key, url, 0, &kept, &err), SPL_E_INPUT);
+        assert_int_equal(check(&key, url, 0, &found, &err), SPL_E_INPUT);
         assert_null(strstr(err.message, SIG));
         url[i] ^= 1;
     }
     url[4] = 'e'; // and of the path
-    assert_int_equal(check(&key, url, 0, &kept, &err), SPL_E_INPUT);
+    assert_int_equal(check(&key, url, 0, &found, &err), SPL_E_INPUT);
     free(url);
     static const char *const broken[] = {"/a?sig=" SIG,
                                          "/a?exp=9",
@@ -174,7 +174,7 @@ static void signed_urls_hold_until_they_expire_and_not_when_changed(void **state
                                          "/a?exp=2000000000&sig=" SIG SIG,
                                          "/a?exp=2000000000&sig=" SIG "&x=1"};
     for (size_t i = 0; i < sizeof broken / sizeof *broken; i++)
-        assert_int_equal(check(&key, broken[i], 0, &kept, &err), SPL_E_INPUT);
+        assert_int_equal(check(&key, broken[i], 0, &found, &err), SPL_E_INPUT);
     spl_sign_key_finish(&wrong);
     spl_sign_key_finish(&key);
 }
@@ -185,20 +185,20 @@ static void urls_are_signed_with_or_without_host_and_query(void **state)
     struct spl_sign_key key = make_key(KEY);
     struct spl_error err = {0};
     char *whole = NULL, *path = NULL;
-    size_t kept = 7;
+    struct spl_signed found = {.kept = 7};
     assert_int_equal(spl_sign_url(&key, "https://h:1/v1/datasets/a", expires, &whole, &err), 0);
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/a", expires, &path, &err), 0);
     assert_string_equal(whole + strlen("https://h:1"), path);
-    assert_int_equal(check(&key, path, 0, &kept, &err), 0);
-    assert_int_equal(kept, 0);
+    assert_int_equal(check(&key, path, 0, &found, &err), 0);
+    assert_int_equal(found.kept, 0);
     free(whole);
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?from=http://y/z", expires, &whole, &err), 0);
-    assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
+    assert_int_equal(check(&key, whole, 0, &found, &err), 0);
     free(whole);
     /* as a browser asks for it */
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?clip='z'<2.5>\"&title=\xc3\xa4~%20+", expires, &whole, &err), 0);
     assert_non_null(strstr(whole, "?clip=%27z%27%3C2.5%3E%22&title=%C3%A4~%20+&exp="));
-    assert_int_equal(check(&key, whole, 0, &kept, &err), 0);
+    assert_int_equal(check(&key, whole, 0, &found, &err), 0);
     free(whole);
     const char *const bad[] = {"",     "v1/x", "https://host", "https://host?/x", "://h/x",
                                "/a#b", "/a b", path,           "/v1/datasets/a?exp=3",
@@ -222,7 +222,7 @@ static void a_signed_page_passes_its_signature_on(void **state)
     struct spl_sign_key key = make_key(KEY);
     struct spl_error err = {0};
     char *url = NULL;
-    size_t kept = 7;
+    struct spl_signed found = {.kept = 7};
     assert_int_equal(spl_sign_url(&key, "https://h/embed/w%61ll#eye=1,2,3", expires, &url, &err), 0);
     assert_string_equal(url, "https://h/embed/w%61ll?exp=2000000000&sig=" EMBED_SIG "#eye=1,2,3");
     free(url);
@@ -230,11 +230,11 @@ static void a_signed_page_passes_its_signature_on(void **state)
                                        "/v1/datasets/w%61ll/pick?exp=2000000000&embed=" EMBED_SIG,
                                        "/embed/wall?exp=2000000000&sig=" EMBED_SIG};
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
-        assert_int_equal(check(&key, good[i], expires, &kept, &err), 0);
-        assert_int_equal(kept, 0);
+        assert_int_equal(check(&key, good[i], expires, &found, &err), 0);
+        assert_int_equal(found.kept, 0);
     }
-    assert_int_equal(check(&key, "/v1/datasets/wall/view?eye=1&exp=2000000000&embed=" EMBED_SIG, 0, &kept, &err), 0);
-    assert_int_equal(kept, strlen("eye=1"));
+    assert_int_equal(check(&key, "/v1/datasets/wall/view?eye=1&exp=2000000000&embed=" EMBED_SIG, 0, &found, &err), 0);
+    assert_int_equal(found.kept, strlen("eye=1"));
     static const char *const bad[] = {"/v1/datasets/walls/view?exp=2000000000&embed=" EMBED_SIG,
                                       "/v1/datasets/wall?exp=2000000001&embed=" EMBED_SIG,
                                       "/v1/datasets/wall?exp=02000000000&embed=" EMBED_SIG,
@@ -244,9 +244,75 @@ static void a_signed_page_passes_its_signature_on(void **state)
                                       "/v1/tours/wall?exp=2000000000&embed=" EMBED_SIG,
                                       "/wall?exp=2000000000&embed=" EMBED_SIG};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        assert_int_equal(check(&key, bad[i], 0, &kept, &err), SPL_E_INPUT);
-    assert_int_equal(check(&key, good[0], expires + 1, &kept, &err), SPL_E_INPUT);
+        assert_int_equal(check(&key, bad[i], 0, &found, &err), SPL_E_INPUT);
+    assert_int_equal(check(&key, good[0], expires + 1, &found, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "exp");
+    spl_sign_key_finish(&key);
+}
+
+/* printf '/v1/datasets/wall/tiles/?class=2&exp=2000000000' | openssl dgst -sha256 -hmac KEY -binary | basenc --base64url */
+#define TILES_SIG "yrkxvyh_BaSnOvUxw7sTyeVgNJe8ZJxTatgjUQt5iMI"
+
+/* One signature holds for every tile with these parameters, and for nothing that is written otherwise. */
+static void all_tiles_are_signed_together(void **state)
+{
+    (void)state;
+    struct spl_sign_key key = make_key(KEY);
+    struct spl_error err = {0};
+    struct spl_signed found = {0};
+    char *url = NULL, path[200];
+    static const char grant[] = "?class=2&exp=2000000000&sig=" TILES_SIG;
+    static const char *const templates[] = {"{z}/{x}/{y}.png", "{z}/{x}/{y}{r}.png", "{z}/{x}/{y}@2x.webp", "{z}/{x}/{y}.webp"};
+    for (size_t i = 0; i < sizeof templates / sizeof *templates; i++) {
+        snprintf(path, sizeof path, "https://h/v1/datasets/wall/tiles/%s?class=2", templates[i]);
+        assert_int_equal(spl_sign_url(&key, path, expires, &url, &err), 0);
+        assert_string_equal(strchr(url, '?'), grant);
+        free(url);
+    }
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles.json?class=2", expires, &url, &err), 0);
+    assert_string_equal(strchr(url, '?'), grant);
+    free(url);
+    static const char *const good[] = {"/tiles/0/0/0.png", "/tiles/30/1073741823/0.webp", "/tiles/3/1/2@2x.png", "/tiles.json"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        snprintf(path, sizeof path, "/v1/datasets/wall%s", good[i]);
+        assert_true(spl_sign_covers(path, strlen(path)));
+        snprintf(path, sizeof path, "/v1/datasets/wall%s%s", good[i], grant);
+        assert_int_equal(check(&key, path, expires, &found, &err), 0);
+        assert_int_equal(found.kept, strlen("class=2"));
+        assert_int_equal(found.expires_s, expires);
+        assert_int_equal(check(&key, path, expires + 1, &found, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "exp");
+    }
+    static const char *const other[] = {"/v1/datasets/wall/tiles/", "/v1/datasets/wall/tiles/{z}/{x}/{y}.png",
+                                        "/v1/datasets/wall/tiles/0/0/0.jpg", "/v1/datasets/wall/tiles/0/0/0.png/",
+                                        "/v1/datasets/wall/tiles/0/0/0", "/v1/datasets/wall/tiles/0/0/.png",
+                                        "/v1/datasets/wall/tiles//0/0/0.png", "/v1/datasets/wall//tiles/0/0/0.png",
+                                        "/v1/datasets/wall/tiles/-1/0/0.png", "/v1/datasets/wall/tiles/../0/0.png",
+                                        "/v1/datasets/wall/tiles/%2e%2e/0/0.png", "/v1/datasets/wall/tiles/0/0/0.png%00",
+                                        "/v1/datasets/wall/tiles/0%2f0/0/0.png", "/v1/datasets/wall/tiles/%30/0/0.png",
+                                        "/v1/datasets/wall/tiles/0/0/0@3x.png", "/v1/datasets/wall/tiles/0/0/0@2x",
+                                        "/v1/datasets//tiles/0/0/0.png", "/v1/datasets/wall/tiles.json/"};
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++)
+        assert_false(spl_sign_covers(other[i], strlen(other[i])));
+    static const char *const bad[] = {"/v1/datasets/walk/tiles/0/0/0.png?class=2&exp=2000000000&sig=" TILES_SIG,
+                                      "/v1/datasets/w%61ll/tiles/0/0/0.png?class=2&exp=2000000000&sig=" TILES_SIG,
+                                      "/v1/datasets/wall/tiles/0/0/0.png?class=3&exp=2000000000&sig=" TILES_SIG,
+                                      "/v1/datasets/wall/tiles/0/0/0.png?exp=2000000000&sig=" TILES_SIG,
+                                      "/v1/datasets/wall/tiles/0/0/0.png?class=2&exp=2000000001&sig=" TILES_SIG,
+                                      "/v1/datasets/wall/tiles/0/0/0.png?class=2&exp=2000000000&embed=" TILES_SIG,
+                                      "/v1/datasets/wall/view?class=2&exp=2000000000&sig=" TILES_SIG,
+                                      "/v1/datasets/wall?class=2&exp=2000000000&sig=" TILES_SIG};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_int_equal(check(&key, bad[i], 0, &found, &err), SPL_E_INPUT);
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles/3/1/2.png", expires, &url, &err), 0); /* this one alone */
+    assert_int_equal(check(&key, url, 0, &found, &err), 0);
+    url[strlen("/v1/datasets/wall/tiles/")] = '4';
+    assert_int_equal(check(&key, url, 0, &found, &err), SPL_E_INPUT);
+    free(url);
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles/{z}/{y}/{x}.png", expires, &url, &err), SPL_E_USAGE);
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/thumbnail.jpg?width=64", expires, &url, &err), 0);
+    assert_int_equal(check(&key, url, 0, &found, &err), 0);
+    free(url);
     spl_sign_key_finish(&key);
 }
 
@@ -380,6 +446,7 @@ int main(void)
         cmocka_unit_test(signed_urls_hold_until_they_expire_and_not_when_changed),
         cmocka_unit_test(urls_are_signed_with_or_without_host_and_query),
         cmocka_unit_test(a_signed_page_passes_its_signature_on),
+        cmocka_unit_test(all_tiles_are_signed_together),
         cmocka_unit_test(keys_that_are_too_short_are_refused),
         cmocka_unit_test(buckets_empty_and_fill_again),
         cmocka_unit_test(a_table_full_of_addresses_still_works),
