@@ -134,7 +134,7 @@ def test_pictures():
         binaries = pathlib.Path(folder, "bin")
         binaries.mkdir()
         (binaries / "splatd").symlink_to(REAL)
-        for name, needs in (("default-views", "ffmpeg"), ("map-viewer", "chromium")):
+        for name, needs in (("default-views", "ffmpeg"), ("map-viewer", "chromium"), ("page", "chromium")):
             kept = ROOT / f"api/pictures/{name}.jpg"
             assert 20000 < kept.stat().st_size <= 150 * 1024, (name, kept.stat().st_size)
             if not shutil.which(needs) or (needs == "chromium" and not pathlib.Path("/usr/share/javascript/leaflet/leaflet.js").exists()):
