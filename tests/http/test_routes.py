@@ -444,7 +444,7 @@ def test_the_clients_are_listed():
         for entry in clients.json()["clients"]:
             file = d.ask(entry["uri"])
             assert file.status == 200 and len(file.body) == entry["bytes"] and entry["about"], entry
-        assert {entry["name"] for entry in clients.json()["clients"]} == {"splat-view.js", "splatd.py", "splatd.sh"}
+        assert {entry["name"] for entry in clients.json()["clients"]} == {"splat-map.js", "splat-view.js", "splatd.py", "splatd.sh"}
         page = d.ask("/clients/", headers={"Accept": "text/html,*/*;q=0.8"})
         assert page.headers["Content-Type"].startswith("text/html") and "script" not in page.body.decode()
         assert sorted(re.findall('href="([^"]+)"', page.body.decode())) == sorted(e["uri"] for e in clients.json()["clients"])
