@@ -21,7 +21,7 @@ shoot() { # name, size, pixels of the screen a pixel, fragment
 }
 # kernels of what is cut are compiled now, or the browser waits for less than they take
 curl -s -o "$out/first.jpg" "$service/v1/datasets/courtyard/view?clip=box:-9,-3,-1,9,9,5"
-shoot page 1280,800 1 '#dataset=courtyard&eye=7,-9,9&target=0,0.5,1&fov=50&clip=box:-9,-3,-1,9,9,5&mark=2.5,-1.4,2.3,Globe&mark=-4.1,2.7,3.5,Tree'
+shoot page 1280,800 1 '#dataset=courtyard&eye=7,-9,9&target=0,0.5,1&fov=50&clip=box:-9,-3,-1,9,9,5&mark=2.12,-0.92,1.88,Globe&mark=-4.1,2.7,3.5,Tree'
 shoot gallery 880,844 1 ''
 shoot phone 500,844 1 '#dataset=interior&clip=z%3C2.3'
 ffmpeg -v error -y -i "$out/page.png" -q:v 4 "$out/page.jpg"
