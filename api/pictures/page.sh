@@ -24,5 +24,5 @@ curl -s -o "$out/first.jpg" "$service/v1/datasets/courtyard/view?clip=box:-9,-3,
 shoot page 1280,800 1 '#dataset=courtyard&eye=7,-9,9&target=0,0.5,1&fov=50&clip=box:-9,-3,-1,9,9,5&mark=2.12,-0.92,1.88,Globe&mark=-4.1,2.7,3.5,Tree'
 shoot gallery 880,844 1 ''
 shoot phone 500,844 1 '#dataset=interior&clip=z%3C2.3'
-ffmpeg -v error -y -i "$out/page.png" -q:v 4 "$out/page.jpg"
+ffmpeg -v error -y -i "$out/page.png" -q:v 6 "$out/page.jpg"
 ffmpeg -v error -y -i "$out/gallery.png" -i "$out/phone.png" -filter_complex hstack -q:v 4 "$out/pages.jpg"
