@@ -47,7 +47,7 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
 }
 
 static const char *const projections[] = {"perspective", "orthographic", "equirectangular", "cube", "fisheye", NULL};
-_Static_assert(sizeof projections / sizeof *projections == SPL_PROJECTION_COUNT + 1, "its choices are numbered so");
+_Static_assert(sizeof projections / sizeof *projections == SPL_RAYS + 1, "its choices are numbered so");
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},

@@ -108,7 +108,8 @@ static bool is_orthographic(const struct spl_value *v)
 static bool is_around(const struct spl_value *v)
 {
     const double projection = v[SPL_CAMERA_projection].n[0];
-    return given(v, SPL_CAMERA_projection) && (projection == SPL_EQUIRECTANGULAR || projection == SPL_CUBE);
+    return given(v, SPL_CAMERA_projection) &&
+           (projection == SPL_EQUIRECTANGULAR || projection == SPL_CUBE || projection == SPL_RAYS);
 }
 
 static bool is_fisheye(const struct spl_value *v)
@@ -155,6 +156,12 @@ static int resolve_around(const struct spl_value *v, struct spl_camera *camera, 
     for (enum spl_camera_param other = SPL_CAMERA_model; other <= SPL_CAMERA_cy; other++)
         if (other != SPL_CAMERA_projection && given(v, other))
             return conflict(v, other, SPL_CAMERA_projection, err);
+    if (v[SPL_CAMERA_projection].n[0] == SPL_RAYS) { // their list is the caller's: spl_camera_set_rays()
+        camera->projection = SPL_RAYS;
+        camera->fx = camera->fy = 1;
+        camera->cx = camera->cy = 0.5;
+        return SPL_OK;
+    }
     int rc = spl_camera_set_around(camera, (enum spl_projection)v[SPL_CAMERA_projection].n[0], camera->width, camera->height,
                                    err);
     if (rc || !given(v, scan[0]))
