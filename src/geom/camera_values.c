@@ -220,6 +220,17 @@ static int resolve_orthographic(const struct spl_value *v, const struct spl_came
     return 0;
 }
 
+/* A form that says a pinhole's lens is no fisheye's, and no plan's, whose numbers mean other things. */
+static int check_form(const struct spl_value *v, struct spl_error *err)
+{
+    if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].source || v[SPL_CAMERA_projection].n[0] == SPL_PERSPECTIVE)
+        return 0;
+    for (enum spl_camera_param lens = SPL_CAMERA_fov; lens <= SPL_CAMERA_cy; lens++)
+        if (given(v, lens) && v[lens].source)
+            return conflict(v, SPL_CAMERA_projection, lens, err);
+    return 0;
+}
+
 static int resolve_intrinsics(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                               struct spl_camera *camera, struct spl_error *err)
 {
@@ -410,7 +421,7 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
         return rc;
     if (!defaults)
         defaults = &fallback;
-    if ((rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
+    if ((rc = check_form(values, err)) || (rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
         (is_around(values) ? (rc = resolve_around(values, camera, err))
                            : !is_orthographic(values) && (rc = resolve_intrinsics(values, defaults, camera, err))) ||
         (rc = resolve_pose(values, defaults, camera, &distance, err)) ||

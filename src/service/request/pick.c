@@ -34,7 +34,7 @@ static int resolve(struct values *values, const struct spl_camera_defaults *defa
         return rc;
     out->pick.crs = (uint32_t)values->v[PARAM_crs].n[0];
     spl_values_resolve_splats(values, &out->view);
-    if ((rc = spl_values_resolve_terms(values, defaults, &out->view, err)))
+    if ((rc = spl_values_resolve_terms(values, defaults, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
     out->view.camera = *camera;

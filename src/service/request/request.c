@@ -220,7 +220,7 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
         (values->rays && (rc = spl_view_set_rays(&out->view, values->rays, (enum spl_ray_frame)get(values, PARAM_frame, 0),
                                                  get(values, PARAM_resolution, 0), err))) ||
         (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_terms(values, defaults, &out->view, err)) ||
+        (rc = spl_values_resolve_terms(values, defaults, out, err)) ||
         (rc = spl_values_resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;

@@ -18,6 +18,7 @@ enum spl_container { SPL_CONTAINER_NONE, SPL_CONTAINER_MULTIPART, SPL_CONTAINER_
 
 struct spl_view_request {
     struct spl_view view;             /* deadline_ns is left at "none" */
+    uint32_t classes;                 /* terms of view.clip, its last, that were given as class */
     enum spl_layer layer;             /* the one bit of view.layers, or the first of several */
     enum spl_container container;     /* of `layers`; NONE: there is one layer, sent as it is */
     struct spl_encode_options encode; /* of `layer`; spl_view_get_encoding() for several; the dataset's unit of all */

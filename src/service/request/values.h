@@ -107,7 +107,7 @@ int spl_values_choose_view(struct values *values, const struct spl_camera_defaul
                            struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */
 int spl_values_resolve_terms(const struct values *values, const struct spl_camera_defaults *defaults,
-                             struct spl_view *view, struct spl_error *err);
+                             struct spl_view_request *out, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(struct values *values, const struct spl_camera_defaults *defaults,
