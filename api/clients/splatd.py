@@ -219,6 +219,31 @@ class Dataset:
                 if p.get_content_type() == "application/problem+json" else View(p.get_payload(decode=True), p)
                 for p in parts_of(body, headers)]
 
+    def rays(self, directions, layer="range", **params):
+        """How far it is along each direction, an array of floats, NaN where nothing is: a simulated lidar. `directions` is a
+        list of [x, y, z], or numpy's array of them, up to 2**20; frame="sensor" has x forward, y left, z up, "world" the
+        dataset's axes, "camera" x right, y down, z forward. Eye, target, matrix of a camera and so on as of a view; layer
+        "coverage" likewise, others as raw bytes."""
+        flat = array.array("d", [float(x) for row in directions for x in row])
+        count = len(flat) // 3
+        if sys.byteorder == "big":
+            flat.byteswap()
+        header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 3), }}".ljust(117) + "\n"
+        params = body_of({"layer": layer, "format": "raw", **params})
+        path = f"{self.info['uri']}/rays"
+        if "camera" in params:
+            body, kind = json.dumps({**posted(params), "directions": [list(map(float, row)) for row in directions]}).encode(), "application/json"
+        else:
+            body, kind = b"\x93NUMPY\x01\x00" + bytes((118, 0)) + header.encode() + flat.tobytes(), "application/x-npy"
+            path += f"?{query(params)}"
+        reply = self.service.ask(path, body, kind=kind)[0]
+        if layer not in ("range", "coverage"):
+            return reply
+        values = array.array("f", reply)
+        if sys.byteorder == "big":
+            values.byteswap()
+        return values
+
     def pick(self, x, y, **params):
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""
         return json.loads(self.ask(f"{self.info['uri']}/pick", {"x": x, "y": y, **params})[0])
@@ -264,9 +289,10 @@ class Splatd:
         self.timeout, self.patience = timeout, patience
         self.headers = {"Authorization": f"Bearer {token}"} if token else {}
 
-    def ask(self, path, body=None, method=None, granted=False):
-        """(bytes, headers) of a GET, of a POST of JSON, or of another method. `granted`: the path has its signature."""
-        headers = {**self.headers, **({"Content-Type": "application/json"} if body else {})}
+    def ask(self, path, body=None, method=None, granted=False, kind="application/json"):
+        """(bytes, headers) of a GET, of a POST of JSON, or of what `kind` says, or of another method. `granted`: the path has
+        its signature."""
+        headers = {**self.headers, **({"Content-Type": kind} if body else {})}
         if self.grant and not granted and not body:
             path = f"{path}{'' if path.endswith('?') else '&' if '?' in path else '?'}{self.grant}"
         until = time.monotonic() + self.patience

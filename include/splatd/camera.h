@@ -8,11 +8,13 @@
  *     u = fx c.x + cx,   v = fy c.y + cy
  * with fx and fy in pixels a unit. An equirectangular one has azimuth (from z towards x) and the angle below the xz
  * plane for c.x / c.z and c.y / c.z, fx and fy pixels a radian; a fisheye the angle off the axis, in the direction of
- * (c.x, c.y), bent by its lens; a cube is six pinholes of 90 degrees side by side. Pure functions; any thread. */
+ * (c.x, c.y), bent by its lens; a cube is six pinholes of 90 degrees side by side; rays are a list. Pure functions; any
+ * thread. */
 #ifndef SPLATD_CAMERA_H
 #define SPLATD_CAMERA_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include <splatd/api.h>
@@ -27,10 +29,12 @@ enum spl_projection {
                             from below */
     SPL_CUBE,            /* right, left, up, down, front and back, in this order; each height x height pixels */
     SPL_FISHEYE,         /* equidistant, or as `lens` bends it */
+    SPL_RAYS,            /* a list of directions, of spl_view.rays: an image of one column; fx = fy, pixels a radian of what
+                            they are looked up in */
     SPL_PROJECTION_COUNT
 };
 SPL_API const char *spl_projection_name(enum spl_projection projection);
-SPL_API int spl_projection_from_name(const char *name); /* -1 for an unknown name */
+SPL_API int spl_projection_from_name(const char *name); /* -1 for an unknown name, and of rays, which no name makes */
 
 /* What lenses add to a pinhole, or to angles: OpenCV's polynomials, which COLMAP, ROS and nerfstudio write too. */
 enum spl_distortion_kind {
@@ -77,6 +81,20 @@ SPL_API int spl_camera_set_around(struct spl_camera *camera, enum spl_projection
 SPL_API int spl_camera_set_fisheye(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                                    struct spl_error *err);
 
+/* Directions to look along, in any frame that the camera's rotation goes to; any thread. spl_rays_create() takes count
+ * times x, y, z of any length above 0, up to SPL_RAYS_MAX; what is none is refused by its place, counted from 0:
+ * SPL_E_INPUT, field "directions". NULL-safe: destroy. */
+enum { SPL_RAYS_MAX = 1 << 20 };
+struct spl_rays;
+SPL_API int spl_rays_create(const double *directions, size_t count, struct spl_rays **out, struct spl_error *err);
+SPL_API void spl_rays_destroy(struct spl_rays *rays);
+
+/* RAYS of the list: as many rows as it has directions. `resolution`, pixels a radian, is how finely what they hit is
+ * sampled; 0 = as densely as most of them lie, 256 to 1024. Field "resolution". The same are filled; the list itself goes
+ * into spl_view.rays. */
+SPL_API int spl_camera_set_rays(struct spl_camera *camera, const struct spl_rays *rays, double resolution,
+                                struct spl_error *err);
+
 /* Bends a pinhole by a RADIAL lens, and makes a fisheye of one by a FISHEYE lens (fx and fy are then pixels a radian);
  * NONE takes the lens away. Its reach is found here. Field "params". Fills projection and lens only. */
 SPL_API int spl_camera_set_lens(struct spl_camera *camera, const struct spl_distortion *lens, struct spl_error *err);
@@ -115,7 +133,7 @@ SPL_API int spl_camera_check(const struct spl_camera *camera, struct spl_error *
 SPL_API bool spl_camera_is_bent(const struct spl_camera *camera);
 
 /* The unit direction, in the camera's frame, of the ray through pixel (u, v); parallel rays begin beside the eye. False
- * where the lens has no image: outside of a fisheye's circle. */
+ * where the lens has no image, outside of a fisheye's circle, and of rays, which the camera does not hold. */
 SPL_API bool spl_camera_get_ray(const struct spl_camera *camera, double u, double v, double ray[3]);
 
 /* The pixel and view depth (of bent cameras the distance) of world point `p`; false (outputs untouched) where it has no

@@ -73,6 +73,7 @@ struct spl_encode_options {
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
     char unit[32];        /* of distances, for the note that a 16 bit PNG carries: "m", "ft"; "" = "unit" */
     struct spl_ground ground; /* of GeoTIFF, which is refused without */
+    bool list;            /* NPY of an image of one column, of rays: (n), not (n,1); (n,4), not (n,1,4) */
 };
 
 static inline void spl_encode_options_init(struct spl_encode_options *options)

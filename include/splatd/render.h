@@ -43,6 +43,7 @@ struct spl_view {
     struct spl_color_params color; /* what they show, the same */
     bool surrounded;            /* a piece of something larger, as a map's tile is: what lies beyond the borders acts on
                                    pixels at them as in the middle (eye-dome lighting, smoothing, specks that close) */
+    const struct spl_rays *rays; // may be NULL: of projection RAYS alone; borrowed while the view is rendered
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,

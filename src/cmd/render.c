@@ -4,10 +4,13 @@
  * Everything that can be refused without a device is refused before one is opened. */
 #include "cmd/cmd.h"
 
+#include <errno.h>
 #include <getopt.h>
+#include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <splatd/dataset.h>
 #include <splatd/render.h>
@@ -19,10 +22,13 @@
 #include "geom/camera_json.h"
 #include "geom/fit.h"
 #include "geom/ground.h"
+#include "geom/ray_list.h"
 #include "geom/size.h"
+#include "image/vectors.h"
 #include "render/soft_params.h"
 #include "service/place/places.h"
 #include "service/request/request.h"
+#include "service/request/values.h"
 
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
@@ -32,6 +38,11 @@ struct arguments {
     int projection;                      /* enum spl_projection, -1 = not given */
     double view_height, units_per_pixel; /* NAN = not given */
     double azimuth[3], elevation[3];     /* the same, of the first */
+    const char *rays_file; // may be NULL
+    int frame;             /* enum spl_ray_frame */
+    double resolution;     /* 0 = what suits the list */
+    struct spl_rays *rays; // may be NULL: of rays_file, once it is read
+    bool listed;           /* rays as JSON */
     bool world_file;
     uint32_t crs; /* of eye and target; 0 = the dataset's coordinates */
 };
@@ -47,7 +58,9 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
 }
 
 static const char *const projections[] = {"perspective", "orthographic", "equirectangular", "cube", "fisheye", NULL};
-_Static_assert(sizeof projections / sizeof *projections == SPL_PROJECTION_COUNT + 1, "its choices are numbered so");
+_Static_assert(sizeof projections / sizeof *projections == SPL_RAYS + 1, "its choices are numbered so");
+
+static const char *const frames[] = {"camera", "sensor", "world", NULL};
 
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
@@ -74,6 +87,12 @@ static const struct spl_cmd_option options[] = {
     {"azimuth", "A,B,N", "columns of an equirectangular image, instead of --size: a scanner's rays, N from A to B, degrees to the right of forward",
      SPL_CMD_VECTOR(struct arguments, azimuth)},
     {"elevation", "A,B,N", "its rows; degrees upwards", SPL_CMD_VECTOR(struct arguments, elevation)},
+    {"rays", "FILE", "directions to look along instead of --size: NPY of float32 or float64, (count, 3), or a .json array of [x, y, z]; "
+     "-o OUT.npy has a number for each, how far it is unless --layer says else, or OUT.json", SPL_CMD_TEXT(struct arguments, rays_file)},
+    {"frame", "F", "what --rays are in: camera, x right, y down, z forward; sensor, x forward, y left, z up; world", .otherwise = "camera",
+     SPL_CMD_CHOICE(struct arguments, frame, frames)},
+    {"resolution", "R", "pixels a radian that what --rays hit is drawn with", .otherwise = "256 to 1024, by how densely they lie",
+     SPL_CMD_REAL(struct arguments, resolution, 1, 16000)},
     {"size", "WxH", "pixels; W or xH alone: at the ratio of the default", .otherwise = "1280x720, 1440x720 all around, "
      "1920x320 of a cube, 720x720 of a fisheye", SPL_CMD_PIXELS(struct spl_cmd_drawing, size)},
     {"near", "N", "view depth from which on is drawn", SPL_CMD_REAL(struct arguments, near, 0, 1e12)},
@@ -81,7 +100,7 @@ static const struct spl_cmd_option options[] = {
     {.help = "Drawing:"},
     {"layer", "LAYER", "color, depth (along the viewing axis), range (along the ray), normal, id, coverage, "
      "primitive (splat, line, panel or mesh)",
-     .otherwise = "color", .take = spl_cmd_take_layer},
+     .otherwise = "color, of --rays range", .take = spl_cmd_take_layer},
     SPL_CMD_DRAWING_ROWS,
     {.help = "File:"},
     {"output", "FILE", "written in one piece; '-' is stdout and wants --format", .letter = 'o',
@@ -113,6 +132,8 @@ static const struct spl_cmd_table table = {
         "All around, upright, and how far everything is along its ray:\n"
         "  splatd render courtyard.spld --projection equirectangular --eye 0,0,1.7 --target 5,0,1.7 -o around.jpg\n"
         "  splatd render courtyard.spld --projection equirectangular --eye 0,0,1.7 --target 5,0,1.7 --layer range -o range.npy\n"
+        "What a robot's lidar would measure, along directions of a file, x forward, y left, z up:\n"
+        "  splatd render courtyard.spld --rays directions.npy --frame sensor --eye 0,0,1.2 --target 5,0,1.2 -o ranges.npy\n"
         "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
         "  splatd render courtyard.spld --eye 6,-6.5,5.5 --target -3,2.6,2.5 --fov 50 \\\n"
         "         --soft 'box:-7,0.2,1.8,-1.2,5.4,6.5' --soft-opacity 0.6 --soft-cover 0.5 -o through.jpg\n"
@@ -128,6 +149,54 @@ static const struct spl_cmd_table table = {
     .count = sizeof options / sizeof *options,
 };
 
+/* What --rays excludes, and the formats that lists have. */
+static int check_rays(struct arguments *a, struct spl_error *err)
+{
+    const struct {
+        const char *name;
+        bool given;
+    } others[] = {{"size", a->drawing.size[0] || a->drawing.size[1]}, {"projection", a->projection >= 0}, {"fov", !isnan(a->fov)},
+                  {"fx", !isnan(a->fx)}, {"fy", !isnan(a->fy)}, {"cx", !isnan(a->cx)}, {"cy", !isnan(a->cy)},
+                  {"view-height", !isnan(a->view_height)}, {"units-per-pixel", !isnan(a->units_per_pixel)},
+                  {"azimuth", !isnan(a->azimuth[0])}, {"elevation", !isnan(a->elevation[0])}, {"world-file", a->world_file}};
+    if (!a->drawing.view.layers) {
+        a->drawing.layer = a->rays_file ? SPL_LAYER_RANGE : SPL_LAYER_COLOR;
+        a->drawing.view.layers = 1u << a->drawing.layer;
+    }
+    if (!a->rays_file && (a->resolution > 0 || a->frame))
+        return spl_fail(err, SPL_E_USAGE, "--%s goes with --rays", a->frame ? "frame" : "resolution");
+    for (size_t i = 0; a->rays_file && i < sizeof others / sizeof *others; i++)
+        if (others[i].given)
+            return spl_fail(err, SPL_E_USAGE, "--rays and --%s exclude each other", others[i].name);
+    return SPL_OK;
+}
+
+static int read_rays(struct arguments *a, struct spl_error *err)
+{
+    const bool json = !strcmp(spl_cmd_ending(a->rays_file), "json");
+    FILE *file = fopen(a->rays_file, "rb");
+    struct stat status;
+    if (!file || fstat(fileno(file), &status)) {
+        int rc = spl_fail_errno(err, errno, "%s: cannot be read", a->rays_file);
+        if (file)
+            fclose(file);
+        return rc;
+    }
+    int rc;
+    if (json) {
+        json_error_t where;
+        json_t *list = json_loadf(file, 0, &where);
+        rc = list ? spl_rays_from_json(list, &a->rays, err)
+                  : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file, where.line,
+                                   where.column, where.text);
+        json_decref(list);
+    } else {
+        rc = spl_rays_from_npy(file, (uint64_t)status.st_size, a->rays_file, &a->rays, err);
+    }
+    fclose(file);
+    return rc;
+}
+
 /* --format, else what stands behind the last dot. */
 static int resolve_format(struct arguments *a, struct spl_error *err)
 {
@@ -135,6 +204,9 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE, "render needs a file to write to: -o OUT.jpg, .png or .npy");
     const char *ending = spl_cmd_ending(a->drawing.output);
     int named = spl_format_from_name(ending);
+    a->listed = a->rays_file && a->drawing.format < 0 && !strcmp(ending, "json");
+    if (a->listed)
+        named = SPL_FORMAT_RAW;
     if (a->drawing.format < 0)
         a->drawing.format = named;
     else if ((named >= 0 && named != a->drawing.format) || !strcmp(ending, "spld"))
@@ -146,6 +218,10 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
                         "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
+    a->drawing.encode.list = a->rays_file;
+    if (a->rays_file && a->drawing.format != SPL_FORMAT_NPY && a->drawing.format != SPL_FORMAT_RAW)
+        return spl_fail(err, SPL_E_USAGE, "--rays are written as .npy, .json or --format raw, not %s",
+                        spl_format_name(a->drawing.encode.format));
     return SPL_OK;
 }
 
@@ -184,8 +260,9 @@ static void give(struct spl_value *values, enum spl_camera_param param, const do
 static int resolve_projection(const struct arguments *a, const struct spl_saved_view *from, const double fit[2],
                               struct spl_camera *camera, struct spl_error *err)
 {
-    const double projection = a->projection < 0 ? (double)NAN : a->projection, size[2] = {a->drawing.size[0], a->drawing.size[1]};
-    const struct spl_camera_limits limits = {.side_px = 65535, .pixels = UINT64_MAX};
+    const double projection = a->rays ? SPL_RAYS : a->projection < 0 ? (double)NAN : a->projection;
+    const double size[2] = {a->rays ? 1 : a->drawing.size[0], a->rays ? a->rays->count : a->drawing.size[1]};
+    const struct spl_camera_limits limits = {.side_px = a->rays ? SPL_RAYS_MAX : 65535, .pixels = UINT64_MAX};
     struct spl_camera_defaults defaults = {
         .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far};
     struct spl_value values[SPL_CAMERA_PARAMS] = {0};
@@ -267,9 +344,11 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     rc = rc ? rc : start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
-    if (a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
+    if (a->rays || a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
         const double *fit = spl_dataset_get_info(dataset)->default_fit;
         rc = resolve_projection(a, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
+        if (!rc && a->rays)
+            rc = spl_view_set_rays(&a->drawing.view, a->rays, (enum spl_ray_frame)a->frame, a->resolution, err);
         return rc ? rc : spl_view_check(&a->drawing.view, err);
     }
     if (!isnan(a->fov) && !isnan(a->fx))
@@ -367,7 +446,8 @@ static int render(struct arguments *a, struct spl_error *err)
     struct spl_renderer *renderer = NULL;
     struct spl_frame frame = {0};
     struct spl_encoded encoded = {0};
-    int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
+    int rc = a->rays_file ? read_rays(a, err) : SPL_OK;
+    rc = rc ? rc : spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
     if (!rc)
         rc = resolve_camera(a, dataset, err);
     if (!rc)
@@ -381,7 +461,8 @@ static int render(struct arguments *a, struct spl_error *err)
     if (!rc)
         rc = spl_renderer_render(renderer, dataset, &a->drawing.view, &frame, err);
     if (!rc)
-        rc = spl_image_encode(&frame.images[a->drawing.layer], &a->drawing.encode, &encoded, err);
+        rc = a->listed ? spl_image_list_json(&frame.images[a->drawing.layer], &encoded, err)
+                       : spl_image_encode(&frame.images[a->drawing.layer], &a->drawing.encode, &encoded, err);
     if (!rc)
         rc = spl_cmd_write_output(a->drawing.output, encoded.bytes, encoded.length, err);
     if (!rc)
@@ -394,6 +475,7 @@ static int render(struct arguments *a, struct spl_error *err)
         spl_renderer_remove(renderer, dataset);
     spl_renderer_destroy(renderer);
     spl_dataset_close(dataset);
+    spl_rays_destroy(a->rays);
     return rc;
 }
 
@@ -406,6 +488,7 @@ int spl_cmd_render(int argc, char **argv)
     };
     struct spl_error err = {0};
     spl_cmd_drawing_init(&a.drawing, 0, 0);
+    a.drawing.view.layers = 0; // not said
     int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
     if (rc == SPL_CMD_DONE)
         return 0;
@@ -415,7 +498,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_soft(&a.drawing, &err) || check_rays(&a, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

@@ -68,7 +68,7 @@ static int check_place(const double v[3], const char *field, struct spl_error *e
 }
 
 static const char *const projections[SPL_PROJECTION_COUNT] = {"perspective", "orthographic", "equirectangular", "cube",
-                                                               "fisheye"};
+                                                               "fisheye", "rays"};
 
 const char *spl_projection_name(enum spl_projection projection)
 {
@@ -77,7 +77,7 @@ const char *spl_projection_name(enum spl_projection projection)
 
 int spl_projection_from_name(const char *name)
 {
-    for (int i = 0; i < SPL_PROJECTION_COUNT; i++)
+    for (int i = 0; i < SPL_RAYS; i++)
         if (!strcmp(name, projections[i]))
             return i;
     return -1;

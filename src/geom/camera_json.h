@@ -37,7 +37,8 @@ enum spl_value_place {
     SPL_PLACE = 32,
     SPL_THUMBNAIL = 64,
     SPL_TILE = 128,
-    SPL_SAVED = 256
+    SPL_SAVED = 256,
+    SPL_LIST = 512
 };
 
 enum spl_camera_param {

@@ -51,6 +51,11 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
                               spl_projection_name(camera->projection), spl_projection_name(first->projection));
     if (path->count && memcmp(&camera->lens, &first->lens, sizeof first->lens))
         return spl_fail_field(err, SPL_E_INPUT, "params", "the lens of a path's cameras is one");
+    const bool scans = camera->projection == SPL_EQUIRECTANGULAR; // whose rays nothing lies between
+    if (path->count && scans && (camera->fx != first->fx || camera->cx != first->cx))
+        return spl_fail_field(err, SPL_E_INPUT, "azimuth", "the azimuths of a path's scans are one, as of its first camera");
+    if (path->count && scans && (camera->fy != first->fy || camera->cy != first->cy))
+        return spl_fail_field(err, SPL_E_INPUT, "elevation", "the elevations of a path's scans are one, as of its first camera");
     if (path->count == path->capacity && grow(path, err))
         return SPL_E_NOMEM;
     if (!path->count && isnan(time)) {

@@ -108,7 +108,8 @@ static bool is_orthographic(const struct spl_value *v)
 static bool is_around(const struct spl_value *v)
 {
     const double projection = v[SPL_CAMERA_projection].n[0];
-    return given(v, SPL_CAMERA_projection) && (projection == SPL_EQUIRECTANGULAR || projection == SPL_CUBE);
+    return given(v, SPL_CAMERA_projection) &&
+           (projection == SPL_EQUIRECTANGULAR || projection == SPL_CUBE || projection == SPL_RAYS);
 }
 
 static bool is_fisheye(const struct spl_value *v)
@@ -155,6 +156,12 @@ static int resolve_around(const struct spl_value *v, struct spl_camera *camera, 
     for (enum spl_camera_param other = SPL_CAMERA_model; other <= SPL_CAMERA_cy; other++)
         if (other != SPL_CAMERA_projection && given(v, other))
             return conflict(v, other, SPL_CAMERA_projection, err);
+    if (v[SPL_CAMERA_projection].n[0] == SPL_RAYS) { // their list is the caller's: spl_camera_set_rays()
+        camera->projection = SPL_RAYS;
+        camera->fx = camera->fy = 1;
+        camera->cx = camera->cy = 0.5;
+        return SPL_OK;
+    }
     int rc = spl_camera_set_around(camera, (enum spl_projection)v[SPL_CAMERA_projection].n[0], camera->width, camera->height,
                                    err);
     if (rc || !given(v, scan[0]))
@@ -210,6 +217,17 @@ static int resolve_orthographic(const struct spl_value *v, const struct spl_came
     camera->fy = get(v, SPL_CAMERA_fy, camera->fx);
     camera->cx = get(v, SPL_CAMERA_cx, camera->cx);
     camera->cy = get(v, SPL_CAMERA_cy, camera->cy);
+    return 0;
+}
+
+/* A form that says a pinhole's lens is no fisheye's, and no plan's, whose numbers mean other things. */
+static int check_form(const struct spl_value *v, struct spl_error *err)
+{
+    if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].source || v[SPL_CAMERA_projection].n[0] == SPL_PERSPECTIVE)
+        return 0;
+    for (enum spl_camera_param lens = SPL_CAMERA_fov; lens <= SPL_CAMERA_cy; lens++)
+        if (given(v, lens) && v[lens].source)
+            return conflict(v, SPL_CAMERA_projection, lens, err);
     return 0;
 }
 
@@ -403,7 +421,7 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
         return rc;
     if (!defaults)
         defaults = &fallback;
-    if ((rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
+    if ((rc = check_form(values, err)) || (rc = resolve_size(values, limits, &camera->width, &camera->height, err)) ||
         (is_around(values) ? (rc = resolve_around(values, camera, err))
                            : !is_orthographic(values) && (rc = resolve_intrinsics(values, defaults, camera, err))) ||
         (rc = resolve_pose(values, defaults, camera, &distance, err)) ||

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "geom/distortion.h"
+#include "geom/ray_list.h"
 
 const double spl_face_axes[SPL_FACES][9] = {
     {0, 0, -1, 0, 1, 0, 1, 0, 0}, {0, 0, 1, 0, 1, 0, -1, 0, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0},
@@ -163,7 +164,7 @@ static double find_focal(const struct spl_camera *camera, double widest)
     const double focal = fmax(fabs(camera->fx), fabs(camera->fy)), end = fmin(widest, M_PI_2);
     const bool fisheye = camera->projection == SPL_FISHEYE;
     double needed = 1;
-    if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE)
+    if (camera->projection == SPL_EQUIRECTANGULAR || camera->projection == SPL_CUBE || camera->projection == SPL_RAYS)
         return focal;
     for (int i = 1; i <= grow_steps; i++) {
         const double angle = end * i / grow_steps, sine = sin(angle);
@@ -179,6 +180,18 @@ static double find_focal(const struct spl_camera *camera, double widest)
 
 int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err)
 {
+    return spl_faces_init_of(faces, camera, NULL, side_px, err);
+}
+
+/* Who is to blame for too large a face. */
+static const char *blame(const struct spl_camera *camera)
+{
+    return camera->projection == SPL_RAYS ? "resolution" : camera->lens.kind ? "params" : "width";
+}
+
+int spl_faces_init_of(struct spl_faces *faces, const struct spl_camera *camera, const struct spl_rays *rays,
+                      uint32_t side_px, struct spl_error *err)
+{
     const bool sphere = camera->width >= 6.283185 * fabs(camera->fx) && camera->height >= 3.141592 * fabs(camera->fy);
     const bool whole = (camera->projection == SPL_EQUIRECTANGULAR && sphere) || camera->projection == SPL_CUBE;
     struct parts parts;
@@ -189,7 +202,10 @@ int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uin
             parts.high[i][k] = whole ? 1 : -INFINITY;
         }
     parts.least = 1;
-    if (!whole) {
+    if (rays) {
+        memcpy(parts.low, rays->low, sizeof parts.low);
+        memcpy(parts.high, rays->high, sizeof parts.high);
+    } else if (!whole) {
         add_image_edges(&parts, camera);
         add_reach(&parts, camera);
         add_face_edges(&parts, camera);
@@ -210,7 +226,7 @@ int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uin
             from[k] = floor(parts.low[i][k] * focal + middle) - SPL_FACE_MARGIN;
             size[k] = ceil(parts.high[i][k] * focal + middle) + SPL_FACE_MARGIN - from[k];
             if (!(size[k] <= side_px))
-                return spl_fail_field(err, SPL_E_LIMIT, camera->lens.kind ? "params" : "width",
+                return spl_fail_field(err, SPL_E_LIMIT, blame(camera),
                                       "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
                                       "%u are drawn", size[k], side_px);
         }

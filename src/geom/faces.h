@@ -27,6 +27,10 @@ struct spl_faces {
  * "width" and "params", where a side would be more than `side_px`. */
 int spl_faces_init(struct spl_faces *faces, const struct spl_camera *camera, uint32_t side_px, struct spl_error *err);
 
+/* The same of a camera that may be one of RAYS; the list is NULL of others. Field "resolution". */
+int spl_faces_init_of(struct spl_faces *faces, const struct spl_camera *camera, const struct spl_rays *rays,
+                      uint32_t side_px, struct spl_error *err);
+
 /* The face of a direction in the camera's frame, and its pixel. *along: the direction's component along the face's axis. */
 unsigned spl_faces_place(const struct spl_faces *faces, const double ray[3], double pixel[2], double *along);
 

@@ -124,6 +124,8 @@ bool spl_camera_get_ray(const struct spl_camera *camera, double u, double v, dou
 {
     const uint32_t face = camera->projection == SPL_CUBE ? face_at(camera, u) : 0;
     const double x = (u - (double)face * camera->height - camera->cx) / camera->fx, y = (v - camera->cy) / camera->fy;
+    if (camera->projection == SPL_RAYS)
+        return false;
     if (camera->projection == SPL_ORTHOGRAPHIC) {
         ray[0] = ray[1] = 0;
         ray[2] = 1;
@@ -148,7 +150,7 @@ bool spl_camera_get_ray(const struct spl_camera *camera, double u, double v, dou
 bool spl_camera_place(const struct spl_camera *camera, const double c[3], double pixel[2])
 {
     const double beside = c[0] * c[0] + c[1] * c[1];
-    if (!(beside + c[2] * c[2] > 0))
+    if (!(beside + c[2] * c[2] > 0) || camera->projection == SPL_RAYS)
         return false;
     if (camera->projection == SPL_EQUIRECTANGULAR) {
         const double turn = 2 * M_PI * camera->fx, u = camera->cx + camera->fx * atan2(c[0], c[2]);

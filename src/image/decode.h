@@ -12,6 +12,13 @@ int spl_decode_png(FILE *file, const char *path, struct spl_image *out, struct s
 int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 
+/* load_npy.c: the text between magic and numbers, as a string, with the file left at the numbers; what stands behind 'key':
+ * there, or NULL; and of a shape its sides, none where it is broken. */
+enum { SPL_NPY_HEADER_MAX = 4096, SPL_NPY_SHAPE_MAX = 4 };
+int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_MAX], struct spl_error *err);
+const char *spl_npy_find(const char *header, const char *key);
+unsigned spl_npy_parse_shape(const char *at, uint64_t shape[SPL_NPY_SHAPE_MAX]);
+
 /* The headers alone. */
 int spl_inspect_png(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);
 int spl_inspect_jpeg(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);

@@ -18,7 +18,7 @@ extern const bool spl_tiff_is_built;
 /* depth_scale and unit of `options` count; the scale is above 0. */
 int spl_encode_png(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
                    struct spl_error *err);
-int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
+int spl_encode_npy(const struct spl_image *image, bool list, struct spl_encoded *out, struct spl_error *err);
 int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err);
 
 /* ---- 8 bit pictures of the layers that are no picture yet (convert.c) ----

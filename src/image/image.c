@@ -165,7 +165,7 @@ static int encode(const struct spl_image *image, const struct spl_encode_options
         rc = spl_encode_tiff(image, &options->ground, out, err);
         break;
     case SPL_FORMAT_NPY:
-        rc = spl_encode_npy(image, out, err);
+        rc = spl_encode_npy(image, options->list, out, err);
         break;
     default:
         rc = spl_encode_raw(image, out, err);

@@ -9,7 +9,7 @@
 
 #include "image/decode.h"
 
-enum { header_max = 4096, prefix_bytes = 10, shape_max = 4 };
+enum { prefix_bytes = 10 };
 
 static const struct {
     const char *type;
@@ -27,7 +27,7 @@ static int fail(const char *path, const char *field, const char *what, struct sp
 }
 
 /* The text between magic and pixels, as a string; the file stands at the pixels. */
-static int read_header(FILE *file, const char *path, char text[header_max], struct spl_error *err)
+int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_MAX], struct spl_error *err)
 {
     unsigned char prefix[prefix_bytes + 2];
     size_t length = 0, more = 0;
@@ -39,7 +39,7 @@ static int read_header(FILE *file, const char *path, char text[header_max], stru
         length |= (size_t)prefix[10] << 16 | (size_t)prefix[11] << 24;
     if (length == 0 || prefix[6] < 1 || prefix[6] > 3)
         return fail(path, "version", "broken, or of a version other than 1, 2 and 3", err);
-    if (length >= header_max)
+    if (length >= SPL_NPY_HEADER_MAX)
         return fail(path, "header", "longer than that of any image", err);
     if (fread(text, 1, length, file) != length)
         return fail(path, "header", "cut off", err);
@@ -48,7 +48,7 @@ static int read_header(FILE *file, const char *path, char text[header_max], stru
 }
 
 /* What stands behind 'key': */
-static const char *find(const char *header, const char *key)
+const char *spl_npy_find(const char *header, const char *key)
 {
     const char *at = strstr(header, key);
     at = at ? at + strlen(key) : NULL;
@@ -56,12 +56,12 @@ static const char *find(const char *header, const char *key)
     return at && *at == ':' ? at + 1 + strspn(at + 1, " ") : NULL;
 }
 
-static unsigned parse_shape(const char *at, uint64_t shape[shape_max])
+unsigned spl_npy_parse_shape(const char *at, uint64_t shape[SPL_NPY_SHAPE_MAX])
 {
     unsigned count = 0;
     if (!at || *at++ != '(')
         return 0;
-    for (at += strspn(at, " "); *at >= '0' && *at <= '9' && count < shape_max; at += strspn(at, " ,")) {
+    for (at += strspn(at, " "); *at >= '0' && *at <= '9' && count < SPL_NPY_SHAPE_MAX; at += strspn(at, " ,")) {
         char *end;
         errno = 0;
         shape[count++] = strtoull(at, &end, 10);
@@ -74,23 +74,23 @@ static unsigned parse_shape(const char *at, uint64_t shape[shape_max])
 
 int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct spl_error *err)
 {
-    char header[header_max];
-    uint64_t shape[shape_max];
+    char header[SPL_NPY_HEADER_MAX];
+    uint64_t shape[SPL_NPY_SHAPE_MAX];
     const char *wanted = rows[out->type].type;
     unsigned channels = rows[out->type].channels, dimensions = channels ? 3 : 2;
-    int rc = read_header(file, path, header, err);
+    int rc = spl_npy_read_header(file, path, header, err);
     if (rc)
         return rc;
-    const char *descr = find(header, "'descr'"), *order = find(header, "'fortran_order'");
+    const char *descr = spl_npy_find(header, "'descr'"), *order = spl_npy_find(header, "'fortran_order'");
     if (!descr || *descr++ != '\'' || strncmp(descr, wanted, strlen(wanted)) || descr[strlen(wanted)] != '\'')
         return spl_fail_field(err, SPL_E_INPUT, "descr", "%s: layer %s is stored as '%s', not '%.*s'", path,
                               spl_layer_name(out->layer), wanted, descr ? (int)strcspn(descr, "'}") : 0,
                               descr ? descr : "");
     if (!order || strncmp(order, "False", 5))
         return fail(path, "fortran_order", "rows must come first: fortran_order must be False", err);
-    const char *given = find(header, "'shape'"), *text = given ? given : "none";
+    const char *given = spl_npy_find(header, "'shape'"), *text = given ? given : "none";
     size_t length = strcspn(text, ")}\n");
-    unsigned count = parse_shape(given, shape);
+    unsigned count = spl_npy_parse_shape(given, shape);
     if (count != dimensions || (channels && shape[2] != channels))
         return spl_fail_field(err, SPL_E_INPUT, "shape", "%s: layer %s has the shape (height, width%s), not %.*s", path,
                               spl_layer_name(out->layer),

@@ -12,7 +12,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "pixels are written as
 
 enum { NPY_ALIGNMENT = 64, NPY_HEADER_MAX = 128, NPY_PREFIX = 10 };
 
-static size_t make_header(const struct spl_image *image, char header[NPY_HEADER_MAX])
+static size_t make_header(const struct spl_image *image, bool list, char header[NPY_HEADER_MAX])
 {
     static const struct {
         const char *type, *channels;
@@ -22,9 +22,13 @@ static size_t make_header(const struct spl_image *image, char header[NPY_HEADER_
         [SPL_PIXEL_F32X3] = {"<f4", ", 3"},
         [SPL_PIXEL_U32] = {"<u4", ""},
     };
+    const char *channels = rows[image->type].channels;
+    char columns[16] = "";
+    if (!list)
+        snprintf(columns, sizeof columns, ", %u", image->width);
     int written = snprintf(header + NPY_PREFIX, NPY_HEADER_MAX - NPY_PREFIX,
-                           "{'descr': '%s', 'fortran_order': False, 'shape': (%u, %u%s), }", rows[image->type].type,
-                           image->height, image->width, rows[image->type].channels);
+                           "{'descr': '%s', 'fortran_order': False, 'shape': (%u%s%s%s), }", rows[image->type].type,
+                           image->height, columns, channels, list && !*channels ? "," : "");
     size_t used = NPY_PREFIX + (size_t)written;
     size_t length = (used + 1 + NPY_ALIGNMENT - 1) / NPY_ALIGNMENT * NPY_ALIGNMENT;
     memset(header + used, ' ', length - used - 1);
@@ -51,10 +55,10 @@ static int store(const struct spl_image *image, const char *header, size_t heade
     return SPL_OK;
 }
 
-int spl_encode_npy(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err)
+int spl_encode_npy(const struct spl_image *image, bool list, struct spl_encoded *out, struct spl_error *err)
 {
     char header[NPY_HEADER_MAX];
-    return store(image, header, make_header(image, header), out, err);
+    return store(image, header, make_header(image, list && image->width == 1, header), out, err);
 }
 
 int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struct spl_error *err)

@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "geom/ray_list.h"
 #include "geom/size.h"
 #include "image/enlarge.h"
 #include "image/rows.h"
@@ -33,7 +34,7 @@ int spl_around_create(struct spl_view *view, struct spl_around **out, struct spl
     if (!around)
         return SPL_E_NOMEM;
     around->side = (uint32_t)view->supersample;
-    int rc = spl_faces_init(&around->faces, &view->camera, SPL_VIEW_SIDE_MAX, err);
+    int rc = spl_faces_init_of(&around->faces, &view->camera, view->rays, SPL_VIEW_SIDE_MAX, err);
     if (rc)
         return rc;
     if (view->layers & range)
@@ -111,7 +112,10 @@ struct job {
 static void look_up_pixel(const struct job *j, uint32_t x, uint32_t y)
 {
     double ray[3], place[2], along = 0;
-    const bool sees = spl_camera_get_ray(&j->wanted->camera, x + 0.5, y + 0.5, ray);
+    const bool listed = j->wanted->rays != NULL;
+    const bool sees = listed || spl_camera_get_ray(&j->wanted->camera, x + 0.5, y + 0.5, ray);
+    if (listed)
+        memcpy(ray, j->wanted->rays->directions[y], sizeof ray);
     const unsigned face = sees ? spl_faces_place(&j->around->faces, ray, place, &along) : 0;
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
         const struct spl_image *image = &j->images[layer], *from = j->around->images[face];
@@ -140,5 +144,6 @@ void spl_around_look_up(const struct spl_around *around, const struct spl_view *
                         struct spl_image images[SPL_LAYER_COUNT], uint32_t begin, uint32_t end)
 {
     struct job job = {.around = around, .wanted = wanted, .images = images, .first = begin};
-    spl_parallel_for(0, end - begin, 8, look_up_rows, &job);
+    const size_t rows = wanted->rays ? 1024 : 8; /* of one pixel */
+    spl_parallel_for(0, end - begin, rows, look_up_rows, &job);
 }

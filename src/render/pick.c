@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/error.h"
 #include "dataset/dataset.h"
 #include "dataset/panels.h"
 #include "geom/faces.h"
@@ -15,8 +16,9 @@
 static const double nowhere = 1e30; // view depth: nothing lies so far away
 
 /* The camera that sees pixel (x, y) of `camera`'s image at at[0], at[1] of its own: itself, or of a bent one the face that
- * is looked up there. False where no ray goes. */
-static bool find_camera(const struct spl_camera *camera, double x, double y, struct spl_camera *out, double at[2])
+ * is looked up there, of width 0 where no ray goes. SPL_E_LIMIT where the faces are too large to be drawn. */
+static int find_camera(const struct spl_camera *camera, double x, double y, struct spl_camera *out, double at[2],
+                       struct spl_error *err)
 {
     struct spl_faces faces;
     double ray[3], along;
@@ -24,31 +26,42 @@ static bool find_camera(const struct spl_camera *camera, double x, double y, str
     at[0] = x;
     at[1] = y;
     if (!spl_camera_is_bent(camera))
-        return true;
-    if (!spl_camera_get_ray(camera, x, y, ray) || spl_faces_init(&faces, camera, SPL_VIEW_SIDE_MAX, NULL))
-        return false;
-    *out = faces.cameras[spl_faces_place(&faces, ray, at, &along)];
-    return out->width;
+        return SPL_OK;
+    int rc = spl_faces_init(&faces, camera, SPL_VIEW_SIDE_MAX, err);
+    if (rc)
+        return rc;
+    out->width = 0;
+    if (spl_camera_get_ray(camera, x, y, ray))
+        *out = faces.cameras[spl_faces_place(&faces, ray, at, &along)];
+    return SPL_OK;
 }
 
-void spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out)
+int spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out, struct spl_error *err)
 {
+    if (view->camera.projection == SPL_RAYS)
+        return spl_fail_field(err, SPL_E_USAGE, "projection", "a ray of a list is no pixel to pick; ask for the layers of it");
+    struct spl_camera camera;
+    double at[2];
+    int rc = find_camera(&view->camera, x, y, &camera, at, err);
+    if (rc)
+        return rc;
     *out = *view;
     out->layers = ((1u << SPL_LAYER_COUNT) - 1) & ~(1u << SPL_LAYER_PRIMITIVE);
     out->shade.kinds = SPL_SHADE_NONE;
     out->color = (struct spl_color_params){0};
     out->disc.atoms = 0; // its colour is the splat's
     out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
-    double at[2];
-    if (!find_camera(&view->camera, x, y, &out->camera, at)) {
+    if (!camera.width) {
         spl_camera_set_fov(&out->camera, 1, 1, 1, NULL);
         out->camera.near = nowhere;
         out->camera.far = INFINITY;
-        return;
+        return SPL_OK;
     }
+    out->camera = camera;
     out->camera.cx += 0.5 - at[0];
     out->camera.cy += 0.5 - at[1];
     out->camera.width = out->camera.height = 1;
+    return SPL_OK;
 }
 
 /* The point at view depth `z` on the ray through (u, v). */
@@ -111,7 +124,7 @@ void spl_pick_read(const struct spl_camera *camera, double x, double y, const st
         return;
     struct spl_camera own;
     double at[2];
-    find_camera(camera, x, y, &own, at);
+    find_camera(camera, x, y, &own, at, NULL); // which has drawn the frame
     pick->depth = (double)depth;
     pick->distance = (double)*(const float *)images[SPL_LAYER_RANGE].pixels;
     place(&own, at[0], at[1], pick->depth, pick->position);

@@ -446,7 +446,8 @@ int spl_renderer_pick(struct spl_renderer *renderer, const struct spl_dataset *d
         return spl_fail_field(err, SPL_E_USAGE, "x", "x %g is outside the image, 0 to %u", x, view->camera.width);
     if (!(y >= 0 && y <= view->camera.height))
         return spl_fail_field(err, SPL_E_USAGE, "y", "y %g is outside the image, 0 to %u", y, view->camera.height);
-    spl_pick_view(view, x, y, &pixel);
+    if ((rc = spl_pick_view(view, x, y, &pixel, err)))
+        return rc;
     if (!spl_method_has_normals(view->method, spl_dataset_get_info(dataset)))
         pixel.layers &= ~(1u << SPL_LAYER_NORMAL);
     rc = spl_renderer_render(renderer, dataset, &pixel, &frame, err);

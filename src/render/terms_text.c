@@ -392,6 +392,13 @@ int spl_terms_parse_classes(const char *text, struct spl_terms *out, struct spl_
     term.outside = take(&r, '!');
     if ((rc = read_list(&r, &term, &read)))
         return rc;
+    for (uint32_t i = out->count; i < read.count; i++) {
+        const struct spl_term *one = &read.terms[i];
+        const double ends[2] = {one->least, one->most};
+        for (int k = 0; k < 2; k++)
+            if (one->measure != SPL_TERM_ATTRIBUTE || (isfinite(ends[k]) && !(ends[k] >= 0 && ends[k] <= UINT32_MAX && ends[k] == floor(ends[k]))))
+                return fail(&r, "classes are whole numbers from 0 on; write 2,6 or 3-5");
+    }
     skip_blanks(&r);
     if (*r.at)
         return fail(&r, "not a list of classes; write 2,6 or 3-5, or !7 for all others");

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/sized.h"
 #include "geom/faces.h"
+#include "geom/ray_list.h"
 #include "geom/size.h"
 #include "render/marks.h"
 #include "render/paint.h"
@@ -49,6 +50,11 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
         spl_camera_coarsen(&camera, view->supersample);
     if (!spl_camera_is_bent(&camera))
         return SPL_OK;
+    if (camera.projection == SPL_RAYS) { // whose list knows what it takes
+        int rc = view->rays ? spl_faces_init_of(&faces, &camera, view->rays, SPL_VIEW_SIDE_MAX, err) : SPL_E_USAGE;
+        *pixels = rc ? 0 : spl_faces_get_pixels(&faces);
+        return rc;
+    }
     memset(camera.eye, 0, sizeof camera.eye);
     memset(camera.rotation, 0, sizeof camera.rotation);
     for (unsigned i = 0; i < SPL_VIEW_LENSES_KEPT; i++)
@@ -95,19 +101,37 @@ static int check_around(const struct spl_view *view, struct spl_error *err)
                                                                         : spl_projection_name(camera->projection));
     int rc = count_face_pixels(view, &faces, err);
     if (!rc && faces > PIXELS_MAX)
-        rc = spl_fail_field(err, SPL_E_LIMIT, "width", "%llu pixels of a cube around the eye are more than %llu",
+        rc = spl_fail_field(err, SPL_E_LIMIT, view->rays ? "resolution" : "width", "%llu pixels of a cube around the eye are more than %llu",
                             (unsigned long long)faces, PIXELS_MAX);
     return rc;
+}
+
+/* A list and its camera belong together. */
+static int check_rays(const struct spl_view *view, struct spl_error *err)
+{
+    const struct spl_camera *camera = &view->camera;
+    if ((camera->projection == SPL_RAYS) != (view->rays != NULL))
+        return spl_fail_field(err, SPL_E_USAGE, "rays", "projection %s and %s list of rays do not go together",
+                              spl_projection_name(camera->projection), view->rays ? "a" : "no");
+    if (!view->rays)
+        return SPL_OK;
+    if (camera->width != 1 || camera->height != view->rays->count)
+        return spl_fail_field(err, SPL_E_USAGE, "rays", "%u rays are an image of 1 x %u pixels, not %u x %u", view->rays->count,
+                              view->rays->count, camera->width, camera->height);
+    if (view->supersample < 1)
+        return spl_fail_field(err, SPL_E_INPUT, "supersample", "supersample %g enlarges images; rays take a coarser resolution",
+                              view->supersample);
+    return SPL_OK;
 }
 
 static int check(const struct spl_view *view, struct spl_error *err)
 {
     int rc = spl_camera_check(&view->camera, err);
-    if (rc)
+    if (rc || (rc = check_rays(view, err)))
         return rc;
     if (view->camera.width > SPL_VIEW_SIDE_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "width", "width %u is above %d", view->camera.width, SPL_VIEW_SIDE_MAX);
-    if (view->camera.height > SPL_VIEW_SIDE_MAX)
+    if (view->camera.height > SPL_VIEW_SIDE_MAX && !view->rays)
         return spl_fail_field(err, SPL_E_LIMIT, "height", "height %u is above %d", view->camera.height, SPL_VIEW_SIDE_MAX);
     if ((uint64_t)view->camera.width * view->camera.height > PIXELS_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "width", "%u x %u pixels are more than %llu", view->camera.width,

@@ -2,6 +2,7 @@
 #ifndef SPL_SERVICE_EXCHANGE_H
 #define SPL_SERVICE_EXCHANGE_H
 
+#include <jansson.h>
 #include <microhttpd.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -41,7 +42,12 @@ struct request {
     struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
     struct spl_place_wish *place;  // may be NULL; the coordinate system that it waits for
     struct spl_saving *saving;     // may be NULL; the view being saved that it waits for
-    bool wants_body;               /* a PUT that is routed again once its body is there */
+    bool wants_body;               /* it is routed again once its body is there */
+    size_t body_most;              /* bytes that body may have, set by then; 0 = body_max */
+    bool is_long;                  /* it has more than body_max: one of spl_http.long_bodies */
+    struct spl_ray_wish *ray_wish; // may be NULL; the list of rays being read that it waits for
+    struct spl_rays *rays;         // may be NULL: not read yet; with what stood beside it in JSON:
+    json_t *rest;                  // may be NULL: the query has it
     unsigned places;               /* such that it has waited for */
     struct ticket ticket;          /* of the view that it waits for */
     bool validated;                /* the reply to a GET of a view: it carries ETag and Cache-Control */
@@ -64,6 +70,8 @@ struct spl_call {
 
 /* routes.c: fills request->response, or has the request wait. */
 void spl_route(struct request *request, const char *method);
+/* A POST that is routed before its body, which may be a long one. */
+bool spl_route_takes_long(const struct request *request);
 
 /* http.c: frees it. */
 void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode code);

@@ -48,7 +48,7 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
                            const struct spl_encoded *encoded)
 {
     enum spl_format format = spl_view_get_encoding(request, layer).format;
-    spl_headers_add(headers, "Content-Type", "%s", spl_format_media_type(format));
+    spl_headers_add(headers, "Content-Type", "%s", request->listed ? "application/json" : spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
     if (format == SPL_FORMAT_TIFF) { // heights
@@ -72,7 +72,7 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
         break;
     default:
         spl_headers_add(headers, "Splatd-Depth-Scale", "1");
-        spl_headers_add(headers, "Splatd-Depth-Invalid", "NaN");
+        spl_headers_add(headers, "Splatd-Depth-Invalid", "%s", request->listed ? "null" : "NaN");
         break;
     }
 }

@@ -73,6 +73,9 @@ void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode
     request->service->http->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
+    request->service->http->long_bodies -= request->is_long;
+    spl_rays_destroy(request->rays);
+    json_decref(request->rest);
     free(request->body);
     free(request->uri);
     free(request);
@@ -127,11 +130,42 @@ static enum MHD_Result send_reply(struct request *request)
     return again ? queued : MHD_YES;
 }
 
+/* Bytes of a body that are kept, and that are read at all. */
+static size_t get_most(const struct request *request)
+{
+    return request->body_most > body_max ? request->body_most : body_max;
+}
+
+static size_t get_drained(const struct request *request)
+{
+    return get_most(request) > drain_max ? get_most(request) : drain_max;
+}
+
+/* One of the few whose bodies may be long at a time; false: there are enough, and it is refused. */
+static bool may_be_long(struct request *request)
+{
+    struct spl_http *http = request->service->http;
+    struct spl_error err = {0};
+    if (request->is_long || request->body_seen <= body_max)
+        return true;
+    if (http->long_bodies == long_bodies_max) {
+        spl_fail_field(&err, SPL_E_BUSY, "body", "%d bodies of more than 1 MiB are on their way; come back later",
+                       (int)long_bodies_max);
+        spl_reply_error(request, &err);
+        return false;
+    }
+    request->is_long = true;
+    http->long_bodies++;
+    return true;
+}
+
 static bool append_body(struct request *request, const char *data, size_t length)
 {
     request->body_seen += length;
-    if (request->body_seen > body_max)
-        return request->body_seen <= drain_max;
+    if (request->body_seen > get_most(request))
+        return request->body_seen <= get_drained(request);
+    if (!may_be_long(request))
+        return true;
     if (spl_array_reserve(request->body, request->body_capacity, request->body_seen, NULL))
         return false;
     memcpy(request->body + request->body_length, data, length);
@@ -141,7 +175,9 @@ static bool append_body(struct request *request, const char *data, size_t length
 
 static void refuse_body(struct request *request)
 {
-    spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", "the body is larger than 1 MiB");
+    char detail[64];
+    snprintf(detail, sizeof detail, "the body is larger than %zu MiB", get_most(request) >> 20);
+    spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", detail);
 }
 
 /* Does the client wait for our word before it sends its body, or mean to send more than `most`? */
@@ -150,7 +186,7 @@ static bool announces_more(struct request *request, uint64_t most)
     const char *length = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_LENGTH);
     bool asks = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_EXPECT);
     uint64_t announced = length ? strtoull(length, NULL, 10) : 0;
-    return announced > (asks ? most : (uint64_t)drain_max);
+    return announced > (asks ? most : get_drained(request));
 }
 
 /* What can be said before the body: that it is too large, or all of a PUT that is refused. */
@@ -162,7 +198,12 @@ static bool answer_headers(struct request *request)
         if (!request->wants_body)
             return !request->change && announces_more(request, 0);
     }
-    if (!announces_more(request, body_max))
+    if (!strcmp(request->method, MHD_HTTP_METHOD_POST) && spl_route_takes_long(request)) {
+        spl_route(request, request->method);
+        if (!request->wants_body)
+            return announces_more(request, 0);
+    }
+    if (!announces_more(request, get_most(request)))
         return false;
     refuse_body(request);
     return true;
@@ -175,11 +216,11 @@ static bool take_body(struct request *request, const char *data, size_t length)
     if (request->change)
         return spl_change_take(request, data, length);
     bool refused = request->response != NULL;
-    if (!refused && !append_body(request, data, length) && request->body_seen <= drain_max)
+    if (!refused && !append_body(request, data, length) && request->body_seen <= get_drained(request))
         return false; // no memory
     if (refused)
         request->body_seen += length; // read and dropped
-    if (request->body_seen <= drain_max)
+    if (request->body_seen <= get_drained(request))
         return true;
     spl_refuse_on_socket(request, refused ? request->status : MHD_HTTP_CONTENT_TOO_LARGE, "body",
                          "the body is not taken, and too long to be read to its end");
@@ -215,7 +256,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_change_end(request);
     } else if (!request->response) {
         spl_connection_enter(request->connection, PHASE_WORKING);
-        if (request->body_seen > body_max)
+        if (request->body_seen > get_most(request))
             refuse_body(request);
         else
             spl_route(request, method);

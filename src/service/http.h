@@ -17,6 +17,7 @@ struct request;
 enum {
     uri_max = 8 * 1024,
     body_max = 1024 * 1024,
+    long_bodies_max = 8, /* that are longer, at a time */
     connection_pool = 17 * 1024, /* libmicrohttpd's pool; see oversize.c */
 };
 
@@ -54,6 +55,7 @@ struct spl_http {
     struct spl_http_turns turns;
     LIST_HEAD(, connection) connections;
     size_t connections_open, requests_open;
+    size_t long_bodies; /* of requests, longer than body_max */
     uv_timer_t slow_timer; /* connections that take too long */
 
     LIST_HEAD(, request) waiting;

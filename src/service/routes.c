@@ -68,6 +68,8 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request));
 }
 
+#define LONG_PATTERN "/v1/datasets/{id}/rays"
+
 /* "{id}" stands for a dataset, "{n}" for a number, "{z}/{x}/{y}" for a tile, "{name}" for any other segment. Methods of one pattern that need
  * different scopes are rows of their own. */
 static const struct route {
@@ -110,6 +112,7 @@ static const struct route {
     {"/v1/tours/{name}/video.mp4", GET, SPL_SCOPE_TOUR, false, spl_show_tour_video},
     {"/v1/datasets/{id}/views", POST, SPL_SCOPE_VIEW, false, spl_make_views},
     {"/v1/datasets/{id}/pick", GET | POST, SPL_SCOPE_VIEW, true, spl_pick},
+    {LONG_PATTERN, POST, SPL_SCOPE_VIEW, true, spl_make_rays}, // before the body, and behind it; its query goes with NPY
 };
 
 /* What a path has in the holes of a pattern, still encoded. */
@@ -141,6 +144,11 @@ static bool match(const char *pattern, const char *path, struct holes *holes)
         path += length;
     }
     return !*path;
+}
+
+bool spl_route_takes_long(const struct request *request)
+{
+    return request->uri && match(LONG_PATTERN, request->uri, &(struct holes){0});
 }
 
 static void refuse_method(struct request *request, unsigned allowed, const char *method)
@@ -207,7 +215,7 @@ static void enter(struct request *request, const struct route *route, enum spl_h
     }
     if (!spl_access_check(request, route->scope, &call))
         return;
-    if (request->query[0] && (method == SPL_POST || !route->query))
+    if (request->query[0] && ((method == SPL_POST && route->methods != POST) || !route->query))
         refuse_query(request, method);
     else if (find(&request->service->library->catalog, route->scope, &call, &err))
         spl_reply_error(request, &err);

@@ -25,6 +25,7 @@ static void let_go(struct request *request)
     spl_batch_abandon(request->batch);
     spl_tour_wish_abandon(request->wish);
     spl_place_abandon(request->place);
+    spl_ray_wish_abandon(request->ray_wish);
     spl_saving_abandon(request->saving);
     spl_waiting_resume(request);
 }

@@ -58,6 +58,9 @@ def test_python_views():
         opengl = {"matrix": matrix, "convention": "opengl", "fov": 60}
         assert wall.pick(32.5, 24.5, camera=opengl, **SMALL) == found  # every call takes what view() takes
         assert wall.depth(camera=opengl, **SMALL)[:2] == (65, 49)
+        rays = wall.rays([[0, 0, 1], [0, 0, -1]], eye=POSE["eye"], target=POSE["target"])
+        assert abs(rays[0] - metres[24 * 65 + 32]) < 0.05 and rays[1] != rays[1] and len(rays) == 2
+        assert len(wall.rays([[1, 0, 0]], layer="color", frame="sensor", camera={"matrix": matrix, "convention": "opengl"})) == 4
         assert wall.view(camera=opengl, **SMALL, lod=None).bytes == view.bytes  # None is left out, whatever the method
         assert wall.view(camera=None, **POSE, **SMALL).bytes == view.bytes
         terms = ["axis:0,0,0,0,0,1<0.5", "box:-1,-1,-1,1,1,1"]

@@ -179,6 +179,77 @@ static void ranges_are_true(void **state)
     }
 }
 
+/* A list of directions has the ranges that an image of the same has, to the bit; and any list those of the truth, however
+ * it is ordered and how often it says one. */
+static void rays_of_a_list_are_true(void **state)
+{
+    (void)state;
+    enum { count = 3000 };
+    static double directions[width * height][3];
+    struct spl_view image = all_around(0), list = image;
+    image.layers = list.layers = 1u << SPL_LAYER_RANGE | 1u << SPL_LAYER_ID;
+    for (int at = 0; at < width * height; at++)
+        assert_true(spl_camera_get_ray(&image.camera, at % width + 0.5, at / width + 0.5, directions[at]));
+    struct spl_rays *rays;
+    assert_int_equal(spl_rays_create(directions[0], width * height, &rays, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_rays(&list.camera, rays, image.camera.fx, NULL), SPL_OK);
+    list.rays = rays;
+    struct spl_frame a = render(&image), b = render(&list);
+    const float *p = a.images[SPL_LAYER_RANGE].pixels, *q = b.images[SPL_LAYER_RANGE].pixels;
+    assert_true(b.images[SPL_LAYER_RANGE].width == 1 && b.images[SPL_LAYER_RANGE].height == width * height);
+    double most = 0;
+    for (int at = 0; at < width * height; at++)
+        most = fmax(most, fabs((double)p[at] - (double)q[at]));
+    print_message("a list of an image's directions: %g off it\n", most);
+    assert_true(most < 1e-5); // of which the faces are as large, but for the edges that nothing asks for
+    spl_frame_finish(&a);
+    spl_frame_finish(&b);
+    spl_rays_destroy(rays);
+    for (int i = 0; i < count; i++) { /* of all lengths, every other twice */
+        const double z = 1 - (2 * (i / 2) + 1.0) / (count / 2), around = sqrt(1 - z * z), angle = (i / 2) * 2.4, length = exp(i % 7 - 3);
+        for (int k = 0; k < 3; k++)
+            directions[i][k] = length * (k == 0 ? around * cos(angle) : k == 1 ? around * sin(angle) : z);
+    }
+    assert_int_equal(spl_rays_create(directions[0], count, &rays, NULL), SPL_OK);
+    list.rays = rays;
+    list.layers = 1u << SPL_LAYER_RANGE;
+    assert_int_equal(spl_camera_set_rays(&list.camera, rays, 0, NULL), SPL_OK);
+    struct spl_frame frame = render(&list);
+    const float *range = frame.images[SPL_LAYER_RANGE].pixels;
+    double sum = 0;
+    for (int i = 0; i < count; i++) {
+        const double *d = directions[i], length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        sum += fabs((double)range[i] - true_range(&list.camera, (double[]){d[0] / length, d[1] / length, d[2] / length}));
+        assert_true(i % 2 == 0 || range[i] == range[i - 1]);
+    }
+    print_message("rays of a list, %% of a radius: mean %.2f\n", 100 * sum / count / disc);
+    assert_true(sum <= 0.03 * count * disc);
+    spl_frame_finish(&frame);
+    struct spl_error err = {0};
+    struct spl_pick pick;
+    assert_int_equal(spl_renderer_pick(renderer, ball, &list, 0.5, 0.5, &pick, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "projection");
+    spl_rays_destroy(rays);
+}
+
+/* What an image is refused for, a pick in it is as well. */
+static void picks_in_faces_that_are_too_large_are_refused(void **state)
+{
+    (void)state;
+    struct spl_view view = all_around(0);
+    struct spl_error err = {0};
+    struct spl_pick pick;
+    assert_int_equal(spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, width, height, NULL), SPL_OK);
+    view.camera.fx = view.camera.fy = 1e6;
+    const double x = width / 2.0, y = height / 2.0;
+    assert_int_equal(spl_renderer_pick(renderer, ball, &view, x, y, &pick, &err), SPL_OK); // a few of its pixels
+    view.camera.width = view.camera.height = 32768;
+    view.camera.fx = view.camera.fy = 2e4;
+    view.camera.cx = view.camera.cy = 16384;
+    assert_int_equal(spl_renderer_pick(renderer, ball, &view, x, y, &pick, &err), SPL_E_LIMIT);
+    assert_string_equal(err.field, "width");
+}
+
 static void a_cubes_faces_are_pinholes(void **state)
 {
     (void)state;
@@ -322,6 +393,8 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_edge_of_a_face_is_seen),
         cmocka_unit_test(ranges_are_true),
+        cmocka_unit_test(rays_of_a_list_are_true),
+        cmocka_unit_test(picks_in_faces_that_are_too_large_are_refused),
         cmocka_unit_test(a_cubes_faces_are_pinholes),
         cmocka_unit_test(layers_hold_their_kind),
         cmocka_unit_test(picks_lie_where_the_image_says),

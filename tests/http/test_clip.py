@@ -2,6 +2,7 @@
 is said, goes on to views of a batch and to tours, and is refused by name where it is wrong."""
 import json
 import math
+import os
 import struct
 
 from harness import FAKE, REAL, VIEW, Daemon, run
@@ -82,7 +83,7 @@ def test_bad_ones_are_named():
         for field, value, words in (
                 ("clip", "polygon:0,0,1,0", "corners"), ("clip", "polygon:0,0,4,4,4,0,0,4", "meet"), ("clip", "box:0,0,0,1,0,1", "empty"),
                 ("clip", "plane:0,0,0,0,0,0>0", "length"), ("clip", "colour>3", "colour"), ("clip", "z<", "number"), ("clip", "", "empty"),
-                ("class", "ground", "number"), ("class", "2,,3", "number"), ("class", "", "empty")):
+                ("class", "ground", "number"), ("class", "2,,3", "number"), ("class", "2.5", "whole"), ("class", "-1", "whole"), ("class", "", "empty")):
             reply = d.ask(f"{VIEW}?width=8&height=8&{field}={value}")
             assert reply.status == 400, (value, reply.body)
             assert words in reply.json()["detail"] and reply.json()["field"] == field, (value, reply.body)
@@ -99,6 +100,28 @@ def test_bad_ones_are_named():
         assert d.ask(f"{VIEW}?width=8&height=8&{many}").status == 200
         for more in "&clip=z%3C17", "&class=2":
             assert d.ask(f"{VIEW}?width=8&height=8&{many}{more}").status == 400, more
+
+
+def test_what_a_dataset_lacks_is_asked_of_its_own_parameter():
+    """The tree has no classes; only what asked for them is to blame."""
+    tree = os.environ["SPLATD_TREE"]
+    with Daemon(REAL, datasets=[tree]) as d:
+        def field_of(query, path="view"):
+            reply = d.ask(f"/v1/datasets/tree/{path}?width=8&height=8&{query}")
+            assert reply.status == 400, (query, reply.body)
+            return reply.json()["field"]
+        assert field_of("class=2") == field_of("class=2&clip=z%3C1") == field_of("class=!2&x=1&y=1", "pick") == "class"
+        assert field_of("clip=class:2") == field_of("clip=class:2&class=2") == field_of("clip=tint%3E2") == "clip"
+        assert field_of("class=2&soft=tint%3E2") == "soft"
+
+
+def test_a_pick_is_refused_like_its_image():
+    """Where the cube's faces would be too large to be drawn."""
+    with Daemon(REAL) as d:
+        lens = "projection=equirectangular&azimuth=0,0.1,8000&elevation=0,90,8"
+        for path in f"{VIEW}?{lens}&layer=range", f"{PICK}?x=1&y=1&{lens}":
+            reply = d.ask(path)
+            assert reply.status == 400 and reply.json()["field"] == "width", (path, reply.body)
 
 
 def test_a_budget_leaves_it_alone():

@@ -75,6 +75,17 @@ def test_what_the_dataset_lacks_is_refused_at_once():
         assert not d.ask("/v1/tours").json()["tours"]
 
 
+def test_a_frame_whose_faces_are_too_many_samples_fails_its_tour():
+    """Its keys look past everything on either side and cost little; between them the whole of a fisheye comes into the image."""
+    def key(cx):
+        return {"camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "projection": "fisheye", "fx": 400, "cx": cx, "cy": 256}}
+    path = {"path": {"keyframes": [key(-1e6), key(1e6)]}, "frames": 3, "settings": {"width": 512, "height": 512}}
+    for samples, state in (300000, "failed"), (4000000, "done"):
+        with Folder() as tours, Daemon(FAKE, "--tours", tours, "--max-samples", str(samples)) as d:
+            tour = ended(d, begin(d, path)["uri"], state)
+            assert state == "done" or "the limit is 300000" in json.dumps(tour), tour
+
+
 def read_stream(d, uri, begun=None):
     """Reads a stream to its end; `begun` is set once its first byte is there."""
     connection = d.connect(120)

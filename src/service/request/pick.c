@@ -34,12 +34,12 @@ static int resolve(struct values *values, const struct spl_camera_defaults *defa
         return rc;
     out->pick.crs = (uint32_t)values->v[PARAM_crs].n[0];
     spl_values_resolve_splats(values, &out->view);
-    if ((rc = spl_values_resolve_terms(values, defaults, &out->view, err)))
+    if ((rc = spl_values_resolve_terms(values, defaults, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
     out->view.camera = *camera;
-    spl_pick_view(&out->view, out->pick.x, out->pick.y, &out->view);
-    return spl_view_check(&out->view, err);
+    rc = spl_pick_view(&out->view, out->pick.x, out->pick.y, &out->view, err);
+    return rc ? rc : spl_view_check(&out->view, err);
 }
 
 int spl_pick_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,

@@ -46,9 +46,15 @@ int spl_values_resolve_encoding(const struct values *values, struct spl_view_req
         return spl_fail_field(err, SPL_E_INPUT, "chroma", "a lossy WebP is always 420; leave chroma out");
     if (!(scale >= 1e-6 && scale <= 1e9))
         return spl_fail_field(err, SPL_E_INPUT, "depth_scale", "depth_scale %g is outside 1e-6 to 1e9", scale);
+    out->listed = (int)format == SPL_FORMAT_LISTED;
+    if (values->rays ? !out->listed && format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW : out->listed)
+        return spl_fail_field(err, SPL_E_INPUT, "format", values->rays ? "format of rays is npy, raw or json"
+                                                                        : "format 'json' is of rays alone");
+    if (out->listed)
+        format = SPL_FORMAT_RAW;
     out->natural = !given(values, PARAM_format);
     out->encode = SPL_SIZED(spl_encode_options, .format = format, .quality = (int)quality, .chroma = (int)chroma,
-                            .depth_scale = scale);
+                            .depth_scale = scale, .list = values->rays);
     if (format != SPL_FORMAT_TIFF) { // what is none has no world file
         spl_camera_get_ground(&out->view.camera, &out->encode.ground, NULL);
         return 0;
@@ -127,7 +133,7 @@ static int check_cost(const struct spl_view *view, const struct spl_camera_limit
     uint64_t samples = spl_view_get_samples(view), bytes = spl_view_get_frame_bytes(view);
     const struct spl_camera *camera = &view->camera;
     if (limits->samples && samples > limits->samples)
-        return spl_fail_field(err, SPL_E_INPUT, view->supersample > 1 ? "supersample" : "width",
+        return spl_fail_field(err, SPL_E_INPUT, view->supersample > 1 ? "supersample" : view->rays ? "resolution" : "width",
                               "%u x %u pixels with supersample %g are %llu samples; the limit is %llu", camera->width,
                               camera->height, view->supersample, (unsigned long long)samples,
                               (unsigned long long)limits->samples);
@@ -211,8 +217,10 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
     out->named = given(values, PARAM_view);
     if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
         (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
+        (values->rays && (rc = spl_view_set_rays(&out->view, values->rays, (enum spl_ray_frame)get(values, PARAM_frame, 0),
+                                                 get(values, PARAM_resolution, 0), err))) ||
         (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_terms(values, defaults, &out->view, err)) ||
+        (rc = spl_values_resolve_terms(values, defaults, out, err)) ||
         (rc = spl_values_resolve_encoding(values, out, err)) ||
         (rc = resolve_demand(values, limits, out, err)))
         return rc;

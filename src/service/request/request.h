@@ -3,7 +3,9 @@
 #ifndef SPL_SERVICE_REQUEST_H
 #define SPL_SERVICE_REQUEST_H
 
+#include <jansson.h>
 #include <stddef.h>
+#include <stdio.h>
 
 #include <splatd/image.h>
 #include <splatd/render.h>
@@ -16,10 +18,12 @@ enum spl_container { SPL_CONTAINER_NONE, SPL_CONTAINER_MULTIPART, SPL_CONTAINER_
 
 struct spl_view_request {
     struct spl_view view;             /* deadline_ns is left at "none" */
+    uint32_t classes;                 /* terms of view.clip, its last, that were given as class */
     enum spl_layer layer;             /* the one bit of view.layers, or the first of several */
     enum spl_container container;     /* of `layers`; NONE: there is one layer, sent as it is */
     struct spl_encode_options encode; /* of `layer`; spl_view_get_encoding() for several; the dataset's unit of all */
     bool natural;                     /* format was left out: each layer has its own */
+    bool listed;                      /* rays: each layer is sent as JSON, whatever encode.format says */
     bool picks;                       /* no image is wanted but what `pick` shows; view.camera sees that point alone */
     struct spl_picked_point {
         double x, y;              /* pixels of `camera` */
@@ -73,6 +77,17 @@ int spl_pick_request_from_query(const char *query, size_t length, const struct s
 int spl_pick_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                                const struct spl_camera_limits *limits, struct spl_view_request *out,
                                struct spl_error *err);
+
+/* POST …/rays: directions to look along instead of an image's pixels. The list is read first: of NPY, or of JSON, whose
+ * object loses its member "directions"; errors are of that field. JSON holds fewer, since it takes a hundred times as long.
+ * Any thread; blocks for the reading. The caller destroys *out. */
+enum { SPL_RAYS_JSON_MAX = 1 << 15, SPL_RAYS_BODY_VALUES = 4 * SPL_RAYS_JSON_MAX + (1 << 12) };
+int spl_rays_from_npy(FILE *file, uint64_t bytes, const char *name, struct spl_rays **out, struct spl_error *err);
+int spl_rays_from_json(const json_t *directions, struct spl_rays **out, struct spl_error *err);
+/* Then what is beside it: `rest`, the object, or NULL and a query. *out borrows `rays`. */
+int spl_rays_request_from(json_t *rest, const char *query, size_t length, const struct spl_rays *rays,
+                          const struct spl_camera_defaults *defaults, const struct spl_camera_limits *limits,
+                          struct spl_view_request *out, struct spl_error *err);
 
 /* POST …/views: many views, in the order that they were listed. */
 enum { SPL_VIEWS_MAX = 256 };

@@ -130,9 +130,11 @@ static int join_clips(const struct values *values, struct spl_terms *out, struct
 }
 
 int spl_values_resolve_terms(const struct values *values, const struct spl_camera_defaults *defaults,
-                             struct spl_view *view, struct spl_error *err)
+                             struct spl_view_request *out, struct spl_error *err)
 {
     const struct spl_value *crs = &values->v[PARAM_crs];
+    struct spl_view *view = &out->view;
+    out->classes = values->classes.count;
     view->soft.what = values->soft.what;
     int rc = join_clips(values, &view->clip, err);
     if (rc || !crs->given) /* what crs needs was checked with the camera */

@@ -41,6 +41,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
+                       : info->places == SPL_LIST           ? "it is a parameter of rays"
                        : info->places & SPL_CAMERA          ? "give it in the \"camera\" object of a POST"
                                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
@@ -176,6 +177,8 @@ static int container_from_name(const char *name)
 
 static int built_format_from_name(const char *name)
 {
+    if (!strcmp(name, "json"))
+        return SPL_FORMAT_LISTED; // spl_values_resolve_encoding() asks of what
     int format = spl_format_from_name(name);
     return format >= 0 && spl_format_is_built((enum spl_format)format) ? format : -1;
 }
@@ -210,6 +213,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, format_names()},
         [SPL_KIND_CONTAINER] = {container_from_name, "multipart, zip"},
+        [SPL_KIND_FRAME] = {spl_ray_frame_from_name, "camera, sensor, world"},
     };
     if (kind == SPL_KIND_COLOR)
         return parse_color(value, name, text, err);

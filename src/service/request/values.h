@@ -27,6 +27,7 @@ enum {
     SPL_KIND_RANGE,    /* ends; bit per end that is a quantile */
     SPL_KIND_COLOR_BY, /* what colours show, which is kept beside the numbers */
     SPL_KIND_TERMS,    /* which are kept beside the numbers */
+    SPL_KIND_FRAME,    /* enum spl_ray_frame */
 };
 
 enum param {
@@ -50,7 +51,22 @@ struct values {
     struct spl_terms clip, classes;  /* of PARAM_clip, PARAM_class */
     struct spl_color_params color;   /* what they show alone, of PARAM_color_by */
     bool world_soft, world_clip;     /* they come from a saved view, which knows no crs */
+    const struct spl_rays *rays;     // may be NULL: it is a view of one
 };
+
+/* What directions of rays are given in. */
+enum spl_ray_frame {
+    SPL_FRAME_CAMERA, /* x right, y down, z forward */
+    SPL_FRAME_SENSOR, /* x forward, y left, z up: ROS's */
+    SPL_FRAME_WORLD
+};
+/* Turns the camera to that of the list, of `resolution` pixels a radian, 0 = as many as suit it. */
+int spl_view_set_rays(struct spl_view *view, const struct spl_rays *rays, enum spl_ray_frame frame, double resolution,
+                      struct spl_error *err);
+int spl_ray_frame_from_name(const char *name); /* -1: unknown */
+
+/* JSON where a list of rays is sent, in place of a format. */
+enum { SPL_FORMAT_LISTED = SPL_FORMAT_COUNT };
 
 /* 0..15, -1 for anything else. */
 int spl_hex_digit(char c);
@@ -91,7 +107,7 @@ int spl_values_choose_view(struct values *values, const struct spl_camera_defaul
                            struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */
 int spl_values_resolve_terms(const struct values *values, const struct spl_camera_defaults *defaults,
-                             struct spl_view *view, struct spl_error *err);
+                             struct spl_view_request *out, struct spl_error *err);
 
 /* Meaning: defaults, conflicts, ranges, the camera. */
 int spl_values_resolve(struct values *values, const struct spl_camera_defaults *defaults,

@@ -12,6 +12,7 @@
 
 #include "base/memory.h"
 #include "geom/ground.h"
+#include "image/vectors.h"
 #include "service/headers.h"
 #include "service/zip.h"
 
@@ -120,6 +121,14 @@ static int add_world_file(struct spl_part *part, enum spl_layer layer, const cha
     return 0;
 }
 
+int spl_bundle_encode(const struct spl_view_request *request, const struct spl_frame *frame, enum spl_layer layer,
+                      struct spl_encoded *out, struct spl_error *err)
+{
+    const struct spl_encode_options options = spl_view_get_encoding(request, layer);
+    return request->listed ? spl_image_list_json(&frame->images[layer], out, err)
+                           : spl_image_encode(&frame->images[layer], &options, out, err);
+}
+
 int spl_bundle_layers(const struct spl_view_request *request, const struct spl_frame *frame, struct spl_encoded *out,
                       struct spl_error *err)
 {
@@ -136,14 +145,15 @@ int spl_bundle_layers(const struct spl_view_request *request, const struct spl_f
         struct spl_encode_options options = spl_view_get_encoding(request, layer);
         struct spl_part *part = &parts[count];
         struct spl_headers headers;
-        if ((rc = spl_image_encode(&frame->images[i], &options, &encoded[i], err)))
+        if ((rc = spl_bundle_encode(request, frame, layer, &encoded[i], err)))
             break;
         spl_headers_open(&headers);
         spl_headers_add(&headers, "Splatd-Layer", "%s", spl_layer_name(layer));
         spl_headers_add_layer(&headers, request, layer, &encoded[i]);
         if (!spl_headers_close(&headers))
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the headers of a layer");
-        snprintf(part->name, sizeof part->name, "%s%s", spl_layer_name(layer), spl_format_suffix(options.format));
+        snprintf(part->name, sizeof part->name, "%s%s", spl_layer_name(layer),
+                 request->listed ? ".json" : spl_format_suffix(options.format));
         part->headers = headers.text;
         part->bytes = encoded[i].bytes;
         part->length = encoded[i].length;

@@ -20,6 +20,10 @@ const char *spl_container_media_type(enum spl_container container); /* not NONE 
 int spl_bundle(enum spl_container container, const struct spl_part *parts, size_t count, struct spl_encoded *out,
                struct spl_error *err);
 
+/* One layer, as it is sent. */
+int spl_bundle_encode(const struct spl_view_request *request, const struct spl_frame *frame, enum spl_layer layer,
+                      struct spl_encoded *out, struct spl_error *err);
+
 /* All layers of `frame` that were asked for, encoded, as request->container; parts are named color.jpg, depth.png, … */
 int spl_bundle_layers(const struct spl_view_request *request, const struct spl_frame *frame, struct spl_encoded *out,
                       struct spl_error *err);

@@ -18,7 +18,7 @@ static void encode(struct spl_job *job)
     else if (request->container)
         spl_bundle_layers(request, &job->frame, &job->encoded, &job->err);
     else
-        spl_image_encode(&job->frame.images[request->layer], &request->encode, &job->encoded, &job->err);
+        spl_bundle_encode(request, &job->frame, request->layer, &job->encoded, &job->err);
     job->encode_ms = (double)(spl_now_ns() - began) / SPL_NS_PER_MS;
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "geom/ray_list.h"
 #include "service/ops/counters.h"
 #include "service/state.h"
 #include "service/view/views.h"
@@ -39,6 +40,7 @@ static int launch(struct flight *flight, uint64_t deadline_ns, struct spl_error 
     job->dataset = flight->entry->dataset;
     job->plan = flight->entry->plan;
     job->request = flight->request;
+    spl_rays_ref(job->request.view.rays);
     job->accepted_ns = spl_now_ns();
     job->deadline_ns = deadline_ns;
     job->owner = flight;
@@ -53,6 +55,7 @@ static int launch(struct flight *flight, uint64_t deadline_ns, struct spl_error 
 
 static void finish(struct flight *flight)
 {
+    spl_rays_destroy((struct spl_rays *)flight->request.view.rays); // its own reference
     spl_catalog_entry_unref(flight->entry);
     free(flight);
 }
@@ -93,6 +96,7 @@ int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct 
     flight->entry = spl_catalog_entry_ref(entry);
     flight->route = ticket->route;
     flight->request = *request;
+    spl_rays_ref(request->view.rays);
     flight->key = *key;
     flight->renderer = spl_pipeline_get_renderer(service->views->pipeline);
     int rc = launch(flight, ticket->deadline_ns, err);

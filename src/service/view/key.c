@@ -10,6 +10,7 @@
 
 #include <xxhash.h>
 
+#include "geom/ray_list.h"
 #include "render/method.h"
 
 static uint64_t hash_program(void)
@@ -178,6 +179,11 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     for (unsigned layer = 0; layer < SPL_LAYER_COUNT && !request->picks; layer++)
         if (view->layers >> layer & 1)
             add_encoding(&form, request, (enum spl_layer)layer);
+    if (view->rays) {
+        add(&form, UINT64_MAX - 1 - request->listed);
+        add(&form, view->rays->hash[0]);
+        add(&form, view->rays->hash[1]);
+    }
     if (view->clip.count) { // behind all else, so that keys without are those of before
         add(&form, UINT64_MAX);
         add_terms(&form, &view->clip);

@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "geom/ray_list.h"
 #include "service/view/stages.h"
 
 void spl_job_destroy(struct spl_job *job)
@@ -18,6 +19,7 @@ void spl_job_destroy(struct spl_job *job)
     spl_frame_finish(&job->frame);
     spl_encoded_finish(&job->encoded);
     spl_catalog_entry_unref(job->entry);
+    spl_rays_destroy((struct spl_rays *)job->request.view.rays);
     free(job);
 }
 

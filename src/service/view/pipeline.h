@@ -26,7 +26,7 @@
 struct spl_job {
     struct spl_catalog_entry *entry;   /* one reference; may be NULL in tests, as may `plan` */
     const struct spl_dataset *dataset; /* of it */
-    struct spl_view_request request;
+    struct spl_view_request request;   /* with a reference to its rays, if it has some */
     uint64_t accepted_ns;
     _Atomic uint64_t deadline_ns;      /* the loop may raise it at any time */
     struct spl_cancel dropped;         /* set by the loop at any time: nobody waits for it, skip the work */

@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -103,6 +104,18 @@ void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_i
     view->encode.ground.epsg = info->epsg;
 }
 
+/* What a dataset lacks of a view's terms, by the parameter that asked for it: classes are the clip's last terms. */
+static int blame_class(const struct spl_view_request *view, const struct spl_dataset_info *info, int rc, struct spl_error *err)
+{
+    struct spl_view others = view->view;
+    if (!rc || !view->classes || strcmp(err->field, "clip"))
+        return rc;
+    others.clip.count -= view->classes;
+    if (!spl_view_check_colors(&others, info, NULL))
+        snprintf(err->field, sizeof err->field, "class");
+    return rc;
+}
+
 int spl_view_check_dataset(struct spl_view_request *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
     spl_view_set_unit(view, info);
@@ -112,8 +125,9 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);
     if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
         view->view.layers &= ~(1u << SPL_LAYER_NORMAL);
-    return view->planned ? spl_view_check_colors(&view->view, info, err) // it may get another method
-                         : spl_view_check_layers(&view->view, info, err);
+    int rc = view->planned ? spl_view_check_colors(&view->view, info, err) // it may get another method
+                           : spl_view_check_layers(&view->view, info, err);
+    return blame_class(view, info, rc, err);
 }
 
 int spl_view_check_part(struct spl_view_request *view, const struct spl_dataset_info *info, const char *part,

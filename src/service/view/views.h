@@ -24,6 +24,7 @@ struct spl_views {
     LIST_HEAD(, flight) flights;
     size_t reply_bytes;       /* of views that clients have not read yet and that are not in the cache */
     size_t large_reply_bytes; /* the same of large views */
+    size_t lists;             /* of rays that the pool reads */
 };
 
 /* views.c: cache and pipeline, over the datasets that are served now. finish() takes what a start that failed has left,
@@ -58,6 +59,11 @@ void spl_view_answer(struct request *request, const struct spl_call *call, struc
 void spl_make_thumbnail(struct request *request, const struct spl_call *call);
 void spl_make_view(struct request *request, const struct spl_call *call);
 void spl_pick(struct request *request, const struct spl_call *call);
+
+/* rays.c: /v1/datasets/{id}/rays. */
+struct spl_ray_wish;
+void spl_make_rays(struct request *request, const struct spl_call *call);
+void spl_ray_wish_abandon(struct spl_ray_wish *wish); /* its request no longer waits for it; NULL-safe */
 
 /* batch.c: /v1/datasets/{id}/views. */
 void spl_make_views(struct request *request, const struct spl_call *call);

@@ -258,6 +258,11 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{" POSE ",\"model\":\"OPENCV_FISHEYE\",\"params\":[9,9,9,9]}," SIZE "}", "params"},
         {"{\"camera\":{" POSE ",\"model\":\"SIMPLE_RADIAL\",\"params\":[9,9,9,-1e9]}," SIZE "}", "params"},
         {GLTF("\"type\":\"fisheye\"," LENS), "gltf.type"},
+#define ROS_K "\"ros\":{\"k\":[500,0,320,0,510,240,0,0,1],\"width\":640,\"height\":480}"
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\"," ROS_K "}}", "projection"}, /* k is a pinhole's */
+        {"{\"camera\":{" POSE "," ROS_K ",\"projection\":\"orthographic\"}}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"gltf\":{\"perspective\":{\"yfov\":1,\"znear\":0.1}}}," SIZE "}", "projection"},
+        {"{\"camera\":{\"projection\":\"orthographic\",\"nerfstudio\":{\"w\":640,\"h\":480,\"fl_x\":500,\"transform_matrix\":" I16 "}}}", "projection"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"units_per_pixel\":4}," SIZE "}", "units_per_pixel"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"fx\":4}," SIZE "}", "fx"},
         {"{\"camera\":{" POSE ",\"view_height\":0}," SIZE "}", "view_height"},

@@ -272,6 +272,17 @@ static void test_add_refuses(void **state)
     refused(&path, &camera, INFINITY, "time");
     refused(&path, &camera, uneven[1], "time");
     refused(&plain, &camera, 1, "time");
+    struct spl_camera_path scans = {0}; /* whose rays nothing lies between */
+    struct spl_camera scan = make_camera(0);
+    assert_int_equal(spl_camera_set_around(&scan, SPL_EQUIRECTANGULAR, 360, 20, NULL), 0);
+    assert_int_equal(spl_camera_path_add(&scans, &scan, NAN, NULL), 0);
+    assert_int_equal(spl_camera_path_add(&scans, &scan, NAN, NULL), 0);
+    for (int i = 0; i < 4; i++) {
+        struct spl_camera other = scan;
+        *(double *[]){&other.fx, &other.cx, &other.fy, &other.cy}[i] *= 1.5;
+        refused(&scans, &other, NAN, i < 2 ? "azimuth" : "elevation");
+    }
+    spl_camera_path_finish(&scans);
     assert_int_equal(
         spl_camera_path_sample(&(struct spl_camera_path){0}, &(struct spl_path_motion){0}, 1, &camera, NULL),
         SPL_E_INPUT);

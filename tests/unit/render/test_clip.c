@@ -169,6 +169,12 @@ static void test_what_is_degenerate_is_refused(void **state)
         refused(cases[i][0], "clip", cases[i][1]);
     refused("2,x", "class", "classes are numbers");
     refused("", "class", "empty");
+    refused("2.5", "class", "whole numbers");
+    refused("2,3.25-5", "class", "whole numbers");
+    refused("!2-4.5", "class", "whole numbers");
+    refused("-1", "class", "whole numbers");
+    refused("q0.5", "class", "whole numbers");
+    refused("4294967296", "class", "whole numbers");
     refused("class:2 and z<1", "soft", "neither the end");
     char text[4096] = "polygon:0,0";
     for (int i = 0; i < SPL_TERMS_CORNERS_MAX; i++)
@@ -178,6 +184,31 @@ static void test_what_is_degenerate_is_refused(void **state)
     for (int i = 0; i <= SPL_TERMS_MIXED_MAX; i++)
         snprintf(text + strlen(text), sizeof text - strlen(text), "%sclass:%d or z<%d", i ? " and " : "", i, i);
     refused(text, "clip", "there may be 7");
+}
+
+/* Of a list of ranges each term has the polygon's corners to itself in kernels, though the text has them once. */
+static void test_corners_that_are_shared_count_for_each(void **state)
+{
+    (void)state;
+    char text[4096] = "polygon:";
+    struct spl_terms terms;
+    struct spl_error err = {0};
+    enum { corners = SPL_TERMS_CORNERS_MAX / 2 };
+    for (int i = 0; i < corners; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%.6f,%.6f", i ? "," : "", cos(i * 2 * M_PI / corners),
+                 sin(i * 2 * M_PI / corners));
+    memset(&terms, 0, sizeof terms);
+    assert_int_equal(spl_terms_parse(text, "clip", &terms, &err), SPL_OK);
+    for (uint32_t i = 1; i < 3; i++) {
+        terms.terms[i] = terms.terms[0];
+        terms.terms[i].joint = SPL_TERM_AND;
+    }
+    assert_int_equal(terms.corner_count, corners);
+    for (terms.count = 1; terms.count <= 3; terms.count++) {
+        err = (struct spl_error){0};
+        assert_int_equal(spl_terms_check(&terms, "clip", &err), terms.count <= 2 ? SPL_OK : SPL_E_USAGE);
+        assert_true(terms.count <= 2 || (!strcmp(err.field, "clip") && strstr(err.message, "64 corners")));
+    }
 }
 
 static void test_terms_read_as_they_are_printed(void **state)
@@ -221,6 +252,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_what_is_said_of_a_box_holds_of_its_points),
         cmocka_unit_test(test_what_is_degenerate_is_refused),
+        cmocka_unit_test(test_corners_that_are_shared_count_for_each),
         cmocka_unit_test(test_terms_read_as_they_are_printed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
