@@ -30,8 +30,9 @@ static void try_tokens(const char *text, size_t size)
 static void fill_holes(char *url)
 {
     static const char *const holes[][2] = {{"{z}", "111"}, {"{x}", "222"}, {"{y}", "333"}, {"{r}", "@2x"}};
-    for (size_t i = 0; i < sizeof holes / sizeof *holes; i++) {
-        char *at = strstr(url, holes[i][0]), *query = strpbrk(url, "?#");
+    char *tiles = strstr(url, "/tiles/{z}");
+    for (size_t i = 0; tiles && i < sizeof holes / sizeof *holes; i++) {
+        char *at = strstr(tiles, holes[i][0]), *query = strpbrk(url, "?#");
         if (at && (!query || at < query))
             memcpy(at, holes[i][1], 3);
     }
