@@ -27,13 +27,14 @@ static void try_tokens(const char *text, size_t size)
 }
 
 /* Of a template of tiles' URLs one that is asked for. */
-static void fill_holes(char *url)
+static void fill_holes(char *path)
 {
     static const char *const holes[][2] = {{"{z}", "111"}, {"{x}", "222"}, {"{y}", "333"}, {"{r}", "@2x"}};
-    char *tiles = strstr(url, "/tiles/{z}");
+    const char *query = path + strcspn(path, "?#");
+    char *tiles = strstr(path, "/tiles/{z}");
     for (size_t i = 0; tiles && i < sizeof holes / sizeof *holes; i++) {
-        char *at = strstr(tiles, holes[i][0]), *query = strpbrk(url, "?#");
-        if (at && (!query || at < query))
+        char *at = strstr(tiles, holes[i][0]);
+        if (at && at < query)
             memcpy(at, holes[i][1], 3);
     }
 }
@@ -49,8 +50,8 @@ static void try_query(const char *query)
         abort();
     char *url = NULL;
     if (!spl_sign_url(&key, query, 1, &url, NULL)) {
-        fill_holes(url);
-        const char *path = spl_sign_path_of(url);
+        char *path = url + (spl_sign_path_of(url) - url);
+        fill_holes(path);
         char *mark = strchr(path, '?');
         *mark = '\0';
         mark[1 + strcspn(mark + 1, "#")] = '\0';
