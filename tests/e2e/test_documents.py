@@ -86,7 +86,8 @@ def test_requests():
             assert asked >= 12, asked
             for file in [ROOT / "README.md", *(ROOT / "api").rglob("*.md")]:
                 for address in re.findall(r"(?<!\()" + re.escape(SERVICE) + r"(/(?:[^\s\"'`#)<]|<(?=[\d.]|plane:))*)", file.read_text(encoding="utf-8")):
-                    if not address.endswith("/tours") and "{" not in address:  # templates are for maps to fill in
+                    # templates are for maps to fill in; others are POSTed to, as the commands do
+                    if not address.endswith("/tours") and "/rays" not in address and "{" not in address:
                         assert d.ask(address).status == 200, (file, address)
 
 
