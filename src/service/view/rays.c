@@ -29,7 +29,7 @@ struct spl_ray_wish {
     struct spl_call call; /* with a reference to its entry */
     char *body;
     size_t length;
-    bool npy;
+    bool npy, is_long; /* counted as such, where its request has ended before it */
     struct spl_rays *rays;
     json_t *rest;
     struct spl_error err;
@@ -111,6 +111,7 @@ static void after(uv_work_t *work, int status)
     json_decref(wish->rest);
     service->library->tasks--;
     service->views->lists--;
+    service->http->long_bodies -= wish->is_long;
     free(wish->body);
     free(wish);
 }
@@ -119,6 +120,8 @@ void spl_ray_wish_abandon(struct spl_ray_wish *wish)
 {
     if (!wish)
         return;
+    wish->is_long = wish->request->is_long;
+    wish->request->is_long = false;
     wish->request->ray_wish = NULL;
     wish->request = NULL;
 }
