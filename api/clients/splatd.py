@@ -95,7 +95,7 @@ class Tiles:
 
     def tile(self, z, x, y, scale=1, format="png"):
         """One as a View: 256 pixels a side, 512 with scale=2; png or webp."""
-        path = self.info["tiles"][0].replace(".png", ("@2x" if scale == 2 else "") + "." + format, 1)
+        path = self.info["tiles"][0].replace("{y}.png", "{y}" + ("@2x" if scale == 2 else "") + "." + format)
         return View(*self.service.ask(path.format(z=z, x=x, y=y), granted=True))
 
     def find(self, x, y, z):

@@ -30,7 +30,7 @@ export class Annotations extends EventTarget {
 
   /** Those of a fragment. */
   open(marks = []) {
-    this.list = marks.map(parseMark).filter(Boolean).slice(0, MARKS_MOST);
+    this.list = [marks].flat().map((mark) => parseMark(`${mark}`)).filter(Boolean).slice(0, MARKS_MOST);
     this.changed();
   }
 

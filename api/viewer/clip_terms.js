@@ -2,10 +2,11 @@
 //
 // Conditions are joined by " and "; all of them hold. One box and one slab have controls, all other conditions stay text.
 
-const NUMBER = "[-+]?(?:\\d+\\.?\\d*|\\.\\d+)(?:e[-+]?\\d+)?",
+const NUMBER = "[-+]?(?:\\d+(?:\\.\\d*)?|\\.\\d+)(?:e[-+]?\\d+)?", // one way to read each: no backtracking
   BOX = new RegExp(`^(!?)box:(${NUMBER}(?:,${NUMBER}){5,6})$`, "i"),
   SLAB = new RegExp(`^([xyz]):(${NUMBER})\\.\\.(${NUMBER})$`, "i"),
   PLANE = new RegExp(`^(${NUMBER})<plane:(${NUMBER}(?:,${NUMBER}){5})<(${NUMBER})$`, "i");
+const TEXT_MOST = 8192; // a service takes no longer URL
 const numbers = (text) => text.split(",").map(Number);
 
 export const AXES = {x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1]};
@@ -56,8 +57,9 @@ function parseSection(condition) {
 /** {box, section, rest} of a text; what is null is not there. Blanks may be written as +, as in a query. */
 export function parseClip(text = "") {
   const found = {box: null, section: null, rest: []};
-  const blanks = text.replace(/\+/g, (plus, i) => (/[\d.]e$/i.test(text.slice(0, i)) && /\d/.test(text[i + 1]) ? plus : " "));
-  for (const condition of blanks.split(/ +and +/).map((part) => part.trim())) {
+  if (text.length > TEXT_MOST) return {...found, rest: text};
+  const blanks = text.replace(/\+/g, (plus, i) => (/[\d.]e$/i.test(text.slice(Math.max(i - 2, 0), i)) && /\d/.test(text[i + 1]) ? plus : " "));
+  for (const condition of blanks.split(/ and /).map((part) => part.trim())) {
     const [box, section] = [found.box ? null : parseBox(condition), found.section ? null : parseSection(condition)];
     if (box) found.box = box;
     else if (section) found.section = section;

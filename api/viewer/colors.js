@@ -28,7 +28,7 @@ export class Colors extends EventTarget {
     const names = ["height", "normal", ...dataset.attributes.map(({name}) => name)];
     $("color_by").replaceChildren(new Option("its own", ""), ...names.map((name) => new Option(name.replaceAll("_", " "), name)));
     for (const name of ["color_by", "shade", "ramp", "background"]) choose($(name), wanted[name] ?? "");
-    const [low, high] = (wanted.range ?? "").split("..");
+    const [low, high] = `${wanted.range ?? ""}`.split("..");
     $("range-low").value = low;
     $("range-high").value = high ?? "";
     this.kept = Object.fromEntries(["edl_strength", "edl_radius"].filter((name) => name in wanted).map((name) => [name, wanted[name]]));

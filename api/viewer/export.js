@@ -30,7 +30,7 @@ export function toCsv(points, annotations, dataset) {
   const rows = all.map(({kind, name, position, normal, color, attributes: had}) => [
     kind, cell(name, true), ...position, null, dataset.unit, nameOf(dataset.crs), ...three(normal), ...three(color),
     ...attributes.map((attribute) => had?.[attribute]),
-  ].map((value, i) => (i === 1 ? value : cell(value))));
+  ].map((value, i) => (i === 1 ? value : cell(value, typeof value === "string"))));
   const measured = points.measures.map(({name, value, unit}) => {
     const row = new Array(head.length).fill("");
     [row[0], row[1], row[5], row[6]] = ["measure", cell(name, true), cell(value), cell(unit)];

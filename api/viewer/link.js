@@ -19,7 +19,7 @@ export function parse(fragment) {
     const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
     if (VECTORS.includes(name) && numbers.length === 3 && numbers.every(Number.isFinite)) found[name] = numbers;
     else if (isNumber(name) && numbers.length === 1 && Number.isFinite(numbers[0])) found[name] = numbers[0];
-    else if (JOINTS[name]) found[name] = found[name] ? found[name] + JOINTS[name] + text : text;
+    else if (Object.hasOwn(JOINTS, name)) found[name] = found[name] ? found[name] + JOINTS[name] + text : text;
     else if (name === "mark") (found.mark ??= []).push(text);
     else if (isText(name)) found[name] = text;
   }

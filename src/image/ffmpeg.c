@@ -10,14 +10,13 @@
 #define FILE_OF(library, version) "lib" #library ".so." NUMBER(version)
 
 static struct spl_ffmpeg ffmpeg;
-static char missing[300]; /* "" = all are there */
+static char missing[100]; /* "" = all are there */
 
 static void *open_library(const char *file)
 {
     void *library = dlopen(file, RTLD_NOW | RTLD_LOCAL);
-    const char *why = library ? NULL : dlerror();
-    if (!library && !missing[0])
-        snprintf(missing, sizeof missing, "%s does not load (%.200s)", file, why ? why : "no reason is given");
+    if (!library && !missing[0]) // why may name paths of this machine, and who asks may be far away
+        snprintf(missing, sizeof missing, "%s does not load", file);
     return library;
 }
 

@@ -31,7 +31,7 @@ int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_M
 {
     unsigned char prefix[prefix_bytes + 2];
     size_t length = 0, more = 0;
-    if (fread(prefix, 1, prefix_bytes, file) == prefix_bytes) {
+    if (fread(prefix, 1, prefix_bytes, file) == prefix_bytes && !memcmp(prefix, "\x93NUMPY", 6)) {
         length = prefix[8] | (size_t)prefix[9] << 8;
         more = prefix[6] > 1 ? 2 : 0; /* from 2.0 on the length has four bytes */
     }

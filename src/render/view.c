@@ -86,7 +86,8 @@ uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
     uint64_t pixel = 4 * (uint64_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
     uint64_t faces;
     count_face_pixels(view, &faces, NULL);
-    return pixel * ((uint64_t)view->camera.width * view->camera.height + faces);
+    const uint64_t list = view->rays ? view->rays->count * sizeof view->rays->directions[0] : 0;
+    return list + pixel * ((uint64_t)view->camera.width * view->camera.height + faces);
 }
 
 /* What is not there of cameras that are no one pinhole. */

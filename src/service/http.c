@@ -199,6 +199,7 @@ static bool answer_headers(struct request *request)
             return !request->change && announces_more(request, 0);
     }
     if (!strcmp(request->method, MHD_HTTP_METHOD_POST) && spl_route_takes_long(request)) {
+        spl_connection_enter(request->connection, PHASE_UPLOADING);
         spl_route(request, request->method);
         if (!request->wants_body)
             return announces_more(request, 0);

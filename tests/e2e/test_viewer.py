@@ -1060,6 +1060,10 @@ def test_a_clip_box_has_handles():
         texts = ["box:0,0,0,1,2,3", "!box:0,0,0,1,2,3,-12.5", "z:1..2", "-1<plane:1,2,3,0,0,1<1", "z<2 or x>1", "!z:1..2", "box:0,0,0,0,1,1",
                  "box:0,0,0,1,1,1 and box:2,0,0,3,1,1 and z:0..1e+2"]
         assert tab.run(again % json.dumps(texts)) == [*texts[:3], "-1<plane:0,0,3,0,0,1<1", *texts[4:7], "box:0,0,0,1,1,1 and z:0..100 and box:2,0,0,3,1,1"]
+        endless = ["box:" + ",".join(["1" * 300] * 7) + "x", "z<1" + " " * 7000 + "x", "+" * 8000]  # a link freezes no page
+        took = tab.run("""import('/viewer/clip_terms.js').then(({parseClip}) => JSON.parse('%s').map(text => {
+            const begin = performance.now(); parseClip(text); return performance.now() - begin; }))""" % json.dumps(endless))
+        assert max(took) < 500, took
 
 
 def rows(tab, which):

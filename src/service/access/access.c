@@ -193,7 +193,8 @@ static bool is_anonymous(struct request *request)
 bool spl_access_admit(struct request *request, const char *method)
 {
     return spl_door_check_host(request, is_anonymous(request)) &&
-           (!request->service->access || is_within_rates(request)) && spl_door_check_preflight(request, method);
+           (!request->service->access || request->wants_body || is_within_rates(request)) && /* it is routed again */
+           spl_door_check_preflight(request, method);
 }
 
 static bool refuse(struct request *request, unsigned status, const char *field, const char *challenge,

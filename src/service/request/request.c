@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "geom/ground.h"
+#include "geom/ray_list.h"
 
 #include "service/request/values.h"
 
@@ -50,6 +51,9 @@ int spl_values_resolve_encoding(const struct values *values, struct spl_view_req
     if (values->rays ? !out->listed && format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW : out->listed)
         return spl_fail_field(err, SPL_E_INPUT, "format", values->rays ? "format of rays is npy, raw or json"
                                                                         : "format 'json' is of rays alone");
+    if (out->listed && values->rays->count > SPL_RAYS_JSON_MAX)
+        return spl_fail_field(err, SPL_E_INPUT, "format", "JSON lists what %d rays hit, not %u; ask for npy or raw",
+                              (int)SPL_RAYS_JSON_MAX, values->rays->count);
     if (out->listed)
         format = SPL_FORMAT_RAW;
     out->natural = !given(values, PARAM_format);

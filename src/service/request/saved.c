@@ -30,7 +30,9 @@ int spl_values_inherit_saved(struct values *values, const char *settings, struct
         return spl_fail_field(err, rc, "view", "the settings of this view are not taken: %s", why.message);
     values->world_soft = !values->v[PARAM_soft].given && saved.v[PARAM_soft].given;
     values->world_clip = !values->v[PARAM_clip].given && saved.v[PARAM_clip].given;
-    if (!values->v[PARAM_color_by].given)
+    if (values->v[PARAM_color_by].given) // the view's ramp and range are those of its own
+        saved.v[PARAM_range].given = saved.v[PARAM_ramp].given = false;
+    else
         values->color = saved.color;
     spl_values_inherit_terms(values, &saved);
     for (int i = 0; i < PARAM_COUNT; i++)

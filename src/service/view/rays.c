@@ -20,7 +20,7 @@
 #include "service/state.h"
 #include "service/view/views.h"
 
-enum { lists_max = 32, header_most = 8192 };
+enum { lists_max = 32, header_most = 8192, beside_max = 4096 /* values beside directions, which the loop reads and frees */ };
 
 struct spl_ray_wish {
     uv_work_t work;
@@ -46,6 +46,23 @@ static int read_npy(struct spl_ray_wish *wish, struct spl_error *err)
     return rc;
 }
 
+/* As deep as the parser lets JSON be. */
+static size_t count_values(json_t *json)
+{
+    size_t count = 1, i;
+    const char *key;
+    json_t *value;
+    json_array_foreach(json, i, value)
+    {
+        count += count_values(value);
+    }
+    json_object_foreach(json, key, value)
+    {
+        count += count_values(value);
+    }
+    return count;
+}
+
 static int read_json(struct spl_ray_wish *wish, struct spl_error *err)
 {
     if (wish->length > body_max)
@@ -61,6 +78,10 @@ static int read_json(struct spl_ray_wish *wish, struct spl_error *err)
         return rc;
     }
     json_object_del(json, "directions");
+    if (count_values(json) > beside_max) {
+        json_decref(json);
+        return spl_fail_field(err, SPL_E_INPUT, "body", "beside 'directions' there are more than %d values", (int)beside_max);
+    }
     wish->rest = json;
     return 0;
 }
@@ -69,6 +90,18 @@ static void read_list(uv_work_t *work)
 {
     struct spl_ray_wish *wish = work->data;
     (wish->npy ? read_npy : read_json)(wish, &wish->err);
+}
+
+/* What is drawn has a reference of its own to the list: a client that reads its reply slowly keeps none, and no place of
+ * those that send one. */
+static void let_go(struct request *request)
+{
+    spl_rays_destroy(request->rays);
+    request->rays = NULL;
+    json_decref(request->rest);
+    request->rest = NULL;
+    request->service->http->long_bodies -= request->is_long;
+    request->is_long = false;
 }
 
 static void answer(struct request *request, const struct spl_call *call)
@@ -85,6 +118,7 @@ static void answer(struct request *request, const struct spl_call *call)
     if (err.code && spl_view_blame(&err) && spl_place_wait(request, call, spl_make_rays, &err))
         return;
     spl_view_answer(request, call, &view, &err);
+    let_go(request);
 }
 
 static void after(uv_work_t *work, int status)
@@ -100,10 +134,12 @@ static void after(uv_work_t *work, int status)
         request->rest = wish->rest;
         wish->rays = NULL;
         wish->rest = NULL;
-        if (wish->err.code)
+        if (wish->err.code) {
             spl_reply_error(request, &wish->err);
-        else
+            let_go(request);
+        } else {
             answer(request, &wish->call);
+        }
         spl_http_pump(service);
     }
     spl_catalog_entry_unref(wish->call.entry);

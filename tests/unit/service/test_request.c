@@ -209,6 +209,7 @@ static void what_a_view_shows_stands_for_what_is_left_out(void **state)
     assert_int_equal(spl_view_request_from_query(text, strlen(text), &named, &limits, &r, &err), 0);
     assert_clip(&r, "y<1 and !class:7");
     assert_true(r.view.color.by == SPL_COLOR_BY_NORMAL && r.view.shade.radius == 1 && r.view.background[0] == 0);
+    assert_false(r.view.color.has_range); /* which is of heights */
     text = "{\"view\": \"door\", \"clip\": [], \"class\": []}";
     assert_int_equal(spl_view_request_from_json(text, strlen(text), &named, &limits, &r, &err), 0);
     assert_int_equal(r.view.clip.count, 0);
