@@ -222,8 +222,10 @@ class Dataset:
     def rays(self, directions, layer="range", **params):
         """How far it is along each direction, an array of floats, NaN where nothing is: a simulated lidar. `directions` is a
         list of [x, y, z], or numpy's array of them, up to 2**20; frame="sensor" has x forward, y left, z up, "world" the
-        dataset's axes, "camera" x right, y down, z forward. Eye, target, matrix of a camera and so on as of a view; layer
-        "coverage" likewise, others as raw bytes."""
+        dataset's axes, "camera" x right, y down, z forward. eye, target and up stand upright: how steeply target is looked at
+        does not count. camera={"matrix": …} is taken as it is, with up to 32,768 directions; more of a tilted robot: turn them
+        and say frame="world", as in rays(directions @ R.T, frame="world", eye=…). Layer "coverage" likewise, others as raw
+        bytes."""
         flat = array.array("d", [float(x) for row in directions for x in row])
         count = len(flat) // 3
         if sys.byteorder == "big":

@@ -2,15 +2,19 @@
 """What a camera would see in a scan, as ROS 2 topics: images, depth, CameraInfo and points, for poses that arrive.
 
     python3 ros2_publisher.py --ros-args -p service:=http://127.0.0.1:8080 -p dataset:=hall -p fov:=60.0
-    ros2 topic pub -1 /pose geometry_msgs/PoseStamped "{header: {frame_id: map}, pose: {position: {x: 4, z: 1.7}, orientation: {w: 1}}}"
+    # looks along the map's x
+    ros2 topic pub -1 /pose geometry_msgs/msg/PoseStamped "{header: {frame_id: map}, pose: {position: {x: 4.0, z: 1.7},
+      orientation: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}}"
 
 A pose is that of the camera's optical frame (REP 103: x right, y down, z forward) in the frame `map`, in metres; `origin` says
-where the map's origin lies in the dataset's coordinates, so that UTM stays out of ROS. With -p tf:=true poses are not taken from
+where the map's origin lies in the dataset's coordinates, so that UTM stays out of ROS (-p origin:="[636000.0, 851000.0, 0.0]": ROS's parameters
+have types, decimals are needed). RViz needs a transform from `map_frame` to `camera_frame`, which this does not publish. With -p tf:=true poses are not taken from
 the topic `pose`: the transform from `map_frame` to `camera_frame` is looked up at `rate` a second.
 
 Published, all with the pose's stamp: image_raw (rgb8), or with -p compressed:=true image_raw/compressed (jpeg); depth (32FC1, metres,
 NaN where nothing is); camera_info; points (organised PointCloud2 of x, y, z, rgb, in the optical frame), each where its switch
 (image, depth, points) is on. Needs rclpy and its messages, which bring numpy, and tf2_ros with tf:=true; nothing else."""
+import array
 import io
 import json
 import sys
@@ -53,7 +57,8 @@ class Publisher(Node):
             self.declare_parameter(name, value)
         self.setting = {name: self.get_parameter(name).value for name in usual}
         self.url = f"{self.setting['service'].rstrip('/')}/v1/datasets/{urllib.parse.quote(self.setting['dataset'], safe='')}"
-        self.metres = METRES.get(json.loads(self.ask(self.url))["unit"], 1)
+        unit = json.loads(self.ask(self.url))["unit"]
+        self.metres = METRES[unit] if unit in METRES else float(unit.split()[0])  # "0.2 m"
         self.width, self.height = self.setting["width"], self.setting["height"]
         self.focal = self.height / 2 / np.tan(np.radians(self.setting["fov"]) / 2)
         self.image = self.create_publisher(Image, "image_raw", 1) if self.setting["image"] and not self.setting["compressed"] else None
@@ -111,7 +116,7 @@ class Publisher(Node):
         if self.compressed:
             message = self.stamped(CompressedImage(), stamp)
             message.format = "jpeg"
-            message.data = self.ask(f"{self.url}/view", {**view, "format": "jpeg"})
+            message.data = array.array("B", self.ask(f"{self.url}/view", {**view, "format": "jpeg"}))
             self.compressed.publish(message)
         layers = zipfile.ZipFile(io.BytesIO(self.ask(f"{self.url}/view", {**view, "layers": ["color", "depth"], "format": "raw", "container": "zip"})))
         color = np.frombuffer(layers.read("color.raw"), np.uint8).reshape(self.height, self.width, 4)[..., :3]
@@ -134,7 +139,7 @@ class Publisher(Node):
         message.height, message.width = self.height, self.width
         message.encoding, message.is_bigendian = encoding, 0
         message.step = pixels.nbytes // self.height
-        message.data = pixels.tobytes()
+        message.data = array.array("B", pixels.tobytes())  # of bytes rclpy looks at each
         return message
 
     def describe(self, stamp):
@@ -159,7 +164,7 @@ class Publisher(Node):
         message.fields = [PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate(("x", "y", "z", "rgb"))]
         message.is_bigendian, message.is_dense = False, False
         message.point_step, message.row_step = rows.itemsize, rows.itemsize * self.width
-        message.data = rows.tobytes()
+        message.data = array.array("B", rows.tobytes())
         return message
 
 

@@ -1,6 +1,6 @@
 // The page inside a frame: the picture and navigation, nothing else. The path names the dataset, the fragment camera
 // and settings. Tells the page around it {splatd: "camera", eye, target, up, fov} when the camera has come to rest, and
-// asks it for {splatd: "token", token} where the service wants one: tokens do not belong into addresses. What `splatd
+// asks it for {splatd: "token", token} where the service wants one: tokens do not belong in addresses. What `splatd
 // sign` has added to its own address lets it look at its dataset without one; it passes that on to what it asks.
 
 import {Annotations} from "./annotations.js";

@@ -47,7 +47,7 @@ static const struct spl_cmd_table table = {
         "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
         "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
         "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
-        "dataset, its profile, views, picks, legend and thumbnail can be signed, all of its map tiles at once, and the\n"
+        "dataset, its profile, views, picks, places, legend and thumbnail can be signed, all of its map tiles at once, and the\n"
         "page /embed/ID: who has that URL may look at this dataset from wherever they like until it expires, and do\n"
         "nothing else.\n\n"
         "Make a key, once:\n"

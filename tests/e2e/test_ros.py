@@ -1,5 +1,6 @@
 """api/examples/ros2_publisher.py over a real daemon, with modules in ROS's place whose messages take what the definitions of
 sensor_msgs, geometry_msgs and std_msgs declare, and refuse every other name, type, length and range, as rclpy's own do."""
+import array
 import importlib.util
 import os
 import pathlib
@@ -40,7 +41,7 @@ def check(kind, value):
     if found:
         assert not found[2] or len(value) == int(found[2]), (kind, len(value))
         if found[1] == "uint8":
-            assert isinstance(value, (bytes, bytearray)), (kind, type(value))  # what rclpy takes without a loop of minutes
+            assert isinstance(value, array.array) and value.typecode == "B", (kind, type(value))  # what rclpy takes without looking at each
         else:
             for item in value:
                 check(found[1], item)
