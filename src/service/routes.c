@@ -68,8 +68,6 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request));
 }
 
-#define LONG_PATTERN "/v1/datasets/{id}/rays"
-
 /* "{id}" stands for a dataset, "{n}" for a number, "{z}/{x}/{y}" for a tile, "{name}" for any other segment. Methods of one pattern that need
  * different scopes are rows of their own. */
 static const struct route {
@@ -112,7 +110,7 @@ static const struct route {
     {"/v1/tours/{name}/video.mp4", GET, SPL_SCOPE_TOUR, false, spl_show_tour_video},
     {"/v1/datasets/{id}/views", POST, SPL_SCOPE_VIEW, false, spl_make_views},
     {"/v1/datasets/{id}/pick", GET | POST, SPL_SCOPE_VIEW, true, spl_pick},
-    {LONG_PATTERN, POST, SPL_SCOPE_VIEW, true, spl_make_rays}, // before the body, and behind it; its query goes with NPY
+    {"/v1/datasets/{id}/rays", POST, SPL_SCOPE_VIEW, true, spl_make_rays}, // before the body, and behind it; its query goes with NPY
 };
 
 /* What a path has in the holes of a pattern, still encoded. */
@@ -148,7 +146,10 @@ static bool match(const char *pattern, const char *path, struct holes *holes)
 
 bool spl_route_takes_long(const struct request *request)
 {
-    return request->uri && match(LONG_PATTERN, request->uri, &(struct holes){0});
+    for (size_t i = 0; request->uri && i < sizeof routes / sizeof *routes; i++)
+        if (routes[i].handle == spl_make_rays && match(routes[i].pattern, request->uri, &(struct holes){0}))
+            return true;
+    return false;
 }
 
 static void refuse_method(struct request *request, unsigned allowed, const char *method)
