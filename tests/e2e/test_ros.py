@@ -232,7 +232,7 @@ def test_where_the_map_lies_and_what_is_compressed():
         node.timers[0]()
         assert set(node.sent) == {"image_raw/compressed", "camera_info"} and not node.subscriptions, (node.sent, node.said)
         message = node.sent["image_raw/compressed"][0]
-        assert message.format == "jpeg" and message.data == wall.view(camera={
+        assert message.format == "jpeg" and message.data.tobytes() == wall.view(camera={
             "matrix": [[0, 0, -1, 3], [1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 0, 1]], "convention": "opencv", "fx": node.focal, "fy": node.focal, "cx": 32.5, "cy": 24.5},
             width=65, height=49).bytes
         lost = start(d, load(), tf=True)
