@@ -8,13 +8,8 @@ here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$out/site"
 splatd synth courtyard --points "${POINTS:-600000}" --format ptx -o "$out/scan"
 splatd pack "$out/scan/courtyard.ptx" -o "$out/hall.spld"
-splatd serve --listen 127.0.0.1:0 --ops-listen 127.0.0.1:0 --cors '*' "$out/hall.spld" 2>"$out/log" &
-daemon=$!
-trap 'kill $daemon' EXIT
-until service=$(sed -n 's|.*listening on \(http://[^ ]*[0-9]\)/.*|\1|p' "$out/log"); grep -q ready "$out/log" && [ -n "$service" ]; do
-    kill -0 $daemon
-    sleep 0.1
-done
+. "$here/serve.sh"
+serve --cors '*' "$out/hall.spld"
 cp "${LEAFLET:-/usr/share/javascript/leaflet}"/leaflet.* "$here/../examples/map.css" "$out/site"
 n=0
 for layer in 'surface=""' 'photo="color_by=height\&ramp=turbo\&shade=edl" surface=""'; do
