@@ -60,8 +60,6 @@ static int take_crs(void *arguments, const char *option, char *text, struct spl_
 static const char *const projections[] = {"perspective", "orthographic", "equirectangular", "cube", "fisheye", NULL};
 _Static_assert(sizeof projections / sizeof *projections == SPL_RAYS + 1, "its choices are numbered so");
 
-static const char *const frames[] = {"camera", "sensor", "world", NULL};
-
 static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
     {"view", "NAME", "or that view's, which the dataset was packed with ('splatd info' lists them)",
@@ -90,7 +88,7 @@ static const struct spl_cmd_option options[] = {
     {"rays", "FILE", "directions to look along instead of --size: NPY of float32 or float64, (count, 3), or a .json array of [x, y, z]; "
      "-o OUT.npy has a number for each, how far it is unless --layer says else, or OUT.json", SPL_CMD_TEXT(struct arguments, rays_file)},
     {"frame", "F", "what --rays are in: camera, x right, y down, z forward; sensor, x forward, y left, z up; world", .otherwise = "camera",
-     SPL_CMD_CHOICE(struct arguments, frame, frames)},
+     SPL_CMD_CHOICE(struct arguments, frame, spl_ray_frames)},
     {"resolution", "R", "pixels a radian that what --rays hit is drawn with", .otherwise = "256 to 1024, by how densely they lie",
      SPL_CMD_REAL(struct arguments, resolution, 1, 16000)},
     {"size", "WxH", "pixels; W or xH alone: at the ratio of the default", .otherwise = "1280x720, 1440x720 all around, "

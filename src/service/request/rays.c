@@ -10,11 +10,12 @@
 #include "service/request/request.h"
 #include "service/request/values.h"
 
+const char *const spl_ray_frames[] = {"camera", "sensor", "world", NULL};
+
 int spl_ray_frame_from_name(const char *name)
 {
-    static const char *const names[] = {"camera", "sensor", "world"};
-    for (int i = 0; i < 3; i++)
-        if (!strcmp(name, names[i]))
+    for (int i = 0; spl_ray_frames[i]; i++)
+        if (!strcmp(name, spl_ray_frames[i]))
             return i;
     return -1;
 }

@@ -63,6 +63,7 @@ enum spl_ray_frame {
 /* Turns the camera to that of the list, of `resolution` pixels a radian, 0 = as many as suit it. */
 int spl_view_set_rays(struct spl_view *view, const struct spl_rays *rays, enum spl_ray_frame frame, double resolution,
                       struct spl_error *err);
+extern const char *const spl_ray_frames[];     /* their names, by number; NULL behind the last */
 int spl_ray_frame_from_name(const char *name); /* -1: unknown */
 
 /* JSON where a list of rays is sent, in place of a format. */
