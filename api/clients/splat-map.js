@@ -53,7 +53,10 @@ class SplatMap extends HTMLElement {
     if (!window.L) throw new Error("<splat-map> needs Leaflet: load leaflet.js before");
     const ways = [["Orthophoto", this.getAttribute("photo") ?? ""], ["Surface", this.getAttribute("surface") ?? "color_by=height&shade=edl"]];
     const wanted = ways.filter(([name, query]) => name === "Orthophoto" || query);
-    const opened = await Promise.all(wanted.map(([, query]) => openTiles(L, service, dataset, query)));
+    const replies = await Promise.allSettled(wanted.map(([, query]) => openTiles(L, service, dataset, query)));
+    const refused = replies.find(({status}) => status === "rejected"); // the first layer's, not the first to come
+    if (refused) throw refused.reason;
+    const opened = replies.map(({value}) => value);
     if (!this.isConnected) return;
     const {crs, bounds, info, maxZoom} = opened[0], frame = document.createElement("div");
     if (getComputedStyle(this).display === "inline") this.style.display = "block"; // a page's own style stands
