@@ -49,12 +49,12 @@ built() {
 
 # name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
 # shown with its output, and every suite is counted. Tests have four times their limit: machines are shared, and others
-# build beside them. `only` names those that run.
+# build beside them. `only` names those that run, `but` suites whose tests do not.
 suites() {
     local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/testlog told p f s
     shift 2
     rm -f "$log".{json,txt}
-    ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" --print-errorlogs ${only-} \
+    ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" ${but+"${but[@]/#/--no-suite=}"} --print-errorlogs ${only-} \
         --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$1.log" 2>&1 || true
     told=$(python3 tests/counts.py "$name" "$log.json" "$@")
     echo "${told%$'\n'*}"
@@ -112,28 +112,30 @@ if [ "$mode" != --quick ]; then
     trap 'kill $others 2>/dev/null || true' EXIT
 fi
 here=$(nproc)
-# Units and fuzzers run where AddressSanitizer looks on; here those that it shortens.
-units=(whole)
-[ "$mode" = "" ] || units=(unit fuzz)
+# Units, fuzzers and what strangers send run where AddressSanitizer looks on; here those that it shortens, and last the
+# sum over all that was asked over HTTP. --full runs everything in every build.
+units=(whole) but=(attack sum) attacks=attack crowds=crowd
+[ "$mode" = "" ] || units=(unit fuzz) but=() attacks=http crowds=http
+[ "$mode" != --full ] || units+=(gpu-again)
 if built normal; then
     suites normal "$here" "${units[@]}" rules gpu golden library fault stability e2e
     suites normal $((2 * here)) http deploy # which wait most of their time
 fi
 [ "$mode" != --quick ] || { finish; exit; }
 
-# Of what the normal build has run, sanitisers run what strangers send and what many threads do, and --full all of it.
-attacks=(bad_input mutate framing reliability change tours wait batch)
-crowds=(load reliability wait change catalog tours)
+unset but
 if built asan; then
     timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so"
-    suites asan "$here" unit fuzz fault
-    only=${attacks[*]/#/http-}
-    [ "$mode" != --full ] || only=""
-    suites asan $((2 * here)) http
-    only="gpu-vulkan gpu-egl exact-vulkan exact-egl residency-vulkan residency-egl"
+    suites asan "$here" unit fuzz
+    suites asan $((2 * here)) "$attacks"
+    only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
     [ "$mode" != --full ] || only=""
     suites asan "$here" gpu
     only="" timeouts="" run_under=""
+    if [ "$mode" = "" ]; then
+        cp -p "$out"/asan/tests/http/exercised/* "$out/normal/tests/http/exercised/"
+        suites normal 1 sum
+    fi
 fi
 if built tsan; then
     if sanitiser_runs thread env; then
@@ -144,10 +146,8 @@ if built tsan; then
     if [ -n "${runs_here-}" ]; then
         timeouts=10 run_under=$runs_here
         suites tsan "$here" unit
-        only=${crowds[*]/#/http-}
-        [ "$mode" != --full ] || only=""
-        suites tsan $((2 * here)) http
-        only="" timeouts="" run_under=""
+        suites tsan $((2 * here)) "$crowds"
+        timeouts="" run_under=""
     else
         echo "note: no thread check, TSan does not start on this kernel"
         skipped=$((skipped + 1))

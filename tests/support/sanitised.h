@@ -1,6 +1,6 @@
 /* What tests leave to the builds without sanitisers. ThreadSanitizer takes ten times as long and looks only for what
  * threads share, AddressSanitizer three times, for what a small input does to memory as much as a large one. A test that
- * includes this is named in `shortened` of tests/meson.build. */
+ * does less under AddressSanitizer is named in `shortened` of tests/meson.build. */
 #ifndef TEST_SUPPORT_SANITISED_H
 #define TEST_SUPPORT_SANITISED_H
 
@@ -31,6 +31,13 @@ static inline void skip_under_tsan(void)
 {
     if (TEST_LOOKS_FOR_RACES)
         skip();
+}
+
+/* In main(), where the tests that share anything between threads have it in their names. */
+static inline void only_threads_under_tsan(void)
+{
+    if (TEST_LOOKS_FOR_RACES)
+        cmocka_set_test_filter("*threads*");
 }
 
 /* Of one that judges a figure, over code that others of its program run. */

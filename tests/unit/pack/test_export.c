@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "clouds.h"
 #include "pack/export/export.h"
+#include "support/sanitised.h"
 
 enum { most = 80000, read_most = 4096 };
 
@@ -775,5 +776,6 @@ int main(void)
         cmocka_unit_test(test_places_that_cannot_be),
         cmocka_unit_test(test_failures_give_nothing),
     };
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -15,6 +15,7 @@
 #include "pack/maps/maps.h"
 #include "pack/maps/sight.h"
 #include "support/make_dataset.h"
+#include "support/sanitised.h"
 
 static char folder[256];
 
@@ -67,7 +68,7 @@ static int pack(const char *input, const char *output, const char *panoramas, st
 
 /* From x = -1 the first two walls are seen, but for what is grazed; the third lies behind the second. Discs are of one
  * texel of the finest z-buffer up to hundreds of them. */
-static void a_wall_hides_what_lies_behind_it(void **state)
+static void a_wall_hides_what_lies_behind_it_for_any_threads(void **state)
 {
     static const double steps[] = {0.06, 0.2, 0.6};
     (void)state;
@@ -222,10 +223,11 @@ int main(void)
 {
     make_folder(folder);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_wall_hides_what_lies_behind_it),
+        cmocka_unit_test(a_wall_hides_what_lies_behind_it_for_any_threads),
         cmocka_unit_test(a_station_that_cannot_be_right_is_told),
         cmocka_unit_test(what_stations_see_is_planned_by_what_it_costs),
         cmocka_unit_test(a_loose_cloud_costs_by_its_points),
     };
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -490,7 +490,7 @@ static void test_refused_memory(void **state)
     free(position);
     unlink(path_of("out.spld"));
     int files = files_in_folder();
-    for (long n = 1;; n += n < 64 ? 1 : 5) {
+    for (long n = 1;; n += n < 64 ? 1 : TEST_SIZE(5, 17)) {
         struct spl_error err = {0};
         spl_memory_fail_after(n);
         int rc = pack_file(path_of("in.ply"), path_of("out.spld"), 1, NULL, &err);

@@ -176,6 +176,7 @@ static void color_of(const double position[3], uint8_t color[3])
 static void cells_take_colours(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_dataset *dataset = pack_room("plain.spld", SPL_PRIMITIVES_ALL, false, 0, 2, NULL), *written = NULL;
     struct spl_splats splats, after;
     struct spl_error err = {0};
@@ -236,6 +237,7 @@ static void cells_take_colours(void **state)
 static void panels_themselves_choose_no_photograph(void **state)
 {
     (void)state;
+    skip_under_tsan();
     struct spl_dataset *dataset = pack_room("plain.spld", SPL_PRIMITIVES_ALL, false, 0, 2, NULL);
     struct spl_splats splats;
     struct spl_candidates candidates;

@@ -12,6 +12,7 @@
 #include "pack/order.h"
 #include "pack/panels/panels.h"
 #include "pack/tree.h"
+#include "support/sanitised.h"
 
 static const double spacing = 0.02;
 
@@ -679,5 +680,6 @@ int main(void)
         cmocka_unit_test(threads_do_not_matter),
         cmocka_unit_test(cells_are_as_large_as_points_lie_apart),
     };
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

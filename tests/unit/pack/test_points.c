@@ -13,6 +13,7 @@
 #include "pack/eyes.h"
 #include "pack/neighbours.h"
 #include "pack/order.h"
+#include "support/sanitised.h"
 
 static int compare_places(const void *a, const void *b)
 {
@@ -63,7 +64,7 @@ static void test_few_points_in_many_threads(void **state)
     static const unsigned many_threads[] = {2, 7, 64};
     double(*position)[3] = shape_points(SHAPE_SPHERE, most, 5);
     for (size_t count = 1; count <= most; count += 1 + count / 4)
-        for (size_t t = 0; t < sizeof many_threads / sizeof *many_threads; t++) {
+        for (size_t t = 0; t < TEST_SIZE(3, 2); t++) {
             unsigned threads = many_threads[t];
             struct spl_points one = sorted((const double(*)[3])position, count, 1);
             struct spl_points many = sorted((const double(*)[3])position, count, threads);
@@ -532,10 +533,8 @@ static void test_threads_do_not_matter(void **state)
     (void)state;
     for (int shape = 0; shape < SHAPES; shape++) {
         size_t count = 80000; /* two blocks */
-#ifdef __SANITIZE_THREAD__ /* what threads share is the same in every shape */
-        if (shape != SHAPE_CUBE && shape != SHAPE_CLUSTERS)
-            continue;
-#endif
+        if (TEST_SANITISED && shape != SHAPE_CUBE && shape != SHAPE_CLUSTERS)
+            continue; /* what threads share is the same in every shape */
         double(*position)[3] = shape_points((enum shape)shape, count, 8);
         struct spl_points a = sorted((const double(*)[3])position, count, 1);
         struct spl_points b = sorted((const double(*)[3])position, count, 3);
@@ -567,8 +566,6 @@ int main(void)
         cmocka_unit_test(test_borders_stay_where_they_are),  cmocka_unit_test(test_leaves_and_noise),
         cmocka_unit_test(test_degenerate_surfaces),          cmocka_unit_test(test_threads_do_not_matter),
     };
-#ifdef __SANITIZE_THREAD__ /* which looks for what threads share, ten times as long */
-    cmocka_set_test_filter("*threads*");
-#endif
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

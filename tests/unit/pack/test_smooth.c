@@ -11,6 +11,7 @@
 #include "clouds.h"
 #include "pack/planes/heights.h"
 #include "pack/planes/planes.h"
+#include "support/sanitised.h"
 
 enum { most = 60000 };
 
@@ -364,5 +365,6 @@ int main(void)
         cmocka_unit_test(test_exactly_flat),
         cmocka_unit_test(test_threads), cmocka_unit_test(test_off),    cmocka_unit_test(test_no_memory),
     };
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

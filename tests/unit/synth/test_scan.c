@@ -627,8 +627,6 @@ int main(void)
         cmocka_unit_test(progress_ends_at_the_number_of_points),
         cmocka_unit_test(the_command_line_names_what_is_wrong),
     };
-#ifdef __SANITIZE_THREAD__ /* which looks for what threads share, ten times as long */
-    cmocka_set_test_filter("*threads*");
-#endif
+    only_threads_under_tsan();
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }
