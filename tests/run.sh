@@ -114,9 +114,9 @@ fi
 here=$(nproc)
 # Units, fuzzers and what strangers send run where AddressSanitizer looks on; here those that it shortens, and last the
 # sum over all that was asked over HTTP. --full runs everything in every build.
-units=(whole) but=(attack sum) attacks=attack crowds=crowd
+units=(whole) again=() but=(attack sum) attacks=attack crowds=crowd
 [ "$mode" = "" ] || units=(unit fuzz) but=() attacks=http crowds=http
-[ "$mode" != --full ] || units+=(gpu-again)
+[ "$mode" != --full ] || units+=(gpu-again) again=(unit-again)
 if built normal; then
     suites normal "$here" "${units[@]}" rules gpu golden library fault stability e2e
     suites normal $((2 * here)) http deploy # which wait most of their time
@@ -126,7 +126,7 @@ fi
 unset but
 if built asan; then
     timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so"
-    suites asan "$here" unit fuzz
+    suites asan "$here" unit "${again[@]}" fuzz
     suites asan $((2 * here)) "$attacks"
     only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
     [ "$mode" != --full ] || only=""
@@ -145,7 +145,7 @@ if built tsan; then
     fi
     if [ -n "${runs_here-}" ]; then
         timeouts=10 run_under=$runs_here
-        suites tsan "$here" unit
+        suites tsan "$here" unit "${again[@]}"
         suites tsan $((2 * here)) "$crowds"
         timeouts="" run_under=""
     else
