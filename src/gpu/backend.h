@@ -20,10 +20,9 @@ struct spl_gpu_bound {
 /* One embedded kernel. */
 struct spl_gpu_code {
     const char *name;
-    const uint32_t *vulkan;
-    size_t vulkan_bytes;
-    const uint32_t *opengl; /* NULL: Vulkan only */
-    size_t opengl_bytes;
+    struct {
+        const uint32_t *begin, *end; /* NULL: not for this one */
+    } vulkan, opengl;
     struct spl_gpu_bound storages, texels; /* Vulkan numbers texels behind the storages */
 };
 const struct spl_gpu_code *spl_gpu_code_find(const char *name); /* NULL for an unknown name */

@@ -17,8 +17,8 @@ const struct spl_gpu_code *spl_gpu_code_find(const char *name)
 
 bool spl_gpu_code_is_as_declared(const struct spl_gpu_code *code)
 {
-    const uint32_t *words = code->vulkan;
-    for (size_t at = SPIRV_HEADER_WORDS, length; at < code->vulkan_bytes / 4; at += length) {
+    const uint32_t *words = code->vulkan.begin;
+    for (size_t at = SPIRV_HEADER_WORDS, length; at < (size_t)(code->vulkan.end - words); at += length) {
         length = words[at] >> 16;
         if (!length)
             return false;

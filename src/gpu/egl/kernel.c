@@ -28,13 +28,14 @@ int gl_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, cons
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     const struct gl_functions *gl = &gpu->gl;
-    if (!code->opengl)
+    if (!code->opengl.begin)
         return spl_fail(err, SPL_E_UNSUPPORTED, "egl: kernel '%s' needs 64 bit atomics, which OpenGL lacks",
                         code->name);
     struct gl_kernel *kernel = spl_alloc(1, sizeof *kernel, err);
     if (!kernel)
         return SPL_E_NOMEM;
-    uint32_t declared = declared_constants(code->opengl, code->opengl_bytes / 4);
+    const size_t words = (size_t)(code->opengl.end - code->opengl.begin);
+    uint32_t declared = declared_constants(code->opengl.begin, words);
     GLuint ids[SPL_GPU_CONSTANTS_MAX], values[SPL_GPU_CONSTANTS_MAX], count = 0;
     for (uint32_t i = 0; i < constant_count; i++) {
         if (declared >> i & 1) {
@@ -46,7 +47,7 @@ int gl_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, cons
     char log[256] = "";
     GLint done = GL_FALSE;
     GLuint shader = gl->CreateShader(GL_COMPUTE_SHADER);
-    gl->ShaderBinary(1, &shader, GL_SHADER_BINARY_FORMAT_SPIR_V, code->opengl, (GLsizei)code->opengl_bytes);
+    gl->ShaderBinary(1, &shader, GL_SHADER_BINARY_FORMAT_SPIR_V, code->opengl.begin, (GLsizei)(4 * words));
     gl->SpecializeShader(shader, "main", count, ids, values);
     gl->GetShaderiv(shader, GL_COMPILE_STATUS, &done);
     if (done) {

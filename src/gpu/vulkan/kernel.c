@@ -63,8 +63,8 @@ int vk_kernel_create(struct spl_gpu *base, const struct spl_gpu_code *code, cons
         result = vkCreateShaderModule(gpu->device,
                                            &(VkShaderModuleCreateInfo){
                                                .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                                               .codeSize = code->vulkan_bytes,
-                                               .pCode = code->vulkan},
+                                               .codeSize = 4 * (size_t)(code->vulkan.end - code->vulkan.begin),
+                                               .pCode = code->vulkan.begin},
                                            NULL, &module);
     if (result >= 0)
         result = vkCreateComputePipelines(
