@@ -10,6 +10,7 @@
 
 #include "geom/fit.h"
 #include "geom/size.h"
+#include "geom/station.h"
 
 static const char *const names[SPL_CAMERA_PARAMS] = {
 #define PARAM(name, alias, kind, places, help) #name,
@@ -341,6 +342,50 @@ static void level(const double eye[3], double target[3], const double given_up[3
         memcpy(target, moved, sizeof moved);
 }
 
+/* At a station; its number says all of the pose but what stands beside it: target and up. A view by name has no say. */
+static int resolve_station(const struct spl_value *v, const struct spl_camera_defaults *defaults,
+                           struct spl_camera *camera, double *distance, struct spl_error *err)
+{
+    static const enum spl_camera_param others[] = {SPL_CAMERA_eye, SPL_CAMERA_matrix, SPL_CAMERA_q, SPL_CAMERA_t};
+    static const char *const name = "station";
+    const struct spl_dataset_info *dataset = defaults->dataset;
+    const double number = v[SPL_CAMERA_station].n[0];
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (given(v, others[i]))
+            return conflict(v, SPL_CAMERA_station, others[i], err);
+    if (!dataset)
+        return spl_fail_field(err, SPL_E_INPUT, name, "no dataset stands behind this that could say where station %.0f is",
+                              number);
+    if (!dataset->station_count)
+        return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f: no scan of dataset '%s' says where it was taken from",
+                              number, dataset->id);
+    if (number >= dataset->station_count)
+        return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is none of dataset '%s', which has 0 to %u", number,
+                              dataset->id, dataset->station_count - 1);
+    static const double origin[3] = {0};
+    const double *pose = dataset->stations[(uint32_t)number], eye[3] = {pose[3], pose[7], pose[11]};
+    const double *about = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : dataset->default_up;
+    double forward[3], up[3], target[3];
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(eye[i]) <= SPL_CAMERA_COORDINATE_MAX))
+            return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is at %g, beyond where a camera can be", number, eye[i]);
+    if (given(v, SPL_CAMERA_target)) {
+        int rc = get_point(v, SPL_CAMERA_target, NULL, defaults, target, err);
+        if (rc)
+            return rc;
+        if (is_around(v))
+            level(eye, target, about);
+        *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
+        return spl_camera_look_at(camera, eye, target, about, err);
+    }
+    if (about[0] == 0 && about[1] == 0 && about[2] == 0)
+        return spl_camera_look_at(camera, origin, (double[]){1, 0, 0}, about, err); /* which says so */
+    spl_station_look(pose, about, forward, up);
+    int rc = spl_camera_look_at(camera, origin, forward, up, err); /* where coordinates are no coarser than directions */
+    memcpy(camera->eye, eye, sizeof eye);
+    return rc;
+}
+
 /* *distance: from the eye to what it looks at, 0 where the pose does not say. */
 static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                         struct spl_camera *camera, double *distance, struct spl_error *err)
@@ -354,6 +399,8 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
         return rc;
     if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
         return missing(SPL_CAMERA_matrix, SPL_CAMERA_convention, err);
+    if (given(v, SPL_CAMERA_station))
+        return resolve_station(v, defaults, camera, distance, err);
     for (int i = 0; i < 3; i++) {
         if (!given(v, look_at[i]))
             continue;
@@ -387,6 +434,8 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
 /* Without a default view, a camera that says only where it stands would be drawn from a made-up angle. */
 static int check_complete(const struct spl_value *v, struct spl_error *err)
 {
+    if (given(v, SPL_CAMERA_station)) /* which there is none of */
+        return 0;
     bool free_pose = given(v, SPL_CAMERA_matrix) || given(v, SPL_CAMERA_q) || given(v, SPL_CAMERA_t);
     if (!free_pose && !given(v, SPL_CAMERA_eye))
         return spl_fail_field(err, SPL_E_INPUT, "eye",
