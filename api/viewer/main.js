@@ -21,6 +21,7 @@ import {attachSides} from "./sides.js";
 import {Soft} from "./soft.js";
 import {keptOf, opacityOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
+import {Stations} from "./stations.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
@@ -37,6 +38,7 @@ const gallery = new Gallery($("gallery"));
 const clip = new Clip(stage);
 const classes = new Classes();
 const views = new Views(stage, say);
+const stations = new Stations(stage, say);
 new Handles(stage, clip, $("handles"), $("box"));
 attach(stage);
 
@@ -140,6 +142,7 @@ async function open() {
     stage.settings = readSettings();
     showDataset(dataset, device);
     views.open(dataset, wanted.view);
+    stations.open(dataset);
     document.title = `${dataset.title ?? id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);

@@ -1,7 +1,7 @@
 /* GET …/stations: where scanners stood, so many at a time, so that no list holds up the loop, whose thread owns it. */
 #include <string.h>
 
-#include "geom/station.h"
+#include "dataset/stations.h"
 #include "service/datasets/library.h"
 #include "service/exchange.h"
 #include "service/place/wait.h"
@@ -10,27 +10,16 @@
 
 enum { at_once = 256 };
 
-static json_t *vector(const double v[3])
-{
-    return json_pack("[f, f, f]", v[0], v[1], v[2]);
-}
-
 /* NULL and `err` where the coordinate system has no such place. */
 static json_t *describe(const struct spl_catalog_entry *entry, uint32_t number, uint32_t crs, struct spl_error *err)
 {
-    const struct spl_dataset_info *info = entry->info;
-    const double *pose = info->stations[number];
-    double world[3] = {pose[3], pose[7], pose[11]}, position[3], forward[3], up[3];
+    const double *pose = entry->info->stations[number], world[3] = {pose[3], pose[7], pose[11]};
+    double position[3];
     if (crs && spl_places_from_world(entry->places, crs, false, world, position, err))
         return NULL;
-    spl_station_look(pose, info->default_up, forward, up);
-    json_t *matrix = json_array();
-    for (int i = 0; i < 16; i++)
-        json_array_append_new(matrix, json_real(pose[i]));
-    json_t *json = json_pack("{s:i, s:o, s:o, s:o, s:o}", "station", (int)number, "world", vector(world), "forward",
-                             vector(forward), "up", vector(up), "matrix", matrix);
+    json_t *json = spl_station_to_json(entry->info, number);
     if (crs)
-        json_object_set_new(json, "position", vector(position));
+        json_object_set_new(json, "position", json_pack("[f, f, f]", position[0], position[1], position[2]));
     return json;
 }
 
