@@ -13,7 +13,7 @@ import tempfile
 HERE = pathlib.Path(__file__)
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "http"))
-from harness import REAL, TEXTURED, WALL, Daemon, run
+from harness import MAPPED, REAL, TEXTURED, Daemon, run
 
 COMMANDS = "serve pack render tour info synth bench compare devices sign".split()
 SERVICE = "http://127.0.0.1:8080"
@@ -64,7 +64,7 @@ def test_requests():
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as tours:
         datasets = [str(pathlib.Path(folder, name)) for name in ("hall.spld", "courtyard.spld")]
         for file in datasets:
-            shutil.copy(WALL, file)
+            shutil.copy(MAPPED, file)
         datasets.append(str(pathlib.Path(folder, "town.spld")))  # where the examples by longitude and latitude are
         subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--unit=ft", "--crs=EPSG:2994", datasets[-1]], check=True)
         pathlib.Path(folder, "camera_path.json").write_text(PATH)
@@ -117,7 +117,7 @@ def test_commands():
                     continue
                 name, rest = found.groups()
                 assert name in COMMANDS, (where, command)
-                for file, source in ("hall.spld", TEXTURED), ("courtyard.spld", WALL):  # others may have written over them
+                for file, source in ("hall.spld", TEXTURED), ("courtyard.spld", MAPPED):  # others may have written over them
                     shutil.copy(source, pathlib.Path(full, file))
                 folder = empty if name in ("bench", "serve") else full
                 rest = re.sub(r"\s{2,}#.*", "", rest.replace("\\\n", " "))

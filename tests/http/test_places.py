@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import REAL, VIEW, WALL, Daemon, eventually, run
+from harness import FAKE, MAPPED, REAL, VIEW, WALL, Daemon, eventually, run
 
 if os.environ["SPLATD_PROJ"] != "1":
     print("skipped: built without PROJ")
@@ -150,6 +150,16 @@ def test_bounds_and_the_default_view():
         used = camera_of(d.ask(f"{VIEW}?{SMALL}&crs=EPSG:4326&eye={text(view['eye'])}&target={text(view['target'])}"))
         assert view["crs"] == "EPSG:4326" and math.dist(used["eye"], world["default_view"]["eye"]) < 1e-6
         assert "crs" in d.ask("/v1/datasets").json()["datasets"][0]
+
+
+def test_stations_in_another_system():
+    with Daemon(FAKE, datasets=[MAPPED]) as d:
+        stations = f"/v1/datasets/{pathlib.Path(MAPPED).stem}/stations"
+        told = d.ask(f"{stations}?crs=EPSG:4326").json()
+        [station] = told["stations"]
+        assert told["crs"] == "EPSG:4326" and station["world"] == [2, 0, 1], told
+        assert math.dist(conic(*station["position"][:2]), station["world"][:2]) < 1e-4, station
+        refused(d.ask(f"{stations}?crs=EPSG:999999"), 400, "crs", "EPSG:999999")
 
 
 def test_what_is_wrong_is_said():
