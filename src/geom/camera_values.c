@@ -304,10 +304,10 @@ static int get_point(const struct spl_value *v, enum spl_camera_param param, con
 }
 
 /* What is up where nobody says so: of a plan, which looks along the default, +y, or +z where that is along it. */
-static void get_up(const struct spl_value *v, const struct spl_camera_defaults *defaults, const double eye[3],
-                   const double target[3], double up[3])
+static void get_up(const struct spl_value *v, const double usual[3], const double eye[3], const double target[3],
+                   double up[3])
 {
-    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up;
+    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual;
     double along[3], square = 0, product = 0, length = 0;
     memcpy(up, given_up, 3 * sizeof *up);
     for (int i = 0; i < 3; i++) {
@@ -342,9 +342,9 @@ static void level(const double eye[3], double target[3], const double given_up[3
         memcpy(target, moved, sizeof moved);
 }
 
-/* At a station; its number says all of the pose but what stands beside it: target and up. A view by name has no say. */
-static int resolve_station(const struct spl_value *v, const struct spl_camera_defaults *defaults,
-                           struct spl_camera *camera, double *distance, struct spl_error *err)
+/* The pose of the station that is named: it says where the eye is, and where it looks unless `target` does. */
+static int find_station(const struct spl_value *v, const struct spl_camera_defaults *defaults, const double **pose,
+                        struct spl_error *err)
 {
     static const enum spl_camera_param others[] = {SPL_CAMERA_eye, SPL_CAMERA_matrix, SPL_CAMERA_q, SPL_CAMERA_t};
     static const char *const name = "station";
@@ -362,27 +362,23 @@ static int resolve_station(const struct spl_value *v, const struct spl_camera_de
     if (number >= dataset->station_count)
         return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is none of dataset '%s', which has 0 to %u", number,
                               dataset->id, dataset->station_count - 1);
-    static const double origin[3] = {0};
-    const double *pose = dataset->stations[(uint32_t)number], eye[3] = {pose[3], pose[7], pose[11]};
-    const double *about = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : dataset->default_up;
-    double forward[3], up[3], target[3];
+    *pose = dataset->stations[(uint32_t)number];
     for (int i = 0; i < 3; i++)
-        if (!(fabs(eye[i]) <= SPL_CAMERA_COORDINATE_MAX))
-            return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is at %g, beyond where a camera can be", number, eye[i]);
-    if (given(v, SPL_CAMERA_target)) {
-        int rc = get_point(v, SPL_CAMERA_target, NULL, defaults, target, err);
-        if (rc)
-            return rc;
-        if (is_around(v))
-            level(eye, target, about);
-        *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
-        return spl_camera_look_at(camera, eye, target, about, err);
-    }
-    if (about[0] == 0 && about[1] == 0 && about[2] == 0)
-        return spl_camera_look_at(camera, origin, (double[]){1, 0, 0}, about, err); /* which says so */
-    spl_station_look(pose, about, forward, up);
-    int rc = spl_camera_look_at(camera, origin, forward, up, err); /* where coordinates are no coarser than directions */
-    memcpy(camera->eye, eye, sizeof eye);
+        if (!(fabs((*pose)[4 * i + 3]) <= SPL_CAMERA_COORDINATE_MAX))
+            return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is at %g, beyond where a camera can be", number,
+                                  (*pose)[4 * i + 3]);
+    return 0;
+}
+
+/* From there ahead and level. Directions are found around the origin, where coordinates are no coarser than they. */
+static int look_ahead(struct spl_camera *camera, const double pose[16], const double about[3], struct spl_error *err)
+{
+    double forward[3] = {1, 0, 0}, up[3] = {0};
+    if (about[0] != 0 || about[1] != 0 || about[2] != 0) // else it is refused below
+        spl_station_look(pose, about, forward, up);
+    int rc = spl_camera_look_at(camera, (double[3]){0}, forward, up, err);
+    for (int i = 0; i < 3; i++)
+        camera->eye[i] = pose[4 * i + 3];
     return rc;
 }
 
@@ -392,6 +388,7 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
 {
     static const enum spl_camera_param look_at[] = {SPL_CAMERA_eye, SPL_CAMERA_target, SPL_CAMERA_up},
                                        colmap[] = {SPL_CAMERA_q, SPL_CAMERA_t};
+    const double *station = NULL, *usual_up = defaults->up;
     double eye[3], target[3], up[3];
     int rc = check_places(v, defaults, err);
     *distance = 0;
@@ -399,8 +396,13 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
         return rc;
     if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
         return missing(SPL_CAMERA_matrix, SPL_CAMERA_convention, err);
-    if (given(v, SPL_CAMERA_station))
-        return resolve_station(v, defaults, camera, distance, err);
+    if (given(v, SPL_CAMERA_station)) { /* a view by name does not say what is up there */
+        if ((rc = find_station(v, defaults, &station, err)))
+            return rc;
+        usual_up = defaults->dataset->default_up;
+        if (!given(v, SPL_CAMERA_target))
+            return look_ahead(camera, station, given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual_up, err);
+    }
     for (int i = 0; i < 3; i++) {
         if (!given(v, look_at[i]))
             continue;
@@ -424,7 +426,9 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
     if ((rc = get_point(v, SPL_CAMERA_eye, defaults->eye, defaults, eye, err)) ||
         (rc = get_point(v, SPL_CAMERA_target, defaults->target, defaults, target, err)))
         return rc;
-    get_up(v, defaults, eye, target, up);
+    for (int i = 0; station && i < 3; i++)
+        eye[i] = station[4 * i + 3];
+    get_up(v, usual_up, eye, target, up);
     if (is_around(v))
         level(eye, target, up);
     *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
