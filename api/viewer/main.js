@@ -142,7 +142,6 @@ async function open() {
     stage.settings = readSettings();
     showDataset(dataset, device);
     views.open(dataset, wanted.view);
-    stations.open(dataset);
     document.title = `${dataset.title ?? id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
@@ -151,6 +150,7 @@ async function open() {
     );
     opened = turn;
     stage.open(dataset, camera);
+    stations.open(dataset, wanted.station);
     clip.show(); // what it cuts depends on where one looks
     points.clear();
     annotations.open(wanted.mark);

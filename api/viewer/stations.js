@@ -17,9 +17,11 @@ export class Stations {
     });
   }
 
-  open(dataset) {
+  /** The stage has its camera, from station `stood` where that is given. */
+  open(dataset, stood = "") {
     const numbers = Array.from({length: Math.min(dataset.stations?.count ?? 0, MOST)}, (_, i) => String(i));
-    choices($("stations"), ["", ...numbers], "");
+    choices($("stations"), ["", ...numbers], String(stood));
+    this.own = this.stage.camera;
     $("stations").options[0].textContent = "none";
     $("stations-label").hidden = !numbers.length;
   }

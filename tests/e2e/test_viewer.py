@@ -727,6 +727,8 @@ def test_maps_are_offered_where_there_are_any():
             assert link(tab)["target"][0] > 2 and tab.run("document.querySelector('#stations').value") == "0"
             tab.press_on("#home")
             tab.until(f"document.querySelector('#stations').value === '' && {REST}")
+            tab.run("location.hash = '#dataset=wall-mapped&station=0'")
+            tab.until(f"document.querySelector('#stations').value === '0' && {REST}")
         with page(f"{site}/embed/wall-mapped#station=0&target=0,0,1") as tab:
             assert any("eye=2%2C0%2C1&target=0%2C0%2C1" in name.replace(",", "%2C") for name, *_ in tab.run(VIEWS)), tab.run(VIEWS)
         with page(f"{site}/{look}&maps=off") as tab:
