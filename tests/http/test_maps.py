@@ -188,6 +188,7 @@ def test_stations_are_listed_and_stood_at():
         batch = d.post({"views": [{"camera": {"station": 0}}, {"camera": {"station": 1}}], **small}, VIEW + "s")
         refused(batch, "views[1].camera.station", "has 0 to 0")
         assert d.ask(f"{here}/pick?x=32&y=24&station=0&width=64&height=48").status == 200
+        assert d.post({"x": 32, "y": 24, "camera": {"station": 0}, **small}, f"{here}/pick").status == 200
         for path, field in ((f"{VIEW}?station=1", "station"), (f"{wall}/view?station=0", "station"), (f"{VIEW}?station=x", "station"),
                             (f"{VIEW}?station=0&eye=1,2,3", "station"), (f"{here}/pick?x=1&y=1&station=9", "station"),
                             (f"{here}/thumbnail.jpg?station=0", "station"), (f"{here}/tiles.json?station=0", "station")):
