@@ -25,7 +25,7 @@ import urllib.parse
 import urllib.request
 import zlib
 
-CAMERA = ("eye", "target", "up", "fov", "fx", "fy", "cx", "cy", "projection", "view_height", "units_per_pixel", "azimuth", "elevation")
+CAMERA = ("eye", "target", "up", "station", "fov", "fx", "fy", "cx", "cy", "projection", "view_height", "units_per_pixel", "azimuth", "elevation")
 
 
 class SplatdError(Exception):
@@ -198,8 +198,11 @@ class Dataset:
         points = unproject(camera, found["range"], "range")[seen]
         return Cloud(points, found["color"][seen][:, :3], found["normal"][seen] if normals else None, found["id"][seen] if ids else None)
 
-    def panorama(self, eye, forward=(0, 1, 0), **params):
-        """All around from `eye`, equirectangular, upright; `forward` is the direction in its middle. A View."""
+    def panorama(self, eye=None, forward=(0, 1, 0), **params):
+        """All around from `eye`, equirectangular, upright; `forward` is the direction in its middle. Or with station=K, from where
+        a scanner stood, what it had before it in the middle. A View."""
+        if params.get("station") is not None:
+            return self.view(**{"projection": "equirectangular", "eye": eye, **params})
         target = [a + b for a, b in zip(plain(eye), plain(forward))]
         return self.view(**{"projection": "equirectangular", "eye": eye, "target": target, **params})
 
@@ -245,6 +248,16 @@ class Dataset:
         if sys.byteorder == "big":
             values.byteswap()
         return values
+
+    def stations(self, crs=None):
+        """Places where scanners stood, a list of dicts: view(station=K) looks ahead from "world" of the K-th; with crs
+        ("EPSG:4326") each has "position" in that, too. "matrix" is the scanner's pose, row-major, station to world."""
+        found = []
+        while True:
+            page = json.loads(self.ask(f"{self.info['uri']}/stations", {"crs": crs, "first": len(found)})[0])
+            found += page["stations"]
+            if len(found) >= page["count"] or not page["stations"]:
+                return found
 
     def pick(self, x, y, **params):
         """What lies at a pixel of the view with these parameters; its "position" is None where nothing is."""

@@ -5,7 +5,7 @@ import {findParameter} from "./methods.js";
 const VECTORS = ["eye", "target", "up"],
   TEXTS = ["dataset", "view", "layer", "method", "budget", "crs", "soft", "color_by", "range", "shade", "projection", "clip", "class",
     "background"],
-  NUMBERS = ["fov", "view_height", "near", "far", "lod", "supersample"];
+  NUMBERS = ["fov", "view_height", "station", "near", "far", "lod", "supersample"];
 const JOINTS = {soft: " or ", clip: " and "}; // of what may be given several times
 const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "string";
 

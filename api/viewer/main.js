@@ -21,6 +21,7 @@ import {attachSides} from "./sides.js";
 import {Soft} from "./soft.js";
 import {keptOf, opacityOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
+import {Stations} from "./stations.js";
 import {Tour} from "./tour.js";
 import {editTour} from "./tour_editor.js";
 import {renderTours} from "./tour_render.js";
@@ -37,6 +38,7 @@ const gallery = new Gallery($("gallery"));
 const clip = new Clip(stage);
 const classes = new Classes();
 const views = new Views(stage, say);
+const stations = new Stations(stage, say);
 new Handles(stage, clip, $("handles"), $("box"));
 attach(stage);
 
@@ -148,6 +150,7 @@ async function open() {
     );
     opened = turn;
     stage.open(dataset, camera);
+    stations.open(dataset, wanted.station);
     clip.show(); // what it cuts depends on where one looks
     points.clear();
     annotations.open(wanted.mark);

@@ -1,11 +1,22 @@
 // Cameras by longitude and latitude, which the service knows where to find in the dataset's world, in which everything else
-// here thinks; and by the names that the dataset's views have.
+// here thinks; by the names that the dataset's views have; and by the numbers of its stations.
 
-import {fitted} from "./camera.js";
+import {add, distance, fitted, times} from "./camera.js";
 import {Problem, ask, askJson, query} from "./service.js";
 
-/** `wanted` with eye and target in the world; they are in its coordinate system `crs` where it names one. */
-export async function toWorld(dataset, {crs, ...wanted}) {
+/** Eye, target and up of a station: ahead by a tenth of the dataset's size. */
+export async function stationAt(dataset, number) {
+  if (!(number < (dataset.stations?.count ?? 0))) throw new Problem("gone", `${dataset.id} has no station ${number}`);
+  const {min, max} = dataset.bounds,
+    ahead = distance({eye: min, target: max}) / 10 || 1;
+  const {stations} = await askJson(`${dataset.stations.uri}?${query({first: number, count: 1})}`),
+    [{world: eye, forward, up}] = stations;
+  return {eye, target: add(eye, times(forward, ahead)), up};
+}
+
+/** `wanted` with eye and target in the world; they are in its coordinate system `crs` where it names one, and at its station. */
+export async function toWorld(dataset, {crs, station, ...wanted}) {
+  if (station !== undefined) return {...(await stationAt(dataset, station)), ...(await toWorld(dataset, {crs, ...wanted}))};
   if (!crs) return wanted;
   const clip = wanted.clip && (await clipToWorld(dataset, crs, wanted));
   const find = async (name) => {

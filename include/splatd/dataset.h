@@ -109,6 +109,9 @@ struct spl_dataset_info {
     uint32_t view_count;                /* at most SPL_SAVED_VIEWS_MAX */
     const struct spl_saved_view *views; /* by name; borrowed until close */
     uint32_t epsg;  /* number of the horizontal coordinate system in EPSG's list; 0 = not known */
+    uint32_t station_count;       /* places where a scanner stood, by their numbers, which attribute "scan" has too */
+    const double (*stations)[16]; /* row-major, station to world, z up of most scanners; borrowed until close */
+    bool stations_of_maps;        /* no scan says where it was taken from: they are the places of panoramas */
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */

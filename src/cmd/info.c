@@ -212,6 +212,20 @@ static void print_line(const char *label, const char *text)
     printf("\n");
 }
 
+/* Those that render takes by number: the first, and how many more. */
+static void print_stations(const struct spl_dataset_info *info)
+{
+    enum { shown = 8 };
+    char text[32];
+    for (uint32_t i = 0; i < info->station_count && i < shown; i++) {
+        const double *pose = info->stations[i];
+        printf("%s--station %u at %.10g %.10g %.10g%s\n", i ? "                " : "  stations      ", i, pose[3], pose[7],
+               pose[11], !i && info->stations_of_maps ? ", of panoramas" : "");
+    }
+    if (info->station_count > shown)
+        printf("                and %s more\n", spl_cmd_group(info->station_count - shown, text));
+}
+
 static void print_bytes(const char *attribute, double bytes, int width)
 {
     printf("  ");
@@ -273,6 +287,7 @@ static void print_table(const struct spl_info_report *report)
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
            info->default_up[2], info->default_fov);
+    print_stations(info);
     for (uint32_t v = 0; v < info->view_count; v++)
         printf("  view          --view %s\n", info->views[v].name);
     print_suggestions(info);

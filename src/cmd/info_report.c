@@ -11,6 +11,7 @@
 #include "dataset/classes.h"
 #include "dataset/panels.h"
 #include "dataset/saved_views.h"
+#include "dataset/stations.h"
 #include "render/soft/suggest.h"
 
 const struct spl_info_code spl_info_codes[SPL_INFO_CODES] = {
@@ -179,6 +180,14 @@ static json_t *maps_to_json(const struct spl_info_report *report)
                      json_object_get(spl_dataset_get_meta(report->dataset), "maps"));
 }
 
+static json_t *stations_to_json(const struct spl_dataset_info *info)
+{
+    json_t *list = json_array();
+    for (uint32_t i = 0; i < info->station_count; i++)
+        json_array_append_new(list, spl_station_to_json(info, i));
+    return list;
+}
+
 /* Bytes with the chunks' headers. */
 static json_t *kinds_to_json(const struct spl_info_report *report)
 {
@@ -275,7 +284,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
     return json_pack(
         "{s:s, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, s:b, "
         "s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, s:O?, "
-        "s:o, s:s?, s:s?, s:o, s:o, s:o}",
+        "s:o, s:s?, s:s?, s:o, s:o, s:o, s:o}",
         "id", info->id, "version", json_sprintf("%016" PRIx64, info->version), "file_bytes",
         (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats,
         "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes", (json_int_t)info->nodes, "chunks",
@@ -295,5 +304,6 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
         json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report), "title", info->title,
         "description", info->description, "views", spl_saved_views_to_json(info->views, info->view_count),
-        "classes", classes_to_json(info), "soft", suggestions_to_json(info));
+        "classes", classes_to_json(info), "soft", suggestions_to_json(info), "stations",
+        stations_to_json(info));
 }

@@ -34,6 +34,7 @@ struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset;
     const char *view; // may be NULL; the name of one that the dataset was packed with
+    uint64_t station; // UINT64_MAX = not given
     double eye[3], target[3], up[3], fov, fx, fy, cx, cy, near, far; /* NAN (eye[0] …) = not given */
     int projection;                      /* enum spl_projection, -1 = not given */
     double view_height, units_per_pixel; /* NAN = not given */
@@ -64,6 +65,8 @@ static const struct spl_cmd_option options[] = {
     {.help = "Camera, in the dataset's coordinates; what is left out is the default view's:"},
     {"view", "NAME", "or that view's, which the dataset was packed with ('splatd info' lists them)",
      SPL_CMD_TEXT(struct arguments, view)},
+    {"station", "K", "where a scanner stood, looking ahead and level, instead of --eye ('splatd info' lists them, from 0 on)",
+     SPL_CMD_COUNT(struct arguments, station, 0, UINT32_MAX)},
     {"eye", "X,Y,Z", "where it is", SPL_CMD_VECTOR(struct arguments, eye)},
     {"target", "X,Y,Z", "where it looks", SPL_CMD_VECTOR(struct arguments, target)},
     {"crs", "EPSG:N", "what --eye, --target and shapes of --soft and --clip are in: longitude, latitude, height with EPSG:4326", .take = take_crs},
@@ -130,6 +133,9 @@ static const struct spl_cmd_table table = {
         "All around, upright, and how far everything is along its ray:\n"
         "  splatd render courtyard.spld --projection equirectangular --eye 0,0,1.7 --target 5,0,1.7 -o around.jpg\n"
         "  splatd render courtyard.spld --projection equirectangular --eye 0,0,1.7 --target 5,0,1.7 --layer range -o range.npy\n"
+        "Where the first scanner stood, and all around it:\n"
+        "  splatd render courtyard.spld --station 0 -o station.jpg\n"
+        "  splatd render courtyard.spld --station 0 --projection equirectangular -o around.jpg\n"
         "What a robot's lidar would measure, along directions of a file, x forward, y left, z up:\n"
         "  splatd render courtyard.spld --rays directions.npy --frame sensor --eye 0,0,1.2 --target 5,0,1.2 -o ranges.npy\n"
         "Through the crown of a tree, by a box around it; 'splatd info' says what else the dataset has, such as class:5:\n"
@@ -255,18 +261,21 @@ static void give(struct spl_value *values, enum spl_camera_param param, const do
 }
 
 /* Where a projection is said, all means what it means over HTTP. */
-static int resolve_projection(const struct arguments *a, const struct spl_saved_view *from, const double fit[2],
-                              struct spl_camera *camera, struct spl_error *err)
+static int resolve_projection(const struct arguments *a, const struct spl_dataset_info *info,
+                              const struct spl_saved_view *from, const double fit[2], struct spl_camera *camera,
+                              struct spl_error *err)
 {
+    const double station = a->station == UINT64_MAX ? (double)NAN : (double)a->station;
     const double projection = a->rays ? SPL_RAYS : a->projection < 0 ? (double)NAN : a->projection;
     const double size[2] = {a->rays ? 1 : a->drawing.size[0], a->rays ? a->rays->count : a->drawing.size[1]};
     const struct spl_camera_limits limits = {.side_px = a->rays ? SPL_RAYS_MAX : 65535, .pixels = UINT64_MAX};
     struct spl_camera_defaults defaults = {
-        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far};
+        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far, .dataset = info};
     struct spl_value values[SPL_CAMERA_PARAMS] = {0};
     memcpy(defaults.eye, from->eye, sizeof defaults.eye);
     memcpy(defaults.target, from->target, sizeof defaults.target);
     memcpy(defaults.up, from->up, sizeof defaults.up);
+    give(values, SPL_CAMERA_station, &station, 1);
     give(values, SPL_CAMERA_eye, a->eye, 3);
     give(values, SPL_CAMERA_target, a->target, 3);
     give(values, SPL_CAMERA_up, a->up, 3);
@@ -342,9 +351,10 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     rc = rc ? rc : start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
-    if (a->rays || a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel)) {
-        const double *fit = spl_dataset_get_info(dataset)->default_fit;
-        rc = resolve_projection(a, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
+    if (a->rays || a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel) || a->station != UINT64_MAX) {
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        const double *fit = info->default_fit;
+        rc = resolve_projection(a, info, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
         if (!rc && a->rays)
             rc = spl_view_set_rays(&a->drawing.view, a->rays, (enum spl_ray_frame)a->frame, a->resolution, err);
         return rc ? rc : spl_view_check(&a->drawing.view, err);
@@ -480,7 +490,7 @@ static int render(struct arguments *a, struct spl_error *err)
 int spl_cmd_render(int argc, char **argv)
 {
     struct arguments a = {
-        .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
+        .station = UINT64_MAX, .eye = {NAN}, .target = {NAN}, .up = {NAN}, .fov = NAN, .fx = NAN, .fy = NAN, .cx = NAN, .cy = NAN,
         .near = NAN, .far = NAN, .projection = -1, .view_height = NAN, .units_per_pixel = NAN,
         .azimuth = {NAN}, .elevation = {NAN},
     };

@@ -122,7 +122,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const struct spl_camera_limits limits = {.side_px = 65535, .pixels = 64 << 20};
-    struct spl_camera_defaults defaults = {.fov = info->default_fov};
+    struct spl_camera_defaults defaults = {.fov = info->default_fov, .dataset = info};
     struct spl_path_value values[SPL_PATH_VALUES];
     struct spl_path_options path_options = {a->drawing.size[0], a->drawing.size[1], &defaults, &limits, values};
     struct spl_path_motion motion = {a->positions, a->rotations, a->ease};

@@ -155,6 +155,7 @@ static void destroy(struct spl_dataset *dataset)
 {
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
+    free(dataset->stations);
     for (uint32_t i = 0; dataset->copies && i < dataset->section_count; i++)
         free(dataset->copies[i]);
     free(dataset->copies);

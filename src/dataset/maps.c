@@ -3,9 +3,33 @@
  * thread, the rest on any. */
 #include "dataset/map.h"
 
+#include <string.h>
+
 #include <xxhash.h>
 
+#include "base/memory.h"
 #include "dataset/open.h"
+
+/* Where no scan says where it was taken from, the places of panoramas are what is known of it. */
+static int take_places(struct spl_dataset *dataset, const struct spl_map_row *rows, uint32_t count, struct spl_error *err)
+{
+    if (dataset->info.station_count)
+        return SPL_OK;
+    if (!(dataset->stations = spl_alloc(count, sizeof *dataset->stations, err)))
+        return SPL_E_NOMEM;
+    for (uint32_t i = 0; i < count; i++) {
+        double *pose = dataset->stations[i];
+        for (int row = 0; row < 3; row++) {
+            memcpy(pose + 4 * row, rows[i].rotation + 3 * row, 3 * sizeof *pose);
+            pose[4 * row + 3] = rows[i].position[row];
+        }
+        pose[15] = 1;
+    }
+    dataset->info.station_count = count;
+    dataset->info.stations = (const double (*)[16])dataset->stations;
+    dataset->info.stations_of_maps = true;
+    return SPL_OK;
+}
 
 int spl_dataset_check_stations(struct spl_dataset *dataset, struct spl_error *err)
 {
@@ -25,7 +49,7 @@ int spl_dataset_check_stations(struct spl_dataset *dataset, struct spl_error *er
     }
     info->maps = count;
     dataset->map_rows = rows;
-    return SPL_OK;
+    return take_places(dataset, rows, count, err);
 }
 
 const struct spl_map_row *spl_dataset_get_maps(const struct spl_dataset *dataset, uint32_t *count)

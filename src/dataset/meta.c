@@ -7,9 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "dataset/open.h"
 #include "dataset/saved_views.h"
 #include "geom/ground.h"
+#include "geom/station.h"
 #include "geom/unit.h"
 
 /* Of what is no number and no text the shape alone. */
@@ -172,17 +174,27 @@ static int get_stations(struct spl_dataset *dataset, struct spl_error *err)
 {
     const char *key = "stations";
     const json_t *stations = json_object_get(dataset->meta, key);
+    const size_t count = json_array_size(stations); /* META's length bounds it */
     if (stations && !json_is_array(stations))
         return wrong(dataset, err, key, stations, "an array");
-    for (size_t i = 0; i < json_array_size(stations); i++) {
+    if (count && !(dataset->stations = spl_alloc_raw(count, sizeof *dataset->stations, err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < count; i++) {
         const json_t *matrix = json_array_get(stations, i), *number = matrix;
         bool good = json_is_array(matrix) && json_array_size(matrix) == 16;
-        for (size_t j = 0; good && j < 16; j++)
+        for (size_t j = 0; good && j < 16; j++) {
             good = json_is_number(number = json_array_get(matrix, j));
+            dataset->stations[i][j] = json_number_value(number);
+        }
         if (!good)
             return wrong_entry(dataset, err, key, i, NULL, matrix, "a matrix of 16 numbers");
+        const char *needed = spl_station_judge(dataset->stations[i]);
+        if (needed)
+            return wrong_entry(dataset, err, key, i, NULL, matrix, needed);
     }
-    dataset->info.has_sides = dataset->info.has_surface && json_array_size(stations) > 0;
+    dataset->info.has_sides = dataset->info.has_surface && count > 0;
+    dataset->info.station_count = (uint32_t)count;
+    dataset->info.stations = (const double (*)[16])dataset->stations;
     return SPL_OK;
 }
 

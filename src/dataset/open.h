@@ -67,6 +67,7 @@ struct spl_dataset {
     struct spl_stream_values stream_values[SPL_STREAMS_MAX];
     struct spl_dictionary dictionary; /* count 0 = no textures */
     json_t *meta;
+    double (*stations)[16]; // info.station_count of them; may be NULL
     struct spl_saved_view views[SPL_SAVED_VIEWS_MAX]; /* info.view_count of them */
 };
 

@@ -10,9 +10,9 @@
 
 #include "base/error.h"
 #include "geom/faces.h"
+#include "geom/size.h"
 
-/* Beyond this, neighbouring doubles are further apart than the points of any scan. */
-static const double coordinate_max = 1e12;
+static const double coordinate_max = SPL_CAMERA_COORDINATE_MAX;
 /* An orthographic image is so high at least: below, doubles of coordinates in kilometres end. */
 static const double view_height_min = 1e-9;
 /* Sine of the angle between view and up below which the image's upright is arbitrary (0.06 millidegrees). */

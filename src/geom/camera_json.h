@@ -38,7 +38,8 @@ enum spl_value_place {
     SPL_THUMBNAIL = 64,
     SPL_TILE = 128,
     SPL_SAVED = 256,
-    SPL_LIST = 512
+    SPL_LIST = 512,
+    SPL_STATIONS = 1024
 };
 
 enum spl_camera_param {
@@ -80,6 +81,7 @@ struct spl_camera_defaults {
     double fit[2]; /* degrees across and upright that an image of any shape shows; 0 = fov in all of them */
     const struct spl_camera_places *places; // may be NULL: nothing is known but the world
     const struct spl_camera_names *names;   // may be NULL: there are none
+    const struct spl_dataset_info *dataset; // may be NULL: no stations are known
     char settings[SPL_VIEW_SETTINGS_BYTES]; /* of the view by its name, beside its camera: a JSON object, or "" */
 };
 

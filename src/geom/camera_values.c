@@ -10,6 +10,7 @@
 
 #include "geom/fit.h"
 #include "geom/size.h"
+#include "geom/station.h"
 
 static const char *const names[SPL_CAMERA_PARAMS] = {
 #define PARAM(name, alias, kind, places, help) #name,
@@ -303,10 +304,10 @@ static int get_point(const struct spl_value *v, enum spl_camera_param param, con
 }
 
 /* What is up where nobody says so: of a plan, which looks along the default, +y, or +z where that is along it. */
-static void get_up(const struct spl_value *v, const struct spl_camera_defaults *defaults, const double eye[3],
-                   const double target[3], double up[3])
+static void get_up(const struct spl_value *v, const double usual[3], const double eye[3], const double target[3],
+                   double up[3])
 {
-    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : defaults->up;
+    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual;
     double along[3], square = 0, product = 0, length = 0;
     memcpy(up, given_up, 3 * sizeof *up);
     for (int i = 0; i < 3; i++) {
@@ -341,12 +342,53 @@ static void level(const double eye[3], double target[3], const double given_up[3
         memcpy(target, moved, sizeof moved);
 }
 
+/* The pose of the station that is named: it says where the eye is, and where it looks unless `target` does. */
+static int find_station(const struct spl_value *v, const struct spl_camera_defaults *defaults, const double **pose,
+                        struct spl_error *err)
+{
+    static const enum spl_camera_param others[] = {SPL_CAMERA_eye, SPL_CAMERA_matrix, SPL_CAMERA_q, SPL_CAMERA_t};
+    static const char *const name = "station";
+    const struct spl_dataset_info *dataset = defaults->dataset;
+    const double number = v[SPL_CAMERA_station].n[0];
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (given(v, others[i]))
+            return conflict(v, SPL_CAMERA_station, others[i], err);
+    if (!dataset)
+        return spl_fail_field(err, SPL_E_INPUT, name, "no dataset stands behind this that could say where station %.0f is",
+                              number);
+    if (!dataset->station_count)
+        return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f: no scan of dataset '%s' says where it was taken from",
+                              number, dataset->id);
+    if (number >= dataset->station_count)
+        return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is none of dataset '%s', which has 0 to %u", number,
+                              dataset->id, dataset->station_count - 1);
+    *pose = dataset->stations[(uint32_t)number];
+    for (int i = 0; i < 3; i++)
+        if (!(fabs((*pose)[4 * i + 3]) <= SPL_CAMERA_COORDINATE_MAX))
+            return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is at %g, beyond where a camera can be", number,
+                                  (*pose)[4 * i + 3]);
+    return 0;
+}
+
+/* From there ahead and level. Directions are found around the origin, where coordinates are no coarser than they. */
+static int look_ahead(struct spl_camera *camera, const double pose[16], const double about[3], struct spl_error *err)
+{
+    double forward[3] = {1, 0, 0}, up[3] = {0};
+    if (about[0] != 0 || about[1] != 0 || about[2] != 0) // else it is refused below
+        spl_station_look(pose, about, forward, up);
+    int rc = spl_camera_look_at(camera, (double[3]){0}, forward, up, err);
+    for (int i = 0; i < 3; i++)
+        camera->eye[i] = pose[4 * i + 3];
+    return rc;
+}
+
 /* *distance: from the eye to what it looks at, 0 where the pose does not say. */
 static int resolve_pose(const struct spl_value *v, const struct spl_camera_defaults *defaults,
                         struct spl_camera *camera, double *distance, struct spl_error *err)
 {
     static const enum spl_camera_param look_at[] = {SPL_CAMERA_eye, SPL_CAMERA_target, SPL_CAMERA_up},
                                        colmap[] = {SPL_CAMERA_q, SPL_CAMERA_t};
+    const double *station = NULL, *usual_up = defaults->up;
     double eye[3], target[3], up[3];
     int rc = check_places(v, defaults, err);
     *distance = 0;
@@ -354,6 +396,13 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
         return rc;
     if (given(v, SPL_CAMERA_convention) && !given(v, SPL_CAMERA_matrix))
         return missing(SPL_CAMERA_matrix, SPL_CAMERA_convention, err);
+    if (given(v, SPL_CAMERA_station)) { /* a view by name does not say what is up there */
+        if ((rc = find_station(v, defaults, &station, err)))
+            return rc;
+        usual_up = defaults->dataset->default_up;
+        if (!given(v, SPL_CAMERA_target))
+            return look_ahead(camera, station, given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual_up, err);
+    }
     for (int i = 0; i < 3; i++) {
         if (!given(v, look_at[i]))
             continue;
@@ -377,7 +426,9 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
     if ((rc = get_point(v, SPL_CAMERA_eye, defaults->eye, defaults, eye, err)) ||
         (rc = get_point(v, SPL_CAMERA_target, defaults->target, defaults, target, err)))
         return rc;
-    get_up(v, defaults, eye, target, up);
+    for (int i = 0; station && i < 3; i++)
+        eye[i] = station[4 * i + 3];
+    get_up(v, usual_up, eye, target, up);
     if (is_around(v))
         level(eye, target, up);
     *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);
@@ -387,6 +438,8 @@ static int resolve_pose(const struct spl_value *v, const struct spl_camera_defau
 /* Without a default view, a camera that says only where it stands would be drawn from a made-up angle. */
 static int check_complete(const struct spl_value *v, struct spl_error *err)
 {
+    if (given(v, SPL_CAMERA_station)) /* which there is none of */
+        return 0;
     bool free_pose = given(v, SPL_CAMERA_matrix) || given(v, SPL_CAMERA_q) || given(v, SPL_CAMERA_t);
     if (!free_pose && !given(v, SPL_CAMERA_eye))
         return spl_fail_field(err, SPL_E_INPUT, "eye",

@@ -11,6 +11,8 @@ enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
 
 /* Where no dataset is at hand whose size would say; far is infinite then. */
 #define SPL_CAMERA_NEAR_DEFAULT 0.01
+/* Of eye and target: beyond it neighbouring doubles are further apart than the points of any scan. */
+#define SPL_CAMERA_COORDINATE_MAX 1e12
 
 /* The size of an image of which neither side is said, and so its ratio where one is. */
 static inline void spl_size_of_projection(enum spl_projection projection, double shape[2])

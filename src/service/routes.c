@@ -93,6 +93,7 @@ static const struct route {
     {"/v1/datasets/{id}/profile", GET, SPL_SCOPE_VIEW, true, spl_show_profile},
     {"/v1/datasets/{id}/legend.svg", GET, SPL_SCOPE_VIEW, true, spl_show_legend},
     {"/v1/datasets/{id}/place", GET, SPL_SCOPE_VIEW, true, spl_show_place},
+    {"/v1/datasets/{id}/stations", GET, SPL_SCOPE_VIEW, true, spl_show_stations},
     {"/v1/datasets/{id}/tiles.json", GET, SPL_SCOPE_VIEW, true, spl_show_tiles},
     {"/v1/datasets/{id}/tiles/{z}/{x}/{y}", GET, SPL_SCOPE_VIEW, true, spl_make_tile},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},

@@ -12,7 +12,7 @@ import tempfile
 HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
-from harness import FAKE, REAL, WALL, Daemon, run, together
+from harness import FAKE, MAPPED, REAL, WALL, Daemon, run, together
 from splatd import Splatd, SplatdError, ring
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
@@ -77,6 +77,24 @@ def test_python_views():
             all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes)
             and len(set(map(tuple, eyes))) == 4
         )
+
+
+def test_python_stations():
+    with Daemon(FAKE, datasets=[WALL, MAPPED]) as d:
+        service = Splatd(url(d))
+        mapped = service.dataset("wall-mapped")
+        assert service.dataset("wall").stations() == []
+        [station] = mapped.stations()
+        assert station["station"] == 0 and station["world"] == [2, 0, 1]
+        views = [mapped.view(station=0, **SMALL), mapped.view(camera={"station": 0}, **SMALL), mapped.batch([{"station": 0}], **SMALL)[0]]
+        assert all(view.camera["eye"] == [2, 0, 1] for view in views), [view.camera for view in views]
+        around = mapped.panorama(station=0, width=64)
+        assert around.camera["projection"] == "equirectangular" and around.camera["eye"] == [2, 0, 1]
+        try:
+            mapped.view(station=1)
+            raise RuntimeError("nothing was refused")
+        except SplatdError as error:
+            assert error.status == 400 and error.field == "station"
 
 
 def test_python_refusals():

@@ -13,7 +13,7 @@ import tempfile
 HERE = pathlib.Path(__file__)
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "http"))
-from harness import REAL, TEXTURED, WALL, Daemon, run
+from harness import REAL, TEXTURED, Daemon, run
 
 COMMANDS = "serve pack render tour info synth bench compare devices sign".split()
 SERVICE = "http://127.0.0.1:8080"
@@ -63,8 +63,7 @@ def test_requests():
     functions = 'curl() { command curl -sS --fail-with-body -o got "$@"; }; splatd.sh() { "$CLIENT" "$@"; }; '
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as tours:
         datasets = [str(pathlib.Path(folder, name)) for name in ("hall.spld", "courtyard.spld")]
-        for file in datasets:
-            shutil.copy(WALL, file)
+        subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--station", *datasets], check=True)
         datasets.append(str(pathlib.Path(folder, "town.spld")))  # where the examples by longitude and latitude are
         subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--unit=ft", "--crs=EPSG:2994", datasets[-1]], check=True)
         pathlib.Path(folder, "camera_path.json").write_text(PATH)
@@ -97,7 +96,7 @@ PATH = """{"camera_path": [{"camera_to_world": [0,0,1,3, 1,0,0,0, 0,1,0,1, 0,0,0
 
 
 def test_commands():
-    with tempfile.TemporaryDirectory() as full, tempfile.TemporaryDirectory() as empty:
+    with tempfile.TemporaryDirectory() as full, tempfile.TemporaryDirectory() as empty, tempfile.TemporaryDirectory() as other:
         pathlib.Path(full, "camera_path.json").write_text(PATH)
         pathlib.Path(full, "directions.npy").write_bytes(DIRECTIONS)
         pathlib.Path(full, "groundtruth.txt").write_text("1 3 0 1 0 0 0 1\n2 3 0 2 0 0 0 1\n")
@@ -109,6 +108,7 @@ def test_commands():
         key.chmod(0o600)
         made = bash(f"{REAL} synth courtyard --points 3000 --format ply -o . && mv courtyard.ply hall.ply", full)
         assert made.returncode == 0, made
+        subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--station", f"{other}/wall.spld"], check=True)
         ran = set()
         for where, example in examples():
             for command in re.split(r"&&|\|", example):
@@ -117,7 +117,7 @@ def test_commands():
                     continue
                 name, rest = found.groups()
                 assert name in COMMANDS, (where, command)
-                for file, source in ("hall.spld", TEXTURED), ("courtyard.spld", WALL):  # others may have written over them
+                for file, source in ("hall.spld", TEXTURED), ("courtyard.spld", f"{other}/wall.spld"):  # others may have written over them
                     shutil.copy(source, pathlib.Path(full, file))
                 folder = empty if name in ("bench", "serve") else full
                 rest = re.sub(r"\s{2,}#.*", "", rest.replace("\\\n", " "))

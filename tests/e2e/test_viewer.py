@@ -704,6 +704,7 @@ def test_atoms_are_offered_where_there_are_textures():
 def test_maps_are_offered_where_there_are_any():
     with page() as tab:
         assert tab.run("document.querySelector('#parameter-maps').hidden") and "maps" not in tab.run("location.hash")
+        assert tab.run("document.querySelector('#stations-label').hidden")
         assert tab.text("#about").startswith("1\u202f600 points, 0.3"), tab.text("#about")
     look = FACING.replace("dataset=wall", "dataset=wall-mapped")
     with Daemon(REAL, datasets=[WALL, MAPPED]) as other:
@@ -719,6 +720,17 @@ def test_maps_are_offered_where_there_are_any():
             assert "maps" not in shown(tab)
             tab.run(f"location.hash = '{look}&budget=30s'")
             tab.until(f"/^Chosen: .*, maps on/.test(document.querySelector('#chosen').textContent) && {REST}")
+        with page(f"{site}/{look}") as tab:  # where its panorama was taken
+            assert tab.run("[...document.querySelector('#stations').options].map(o => o.text)") == ["none", "0"]
+            tab.choose("#stations", "0")
+            tab.until(f"/eye=2(,|%2C)0(,|%2C)1&/.test(location.hash) && {REST}", "the station's view")
+            assert link(tab)["target"][0] > 2 and tab.run("document.querySelector('#stations').value") == "0"
+            tab.press_on("#home")
+            tab.until(f"document.querySelector('#stations').value === '' && {REST}")
+            tab.run("location.hash = '#dataset=wall-mapped&station=0'")
+            tab.until(f"document.querySelector('#stations').value === '0' && {REST}")
+        with page(f"{site}/embed/wall-mapped#station=0&target=0,0,1") as tab:
+            assert any("eye=2%2C0%2C1&target=0%2C0%2C1" in name.replace(",", "%2C") for name, *_ in tab.run(VIEWS)), tab.run(VIEWS)
         with page(f"{site}/{look}&maps=off") as tab:
             assert any("maps=off" in name for name, *_ in tab.run(VIEWS)), "the address has it"
             assert tab.run("document.querySelector('#parameter-maps').value") == "off"

@@ -1,9 +1,9 @@
-/* make_wall [--small | --large | --textured | --mapped | --knot | --tree | --heap | --unit=UNIT] [--crs=CRS] NAME.spld…: a
+/* make_wall [--station] [--unit=UNIT] [--crs=CRS] [--small | --large | --textured | --mapped | --knot | --tree | --heap] NAME.spld…: a
  * coloured wall of 40 × 40 splats (--small: its lower half; --large: 600 × 600, several MiB), two levels, in the plane
  * x = 0. --textured gives its splats up to 8 of 16 atoms, --mapped the map of a station at (2, 0, 1) that sees it in
  * other colours, striped, and through its splats from y = 0.5 on. --knot makes what once took long to open, --tree a
  * ground of several levels on many small pages, --heap 20,000 discs, one behind the other, each of which covers the image. --unit= and --crs= are what the dataset says, nothing where they are
- * empty. */
+ * empty; --station is one that looks along +x from the origin. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,6 +46,10 @@ static void make_heap(const char *path)
 
 int main(int argc, char **argv)
 {
+    if (argc > 1 && !strcmp(argv[1], "--station")) {
+        make_dataset_station = true;
+        argc--, argv++;
+    }
     if (argc > 1 && !strncmp(argv[1], "--unit=", 7)) {
         make_dataset_unit = argv[1][7] ? argv[1] + 7 : NULL;
         argc--, argv++;

@@ -1,7 +1,8 @@
 """Maps of stations over HTTP: what a dataset says of them, maps=on|off in views, picks, batches and tours, what is kept under
-which ETag, and a memory limit that has no room for them. The wall's map has other colours than its splats, and its station saw
+which ETag; where stations are, and standing there; and a memory limit that has no room for them. The wall's map has other colours than its splats, and its station saw
 through it from y = 0.5 on (make_wall.c)."""
 import contextlib
+import json
 import math
 import pathlib
 import struct
@@ -148,6 +149,79 @@ def test_a_limit_that_is_too_little_says_what_maps_take():
     assert process.returncode and "with the maps of all stations 2M more" in process.stderr, process.stderr
 
 
+def refused(reply, field, *words):
+    assert reply.status == 400 and reply.json()["field"] == field, reply.body
+    assert all(word in reply.json()["detail"] for word in words), reply.body
+
+
+def test_stations_are_listed_and_stood_at():
+    """Of the mapped wall it is the place of its panorama; its default view looks from elsewhere."""
+    here, wall = f"/v1/datasets/{NAME}", "/v1/datasets/wall"
+    with tempfile.TemporaryDirectory() as folder, Daemon(FAKE, "--tours", folder, datasets=[MAPPED, WALL]) as d:
+        assert d.ask(here).json()["stations"] == {"count": 1, "from": "panoramas", "uri": f"{here}/stations"}
+        listed = d.ask(f"{here}/stations").json()
+        [only] = listed["stations"]
+        assert (listed["count"], listed["first"]) == (1, 0) and only["station"] == 0 and only["world"] == [2, 0, 1], listed
+        assert only["matrix"][3::4] == [2, 0, 1, 1] and only["up"] == [0, 0, 1] and "position" not in only, only
+        assert d.ask(f"{here}/stations?first=1&count=256").json()["stations"] == []
+        assert d.ask(wall).json()["stations"] is None
+        assert d.ask(f"{wall}/stations").json() == {"count": 0, "first": 0, "stations": []}
+        for query, field in (("first=2", "first"), ("first=-1", "first"), ("count=0", "count"), ("count=257", "count"),
+                             ("count=a", "count"), ("eye=1,2,3", "eye"), ("station=0", "station"), ("crs=EPSG:0", "crs")):
+            refused(d.ask(f"{here}/stations?{query}"), field)
+        assert d.ask("/v1/datasets/none/stations").status == 404 and d.post({}, f"{here}/stations").status == 405
+        refused(d.ask(f"{here}?first=0"), "first", "crs")
+
+        def camera(query):
+            reply = d.ask(f"{VIEW}?width=64&height=48&{query}", "HEAD")
+            assert reply.status == 200, reply.headers
+            return json.loads(reply.headers["Splatd-Camera"]), reply.headers["ETag"]
+        at, tag = camera("station=0")
+        ahead = ",".join(repr(a + b) for a, b in zip(only["world"], only["forward"]))
+        assert at["eye"] == [2, 0, 1] and tag == camera(f"eye=2,0,1&target={ahead}&up=0,0,1")[1]
+        around, _ = camera("station=0&projection=equirectangular")
+        assert around["projection"] == "equirectangular" and around["eye"] == at["eye"] and around["rotation"] == at["rotation"]
+        assert camera("station=0&target=0,0,1")[1] == camera("eye=2,0,1&target=0,0,1")[1]
+        small = {"width": 64, "height": 48}
+        posted = d.post({"camera": {"station": 0}, **small}, VIEW)
+        assert posted.status == 200 and json.loads(posted.headers["Splatd-Camera"]) == at, posted.headers
+        batch = d.post({"views": [{"camera": {"station": 0}}, {"camera": {"station": 1}}], **small}, VIEW + "s")
+        refused(batch, "views[1].camera.station", "has 0 to 0")
+        assert d.ask(f"{here}/pick?x=32&y=24&station=0&width=64&height=48").status == 200
+        assert d.post({"x": 32, "y": 24, "camera": {"station": 0}, **small}, f"{here}/pick").status == 200
+        for path, field in ((f"{VIEW}?station=1", "station"), (f"{wall}/view?station=0", "station"), (f"{VIEW}?station=x", "station"),
+                            (f"{VIEW}?station=0&eye=1,2,3", "station"), (f"{here}/pick?x=1&y=1&station=9", "station"),
+                            (f"{here}/thumbnail.jpg?station=0", "station"), (f"{here}/tiles.json?station=0", "station")):
+            refused(d.ask(path), field)
+        stay, away = {"camera": {"station": 0}}, {"camera": {"station": 2}}
+        tour = d.post({"path": {"keyframes": [stay, BODY]}, "frames": 2, "settings": small}, f"{here}/tours")
+        assert tour.status == 202, tour.body
+        refused(d.post({"path": {"keyframes": [stay, away]}, "frames": 2}, f"{here}/tours"), "keyframes[1].camera.station")
+
+
+def test_rays_and_commands_begin_at_a_station():
+    with Daemon(REAL, datasets=[MAPPED]) as d:
+        told = d.post({"directions": [[-1, 0, 0], [0, 0, 1]], "frame": "world", "format": "json", "layer": "range", "maps": "off",
+                       "camera": {"station": 0}}, f"/v1/datasets/{NAME}/rays")
+        assert told.status == 200 and abs(told.json()[0] - 2) < 0.02 and told.json()[1] is None, told.body
+        list_ = b"\x93NUMPY\x01\x00\x3c\x00" + b"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 3)}".ljust(59) + b"\n"
+        plain = d.ask(f"/v1/datasets/{NAME}/rays?station=0&frame=world&maps=off&format=raw", "POST",
+                      list_ + struct.pack("<3f", -1, 0, 0), {"Content-Type": "application/x-npy"})
+        assert plain.status == 200 and abs(struct.unpack("<f", plain.body)[0] - 2) < 0.02, plain.body
+        drawn = d.ask(f"{VIEW}?station=0&target=0,0,1&width=64&height=48&format=png").body
+    with tempfile.TemporaryDirectory() as folder:
+        out = pathlib.Path(folder, "out.png")
+
+        def render(*more):
+            return subprocess.run([REAL, "render", MAPPED, "--size", "64x48", "-o", out, *more], capture_output=True, text=True,
+                                  timeout=120)
+        assert render("--station", "0", "--target", "0,0,1").returncode == 0 and out.read_bytes() == drawn
+        for more, word in ((("--station", "1"), "has 0 to 0"), (("--station", "-1"), "--station"), (("--station", "1.5"), "--station"),
+                           (("--station", "0", "--eye", "1,2,3"), "exclude")):
+            done = render(*more)
+            assert done.returncode == 2 and word in done.stderr, done
+
+
 def write_wall(path):
     """A PTX of one station 3 m before a wall of waves, to the side of which nothing came back."""
     lines = ["120", "90", "0 0 0", "1 0 0", "0 1 0", "0 0 1", "1 0 0 0", "0 1 0 0", "0 0 1 0", "0 0 0 1"]
@@ -168,7 +242,10 @@ def test_maps_go_with_primitives():
                        capture_output=True, timeout=120)
         look = "eye=0,0.4,0&target=3,0.4,0&up=0,0,1&fov=60&width=64&height=48&format=raw"
         with Daemon(REAL, datasets=[packed]) as d:
-            assert d.ask("/v1/datasets/flat").json()["maps"]["stations"] == 1
+            about = d.ask("/v1/datasets/flat").json()
+            assert about["maps"]["stations"] == 1 and about["stations"]["from"] == "scan", about
+            [station] = d.ask(about["stations"]["uri"]).json()["stations"]
+            assert station["world"] == [0, 0, 0] and station["forward"] == [1, 0, 0], station
             seen = {}
             for primitives in "all", "off":
                 for method in "splat", "nearest":

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import REAL, VIEW, WALL, Daemon, eventually, run
+from harness import FAKE, MAPPED, REAL, VIEW, WALL, Daemon, eventually, run
 
 if os.environ["SPLATD_PROJ"] != "1":
     print("skipped: built without PROJ")
@@ -19,6 +19,7 @@ if os.environ["SPLATD_PROJ"] != "1":
 DATASET = VIEW.replace("/view", "")
 FOOT = 1200 / 3937
 SMALL = "width=64&height=48"
+STATIONS = f"/v1/datasets/{pathlib.Path(MAPPED).stem}/stations"
 
 
 def conic(longitude, latitude):
@@ -150,6 +151,15 @@ def test_bounds_and_the_default_view():
         used = camera_of(d.ask(f"{VIEW}?{SMALL}&crs=EPSG:4326&eye={text(view['eye'])}&target={text(view['target'])}"))
         assert view["crs"] == "EPSG:4326" and math.dist(used["eye"], world["default_view"]["eye"]) < 1e-6
         assert "crs" in d.ask("/v1/datasets").json()["datasets"][0]
+
+
+def test_stations_in_another_system():
+    with Daemon(FAKE, datasets=[MAPPED]) as d:
+        told = d.ask(f"{STATIONS}?crs=EPSG:4326").json()
+        [station] = told["stations"]
+        assert told["crs"] == "EPSG:4326" and station["world"] == [2, 0, 1], told
+        assert math.dist(conic(*station["position"][:2]), station["world"][:2]) < 1e-4, station
+        refused(d.ask(f"{STATIONS}?crs=EPSG:999999"), 400, "crs", "EPSG:999999")
 
 
 def test_what_is_wrong_is_said():
@@ -292,11 +302,13 @@ def test_the_commands_do_the_same():
 
 
 def test_looking_up_ends_with_the_deadline():
-    with Daemon(REAL, "--deadline", "1") as d, concurrent.futures.ThreadPoolExecutor(24) as many:
+    with Daemon(REAL, "--deadline", "1", datasets=[WALL, MAPPED]) as d, concurrent.futures.ThreadPoolExecutor(24) as many:
         asked = [f"{DATASET}{'/place' if i % 2 else ''}?crs=EPSG:{32601 + i}{'&world=1,2,3' if i % 2 else ''}" for i in range(48)]
         replies = list(many.map(d.ask, asked))
         statuses = [reply.status for reply in replies]
         assert set(statuses) <= {200, 400, 503} and 503 in statuses[::2] and 503 in statuses[1::2], statuses
+        listed = [reply.status for reply in many.map(d.ask, [f"{STATIONS}?crs=EPSG:{32701 + i}" for i in range(24)])]
+        assert set(listed) <= {200, 400, 503} and 503 in listed, listed
         tiles = [reply.status for reply in many.map(d.ask, 8 * [f"{DATASET}/tiles.json"])]
         assert set(tiles) <= {200, 503} and 503 in tiles, tiles
         assert d.ask(f"{DATASET}").status == 200
@@ -304,10 +316,11 @@ def test_looking_up_ends_with_the_deadline():
 
 
 def test_without_the_list_of_systems():
-    with tempfile.TemporaryDirectory() as folder, Daemon(REAL, PROJ_DATA=folder, PROJ_LIB=folder) as d:
+    with tempfile.TemporaryDirectory() as folder, Daemon(REAL, datasets=[WALL, MAPPED], PROJ_DATA=folder, PROJ_LIB=folder) as d:
         json_type = {"Content-Type": "application/json"}
         refused(place(d, crs="EPSG:4326", world="1,2,3"), 501, "crs", "proj-data")
         refused(d.ask(f"{DATASET}?crs=EPSG:4326"), 501, "crs")
+        refused(d.ask(f"{STATIONS}?crs=EPSG:4326"), 501, "crs")
         refused(d.ask(f"{VIEW}?crs=EPSG:4326"), 501, "crs")
         refused(d.ask(VIEW, "POST", '{"crs": "EPSG:4326"}', json_type), 501, "crs")
         refused(d.ask(f"{DATASET}/pick?x=1&y=1&crs=EPSG:4326"), 501, "crs")

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "dataset/map.h"
 #include "dataset/panels.h"
+#include "geom/station.h"
 #include "geom/unit.h"
 #include "pack/maps/pictures.h"
 #include "pack/maps/sight.h"
@@ -64,25 +65,6 @@ static int add(struct spl_stations *stations, size_t *capacity, const double pos
     return SPL_OK;
 }
 
-/* The nearest rotation to three axes that are about orthonormal: rows of a matrix in text have six digits at times. */
-static bool straighten(double r[9])
-{
-    for (int round = 0; round < 8; round++) { /* R (3 - R^T R) / 2 */
-        double gram[9], next[9];
-        for (int i = 0; i < 9; i++)
-            gram[i] = r[i / 3] * r[i % 3] + r[3 + i / 3] * r[3 + i % 3] + r[6 + i / 3] * r[6 + i % 3];
-        for (int i = 0; i < 9; i++) {
-            next[i] = 1.5 * r[i];
-            for (int k = 0; k < 3; k++)
-                next[i] -= 0.5 * r[i / 3 * 3 + k] * gram[3 * k + i % 3];
-        }
-        memcpy(r, next, sizeof next);
-    }
-    double det = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
-                 r[2] * (r[3] * r[7] - r[4] * r[6]);
-    return fabs(det - 1) < 1e-9;
-}
-
 /* META's stations, 4 x 4 by rows. One that is mirrored or bent keeps its place and stands upright. */
 static int take_scanned(struct spl_stations *stations, const json_t *list, struct spl_error *err)
 {
@@ -102,7 +84,7 @@ static int take_scanned(struct spl_stations *stations, const json_t *list, struc
         if (!finite)
             rc = spl_fail(err, SPL_E_INPUT, "station %zu has a pose that is no number", i + 1);
         else
-            rc = add(stations, &capacity, position, straighten(rotation) ? rotation : NULL, err);
+            rc = add(stations, &capacity, position, spl_rotation_straighten(rotation) ? rotation : NULL, err);
     }
     return rc;
 }
@@ -119,7 +101,7 @@ static bool find_axes(const struct spl_named_view *view, double rotation[9])
             for (int k = 0; k < 3; k++)
                 rotation[3 * j + i] += face[3 * i + k] * camera[3 * k + j];
         }
-    return straighten(rotation);
+    return spl_rotation_straighten(rotation);
 }
 
 static int take_eyes(struct spl_stations *stations, const struct spl_view_list *views, double metre,

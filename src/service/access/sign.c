@@ -114,7 +114,7 @@ static bool is_rest(const char *path, size_t length, const char *wanted)
 
 bool spl_sign_covers(const char *path, size_t length)
 {
-    static const char *const below[] = {"",         "/view",       "/pick",          "/place",
+    static const char *const below[] = {"",         "/view",       "/pick",          "/place", "/stations",
                                         "/profile", "/legend.svg", "/thumbnail.jpg", tile_json};
     size_t id = find_id(path, pages);
     if (id)
@@ -242,7 +242,7 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
     if (!spl_sign_covers(path, length) && !is_pyramid(path, length))
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick, "
-                        "/place, /profile, /legend.svg and /thumbnail.jpg, its tiles /tiles/{z}/{x}/{y}.png, and the "
+                        "/place, /stations, /profile, /legend.svg and /thumbnail.jpg, its tiles /tiles/{z}/{x}/{y}.png, and the "
                         "page /embed/ID; anything else needs a token",
                         url);
     if (page && path[length] == '?')

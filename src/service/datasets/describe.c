@@ -155,6 +155,15 @@ static json_t *describe_pruned(const struct spl_dataset *dataset)
     return json_is_integer(of) ? json_pack("{s:I}", "of", json_integer_value(of)) : json_null();
 }
 
+static json_t *describe_stations(const struct spl_catalog_entry *entry)
+{
+    const struct spl_dataset_info *info = entry->info;
+    if (!info->station_count)
+        return json_null();
+    return json_pack("{s:o, s:s, s:o}", "count", count(info->station_count), "from",
+                     info->stations_of_maps ? "panoramas" : "scan", "uri", json_sprintf("%s/stations", entry->uri));
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
@@ -192,6 +201,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "color", describe_color(entry->dataset));
     set(json, "textures", info->atoms ? describe_textures(info) : json_null());
     set(json, "maps", info->maps ? describe_maps(entry) : json_null());
+    set(json, "stations", describe_stations(entry));
     set(json, "primitives", info->panels || info->meshes || info->pieces ? describe_primitives(info) : json_null());
     json_t *formats = json_array();
     for (int i = 0; i < SPL_FORMAT_COUNT; i++)

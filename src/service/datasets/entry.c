@@ -33,6 +33,7 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))
         goto done;
+    entry->defaults.dataset = info;
     entry->defaults.fov = info->default_fov;
     entry->defaults.near = camera.near;
     entry->defaults.far = camera.far;

@@ -21,4 +21,7 @@ void spl_place_abandon(struct spl_place_wish *wish); /* its request no longer wa
 void spl_show_dataset(struct request *request, const struct spl_call *call);
 void spl_show_place(struct request *request, const struct spl_call *call);
 
+/* stations_route.c: /v1/datasets/{id}/stations. */
+void spl_show_stations(struct request *request, const struct spl_call *call);
+
 #endif

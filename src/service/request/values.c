@@ -39,6 +39,8 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                        : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background, clip, class and v"
                        : place == SPL_SAVED                 ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
                        : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
+                       : place == SPL_STATIONS              ? "a list of stations takes crs, first and count"
+                       : info->places == SPL_STATIONS       ? "it is a parameter of a list of stations"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
                        : info->places == SPL_LIST           ? "it is a parameter of rays"

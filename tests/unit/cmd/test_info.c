@@ -74,10 +74,14 @@ static void test_maps(void **state)
     assert_float_equal(json_real_value(json_object_get(maps, "bytes_per_texel")), (double)bytes / (double)texels, 1e-9);
     assert_true(number(only, "side") == 128 && number(only, "range_side") == 100 && number(only, "bytes") == bytes);
     assert_float_equal(json_real_value(json_array_get(json_object_get(only, "position"), 1)), 2, 0);
+    const json_t *station = json_array_get(json_object_get(json, "stations"), 0);
+    assert_true(number(station, "station") == 0 && json_array_size(json_object_get(json, "stations")) == 1);
+    assert_float_equal(json_real_value(json_array_get(json_object_get(station, "world"), 2)), 3, 0);
     double total = json_real_value(json_object_get(json_object_get(json, "bytes_per_splat"), "total"));
     long long resident = number(json, "page_bytes");
     json_decref(json);
     assert_non_null(strstr(tell("mapped.spld"), "\n  maps          1 station of side 128, 98,304 texels, "));
+    assert_non_null(strstr(tell("mapped.spld"), "\n  stations      --station 0 at 1 2 3, of panoramas\n"));
     char pages[64]; /* maps may stay where they are */
     snprintf(pages, sizeof pages, ", %.1f MB resident, %.1f MB with all maps\n", (double)(resident - bytes) / 1e6,
              (double)resident / 1e6);
@@ -87,7 +91,7 @@ static void test_maps(void **state)
     int rc = spl_dataset_rewrite(&(struct spl_rewrite){.from = plain}, place("plain.spld"), NULL);
     assert_int_equal(rc, 0);
     json = tell_json("plain.spld");
-    assert_true(json_is_null(json_object_get(json, "maps")));
+    assert_true(json_is_null(json_object_get(json, "maps")) && !json_array_size(json_object_get(json, "stations")));
     double stations = (double)sizeof(struct spl_chunk_stations) * (double)number(json, "chunks");
     assert_float_equal(json_real_value(json_object_get(json_object_get(json, "bytes_per_splat"), "total")) +
                            stations / (double)number(json, "splats"),
@@ -95,6 +99,7 @@ static void test_maps(void **state)
     assert_true(number(json, "page_bytes") == resident - bytes);
     json_decref(json);
     assert_null(strstr(tell("plain.spld"), "maps"));
+    assert_null(strstr(tell("plain.spld"), "--station"));
 }
 
 static void test_pruned(void **state)

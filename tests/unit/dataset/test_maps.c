@@ -64,6 +64,11 @@ static void same_maps(const struct spl_dataset *dataset, const struct make_maps 
         bytes += length;
     }
     assert_true(info->map_texels == texels && info->map_bytes == bytes);
+    assert_true(info->station_count == count && info->stations_of_maps); /* nobody else says where somebody stood */
+    for (uint32_t i = 0; i < count; i++)
+        for (int k = 0; k < 16; k++)
+            assert_true(info->stations[i][k] == (k == 15 ? 1 : k >= 12 ? 0 : k % 4 == 3 ? rows[i].position[k / 4]
+                                                                    : rows[i].rotation[k / 4 * 3 + k % 4]));
     if (spl_dataset_keeps_all(dataset))
         assert_memory_equal(spl_dataset_get_chunk_stations(dataset), maps->stations,
                             info->chunks * sizeof *maps->stations);

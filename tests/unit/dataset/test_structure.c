@@ -210,6 +210,19 @@ FORGE(up, json_array_set_new(json_object_get(json_object_get(p->meta, "default_v
 FORGE(flags, json_object_del(json_object_get(p->meta, "attributes"), "color"))
 FORGE(sources, json_object_set_new(p->meta, "sources", json_pack("[i]", 1)))
 FORGE(stations, json_object_set_new(p->meta, "stations", json_pack("[[i]]", 1)))
+/* An upright pose but for one number. */
+static void set_station(struct parts *p, size_t at, double number)
+{
+    json_t *pose = json_array();
+    for (size_t i = 0; i < 16; i++)
+        json_array_append_new(pose, json_real(i == at ? number : i % 5 == 0));
+    json_object_set_new(p->meta, "stations", json_pack("[o]", pose));
+}
+FORGE(station_right, set_station(p, 3, -1e15))
+FORGE(station_mirrored, set_station(p, 10, -1))
+FORGE(station_far, set_station(p, 7, 2e15))
+FORGE(station_columns, set_station(p, 12, 4))
+FORGE(station_scaled, set_station(p, 15, 0))
 static void set_color(struct parts *p, const char *from, int points)
 {
     json_object_set_new(p->meta, "color",
@@ -312,6 +325,11 @@ static const struct {
     {flags, "section META: \"attributes.color\" is missing, and must be true"},
     {sources, "section META: \"sources[0]\" is 1, and must be a name"},
     {stations, "section META: \"stations[0]\" is an array of 1, and must be a matrix"},
+    {station_right, NULL},
+    {station_mirrored, NULL},
+    {station_far, "section META: \"stations[0]\" is an array of 16, and must be numbers from -1e15 to 1e15"},
+    {station_columns, "\"stations[0]\" is an array of 16, and must be a pose by rows, whose last row is 0 0 0 1"},
+    {station_scaled, "and must be a pose by rows, whose last row is 0 0 0 1"},
     {color, NULL},
     {color_text, "section META: \"color\" is \"rgb\", and must be an array"},
     {color_few, "section META: \"color[0].points\" is -1, and must be"},
