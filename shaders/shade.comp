@@ -5,7 +5,8 @@
  * Eye-dome lighting looks at four pairs of samples, map_sides away on either side. Inverse depth is linear along a
  * plane, so the mean of a pair's is the sample's own on any plane, however slanted; where it is more, the sample lies
  * deeper than what is around it. Along parallel rays depth itself is linear, and differences of depth are a share of how
- * far off a pinhole would see pixels as large. Products, sums and quotients alone, continuous in depth: drivers differ by a rounding.
+ * far off a pinhole would see pixels as large. What a surface's own splats may differ by, seen as slanted as the pair is, is
+ * no depth: they overlap in steps. Products, sums and quotients alone, continuous in depth: drivers differ by a rounding.
  * A sample outside the image, or one that holds nothing, says nothing, and its pair neither. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -64,12 +65,14 @@ float linear_at(ivec2 at)
 float edl_of(ivec2 at, float z)
 {
     int far = int(frame.map_sides), corner = int(0.7071068 * float(far) + 0.5);
-    float deeper = 0.0, far_off = depth_slack(z, 1.0);
+    float deeper = 0.0, far_off = depth_slack(z, 1.0), scale = ray_scale(z), across = frame.fx / float(far);
+    precise float rough = max(frame.map_pose[3], frame.map_pose[4] * scale) / (PARALLEL != 0u ? far_off : z);
     for (int i = 0; i < 4; i++) { /* of fixed length: it is unrolled */
         ivec2 step = i == 0 ? ivec2(far, 0) : i == 1 ? ivec2(corner, corner) : i == 2 ? ivec2(0, far) : ivec2(corner, -corner);
         float one = linear_at(at - step), other = linear_at(at + step);
         precise float nearer = 0.5 * (one + other) * z - 1.0, before = (z - 0.5 * (one + other)) / far_off;
-        float past = PARALLEL != 0u ? before : nearer;
+        precise float slant = 0.5 * abs(one - other) * (PARALLEL != 0u ? 1.0 : z) * across;
+        precise float past = (PARALLEL != 0u ? before : nearer) - rough * (1.0 + slant);
         deeper += one > 0.0 && other > 0.0 ? max(past, 0.0) : 0.0;
     }
     precise float scaled = SPL_SHADE_DEPTH * deeper;

@@ -298,6 +298,8 @@ struct spl_draw_chunk {
 /* Eye-dome lighting: half of what can be lost is where the sum over four pairs of samples of how much deeper than their
  * mean it lies, as a share of its depth, is one over this. */
 #define SPL_SHADE_DEPTH 60.0f
+/* Of a splat's radius: steps of depth where splats of one surface overlap, across it. */
+#define SPL_SHADE_ROUGH 0.25f
 
 /* What colours show (src/render/paint.h): where a value comes from, and that it is multiplied with a splat's own colour.
  * The palette is words: SPL_PALETTE_COLORS colours, r | g << 8 | b << 16, that of splats without a value, and what finds
@@ -420,7 +422,8 @@ struct spl_frame_params {
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
     SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide; shade:
-                                             strength; map_sides: samples that are looked away; map_pose: the sun */
+                                             strength; map_sides: samples that are looked away; map_pose: the sun, steps that
+                                             surfaces have: in units, and of a sample's size */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
 };

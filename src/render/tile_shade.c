@@ -32,6 +32,14 @@ static void see_sun(const struct spl_tile *tile, float out[3])
     }
 }
 
+/* The steps in which splats overlap: of the finest, in units; of coarser ones, which are as large as lod samples, as a share
+ * of the distance, or in units along parallel rays. */
+static void see_splats(const struct spl_tile *tile, float out[2])
+{
+    out[0] = SPL_SHADE_ROUGH * (float)spl_dataset_get_info(tile->resident->dataset)->splat_radius;
+    out[1] = SPL_SHADE_ROUGH * (float)(tile->view->lod / (tile->view->camera.fx * tile->params.supersample));
+}
+
 static int dispatch(struct spl_tile *tile, uint32_t kinds, bool lit, struct spl_error *err)
 {
     const struct spl_method_row *method = spl_method_row(tile->view->method);
@@ -51,6 +59,7 @@ static int dispatch(struct spl_tile *tile, uint32_t kinds, bool lit, struct spl_
     params.map_near = (float)view->shade.strength;
     params.map_sides = view->shade.radius * side;
     see_sun(tile, params.map_pose);
+    see_splats(tile, params.map_pose + 3);
     const struct spl_kernel_key key = {"shade", !method->sums, {method->resolve, kinds, lit}};
     return spl_tile_dispatch_items(tile, &key, &params, params.entries, err);
 }

@@ -32,24 +32,27 @@ static void make_parallel(struct spl_view *view, double height)
     assert_int_equal(spl_camera_set_orthographic(camera, height, camera->width, camera->height, NULL), SPL_OK);
 }
 
-/* What shade.comp is to say, from depths. */
-static double edl(const struct spl_frame *frame, const struct spl_view *view, int x, int y)
+/* What shade.comp is to say, from depths; the scan's splats have this radius, at lod 0. */
+static double edl(const struct spl_frame *frame, const struct spl_view *view, double radius, int x, int y)
 {
     const int width = (int)view->camera.width, height = (int)view->camera.height;
     const int r = (int)view->shade.radius, c = (int)(0.7071068 * r + 0.5);
     const int steps[4][2] = {{r, 0}, {c, c}, {0, r}, {c, -c}};
     const bool parallel = view->camera.projection == SPL_ORTHOGRAPHIC;
     const double z = depth_at(frame, (size_t)(y * width + x)), far_off = (double)SPL_PARALLEL_FOCAL / view->camera.fx;
+    const double rough = SPL_SHADE_ROUGH * radius / (parallel ? far_off : z);
     double deeper = 0;
     for (int i = 0; i < 4; i++) {
         const int at[2][2] = {{x - steps[i][0], y - steps[i][1]}, {x + steps[i][0], y + steps[i][1]}};
-        double sum = 0;
+        double sum = 0, slant = 0;
         for (int k = 0; k < 2; k++) {
             const bool inside = at[k][0] >= 0 && at[k][1] >= 0 && at[k][0] < width && at[k][1] < height;
             const double there = inside ? depth_at(frame, (size_t)(at[k][1] * width + at[k][0])) : NAN;
             sum += parallel ? there : 1 / there;
+            slant += (k ? -1 : 1) * (parallel ? there : z / there);
         }
-        deeper += fmax(parallel ? (z - sum / 2) / far_off : sum / 2 * z - 1, 0); /* of NaN it is 0 */
+        slant = fabs(slant) / 2 * view->camera.fx / r;
+        deeper += fmax((parallel ? (z - sum / 2) / far_off : sum / 2 * z - 1) - rough * (1 + slant), 0); /* of NaN it is 0 */
     }
     return 1 - view->shade.strength * (SPL_SHADE_DEPTH * deeper / (1 + SPL_SHADE_DEPTH * deeper));
 }
@@ -101,7 +104,7 @@ static void compare_shading(struct spl_dataset *dataset, struct spl_view view)
                     continue;
                 }
                 double kept = light(&plain, &view, x, y);
-                kept *= view.shade.kinds & SPL_SHADE_EDL ? edl(&plain, &view, x, y) : 1;
+                kept *= view.shade.kinds & SPL_SHADE_EDL ? edl(&plain, &view, spl_dataset_get_info(dataset)->splat_radius, x, y) : 1;
                 darker += kept < 0.8;
                 for (int c = 0; c < 3; c++)
                     differ += fabs(color_at(&plain, at)[c] * kept - color_at(&shaded, at)[c]) > 0.5 + cases[i].levels;
