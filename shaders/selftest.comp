@@ -80,6 +80,11 @@ void put_frame()
         put(frame.map_pose[i]);
     put(frame.map_near), put(frame.map_slack);
     put(frame.map_sides);
+    for (int i = 0; i < 12; i++)
+        put(frame.cut_rows[i]);
+    put(frame.cut_half[0]), put(frame.cut_half[1]), put(frame.cut_half[2]);
+    put(frame.cut_least), put(frame.cut_most);
+    put(frame.cut_flags);
 }
 
 void put_chunk(spl_draw_chunk c)

@@ -375,6 +375,9 @@ struct spl_draw_chunk {
  * the flags of a test. Kernels are made for planes and coordinates alone, and for all. */
 #define SPL_CUT_PLANES 1u
 #define SPL_CUT_BODIES 2u /* these too */
+/* Where it is one plane, axis or inside of a box, as of nearly all chunks that are cut, kernels are made for what it is
+ * (plus SPL_SHAPE_*), and it is among the frame's parameters (frame.cut_*). */
+#define SPL_CUT_ONE 4u
 
 /* Occlusion: the image in tiles of this many samples a side, of which a chunk that can be hidden covers at most so many
  * (the same 65535 rounds). */
@@ -426,6 +429,10 @@ struct spl_frame_params {
                                              surfaces have: in units, and of a sample's size */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
+    SPL_F32 cut_rows[12];                 /* of the one shape that cuts what is drawn (SPL_CUT_ONE), as its words have it */
+    SPL_F32 cut_half[3];
+    SPL_F32 cut_least, cut_most;
+    SPL_U32 cut_flags;                    /* SPL_SHAPE_*, and what joins its test: SPL_TEST_* */
 };
 
 /* Soft transparency: spheres as items in the order of their ids, which are sorted by depth and listed by the tiles of
@@ -510,7 +517,7 @@ _Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE 
                "the same of a panel");
 _Static_assert(2 * SPL_MESH_WINDOW * SPL_MESH_WINDOW * (1 << 2 * SPL_RELIEF_LEVEL_MAX) / SPL_MESH_LANES < 55000,
                "the same of a mesh, with some for what the rows of its triangles are short of");
-_Static_assert(sizeof(struct spl_frame_params) == 256, "spl_frame_params is 256 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 328, "spl_frame_params is 328 bytes on both sides");
 #endif
 
 #endif

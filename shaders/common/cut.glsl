@@ -1,6 +1,8 @@
 /* What shapes leave of discs, panels, meshes and lines, sample by sample, so that they end at a plane and not by their
  * radius beyond it. For chunks that a shape crosses, in a variant of its own (constant 5: SPL_CUT_*), so that others do
- * not pay for it. */
+ * not pay for it. One plane, axis or box is among the parameters of the frame: software drivers read texels for each
+ * sample, all of them together twice as long as a sample takes; and the rounds of the loop over shapes count among those
+ * after which the loop over samples ends. */
 #ifndef SPL_CUT_GLSL
 #define SPL_CUT_GLSL
 
@@ -8,11 +10,35 @@
 
 layout(constant_id = 5) const uint CUT = 0;
 
+/* Is p in the one shape of the frame? By the arithmetic of distance_to() and is_within(); of a box, whose inside it is,
+ * the distance's sign alone. */
+bool is_within_one(vec3 p)
+{
+    precise vec3 q;
+    for (uint i = 0u; i < 3u; i++) /* of fixed length: it is unrolled */
+        q[i] = frame.cut_rows[4u * i] * p.x + frame.cut_rows[4u * i + 1u] * p.y + frame.cut_rows[4u * i + 2u] * p.z +
+               frame.cut_rows[4u * i + 3u];
+    precise vec3 beyond = abs(q) - vec3(frame.cut_half[0], frame.cut_half[1], frame.cut_half[2]);
+    precise float axis = sqrt(q.x * q.x + q.y * q.y);
+    float box = max(max(beyond.x, beyond.y), beyond.z);
+    float distance = CUT == SPL_CUT_ONE + SPL_SHAPE_AXIS ? axis : CUT == SPL_CUT_ONE + SPL_SHAPE_PLANE ? q.z : box;
+    bool with_least = (frame.cut_flags & SPL_SHAPE_WITH_LEAST) != 0u;
+    bool with_most = (frame.cut_flags & SPL_SHAPE_WITH_MOST) != 0u;
+    bool above = distance > frame.cut_least || (with_least && distance == frame.cut_least);
+    bool below = distance < frame.cut_most || (with_most && distance == frame.cut_most);
+    return above && below;
+}
+
 /* Is what lies at p, view space, drawn? `known`: conditions that hold by the splat's attributes, as its mark has them. */
 bool is_kept(vec3 p, uint known)
 {
     if (CUT == 0u)
         return true;
+    if (CUT >= SPL_CUT_ONE) {
+        uint bit = frame.cut_flags >> SPL_TEST_BIT & 15u;
+        bool outside = (frame.cut_flags & SPL_TEST_OUTSIDE) != 0u;
+        return is_within_one(p) != outside || (known << 1u >> bit & (bit != 0u ? 1u : 0u)) != 0u;
+    }
     bool bodies = (CUT & SPL_CUT_BODIES) != 0u;
     uint at = frame.fill_from, count = test_word(at);
     term_fold f = begin_fold();

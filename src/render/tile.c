@@ -1,5 +1,6 @@
 /* Recording the dispatches of one tile: parameters, bindings, timestamps. Much work runs a part at a time, so that a
  * slow device is not taken for a lost one, whatever is drawn, and a frame that nobody waits for ends. */
+#include <float.h>
 #include <string.h>
 
 #include "base/clock.h"
@@ -9,10 +10,52 @@
 #include "render/soft/of.h"
 #include "render/soft/pass.h"
 
-static uint32_t ends_of(const struct spl_draw_key *key)
+/* The words of the one shape that cuts chunks, and the flags of its test; NULL where there are several. */
+static const uint32_t *one_shape(const struct spl_draw_list *list, const struct spl_draw_cut *cut, uint32_t *flags)
+{
+    const uint32_t *words = list->tests + cut->word;
+    *flags = words[2];
+    return words[0] == 1 ? list->tests + words[1] : NULL;
+}
+
+/* As what cuts them chunks are drawn: a box by its sides' signs, which say whether what is asked for is its inside. */
+static enum spl_cut_by cut_by(const struct spl_draw_list *list, uint32_t cut)
+{
+    uint32_t flags;
+    const uint32_t *shape = cut ? one_shape(list, spl_draw_list_find_cut(list, cut), &flags) : NULL;
+    if (!shape)
+        return cut ? SPL_CUT_BY_SHAPES : SPL_CUT_BY_NONE;
+    float ends[2];
+    memcpy(ends, shape + 15, sizeof ends);
+    switch (shape[19] & 3) {
+    case SPL_SHAPE_AXIS:
+        return SPL_CUT_BY_AXIS;
+    case SPL_SHAPE_PLANE:
+        return SPL_CUT_BY_PLANE;
+    case SPL_SHAPE_BOX:
+        return ends[0] == -FLT_MAX && ends[1] == 0 ? SPL_CUT_BY_BOX : SPL_CUT_BY_SHAPES;
+    default:
+        return SPL_CUT_BY_SHAPES;
+    }
+}
+
+static uint32_t ends_of(const struct spl_draw_list *list, const struct spl_draw_key *key)
 {
     return (key->apart ? SPL_ENDS_CLIPPED : 0) | (key->trims ? SPL_ENDS_TRIMMED : 0) |
-           (key->marked ? SPL_ENDS_MARKED : 0) | (key->cut ? SPL_ENDS_CUT : 0);
+           (key->marked ? SPL_ENDS_MARKED : 0) | (uint32_t)cut_by(list, key->cut) << SPL_ENDS_CUT;
+}
+
+/* The constant of kernels with `ends` that says what cuts. */
+static uint32_t cut_constant(const struct spl_draw_list *list, uint32_t ends)
+{
+    switch (ends >> SPL_ENDS_CUT) {
+    case SPL_CUT_BY_NONE:
+        return 0;
+    case SPL_CUT_BY_SHAPES:
+        return list->cut_kinds;
+    default:
+        return SPL_CUT_ONE + SPL_SHAPE_AXIS + (ends >> SPL_ENDS_CUT) - SPL_CUT_BY_AXIS;
+    }
 }
 
 /* Is a batch what is asked for? */
@@ -27,17 +70,17 @@ int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, 
 {
     enum { clipped_constant = 2 };
     struct spl_renderer *r = tile->renderer;
-    uint32_t needed = 1;
+    uint64_t needed = 1;
     int rc = SPL_OK;
     for (size_t i = 0; i < r->list.batch_count; i++)
         if (r->list.batches[i].key.role == SPL_ROLE_SOLID)
-            needed |= 1u << ends_of(&r->list.batches[i].key);
+            needed |= UINT64_C(1) << ends_of(&r->list, &r->list.batches[i].key);
     *out = (struct spl_disc_kernels){.lanes = r->shares ? SPL_WORKGROUP : 0};
     key.shared = r->shares;
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
         key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
-        key.constants[SPL_CONSTANT_CUT] = ends & SPL_ENDS_CUT ? r->list.cut_kinds : 0;
+        key.constants[SPL_CONSTANT_CUT] = cut_constant(&r->list, ends);
         key.trims = ends & SPL_ENDS_TRIMMED;
         if (needed >> ends & 1)
             rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
@@ -49,15 +92,15 @@ int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key,
                                struct spl_disc_kernels *out, struct spl_error *err)
 {
     struct spl_renderer *r = tile->renderer;
-    uint32_t needed = 0;
+    uint64_t needed = 0;
     int rc = SPL_OK;
     for (size_t i = 0; i < r->list.batch_count; i++)
         if (is_of(what, &r->list.batches[i].key))
-            needed |= 1u << (ends_of(&r->list.batches[i].key) & ~(uint32_t)SPL_ENDS_CLIPPED);
+            needed |= UINT64_C(1) << (ends_of(&r->list, &r->list.batches[i].key) & ~(uint32_t)SPL_ENDS_CLIPPED);
     *out = (struct spl_disc_kernels){0};
     for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
         key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
-        key.constants[SPL_CONSTANT_CUT] = ends & SPL_ENDS_CUT ? r->list.cut_kinds : 0;
+        key.constants[SPL_CONSTANT_CUT] = cut_constant(&r->list, ends);
         key.trims = ends & SPL_ENDS_TRIMMED;
         if (needed >> ends & 1)
             rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
@@ -71,9 +114,24 @@ static struct spl_gpu_kernel *kernel_of(const struct spl_disc_kernels *kernels, 
     if (!kernels->of[ends])
         ends &= ~(uint32_t)SPL_ENDS_CLIPPED;
     if (!kernels->of[ends])
-        ends &= SPL_ENDS_MARKED | SPL_ENDS_CUT;
+        ends &= ~(uint32_t)(SPL_ENDS_CLIPPED | SPL_ENDS_TRIMMED);
     spl_assert(kernels->of[ends]);
     return kernels->of[ends];
+}
+
+/* What cuts chunks: where it is among the tests; of one shape what it is. */
+static void put_cut(const struct spl_draw_list *list, uint32_t cut, struct spl_frame_params *params)
+{
+    const struct spl_draw_cut *found = spl_draw_list_find_cut(list, cut);
+    const uint32_t *shape = one_shape(list, found, &params->cut_flags);
+    params->fill_from = found->word;
+    if (!shape)
+        return;
+    memcpy(params->cut_rows, shape, sizeof params->cut_rows);
+    memcpy(params->cut_half, shape + 12, sizeof params->cut_half);
+    memcpy(&params->cut_least, shape + 15, sizeof params->cut_least);
+    memcpy(&params->cut_most, shape + 16, sizeof params->cut_most);
+    params->cut_flags |= shape[19];
 }
 
 static int too_many(struct spl_error *err)
@@ -181,7 +239,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             spl_tile_set_map(tile, batch->key.trims - 1u);
             bindings[SPL_RESOURCE_MAP].buffer = tile->map;
         }
-        struct spl_gpu_kernel *kernel = kernel_of(kernels, ends_of(&batch->key));
+        struct spl_gpu_kernel *kernel = kernel_of(kernels, ends_of(list, &batch->key));
         uint32_t round = batch->first_round;
         rc = spl_tile_add_work(tile, batch->work, err);
         for (uint32_t done = 0; done < batch->entries && !rc; done += batch->round_entries) {
@@ -189,7 +247,7 @@ int spl_tile_dispatch_splats(struct spl_tile *tile, const struct spl_disc_kernel
             struct spl_frame_params params = tile->params;
             params.first_entry = batch->first_entry + done;
             if (batch->key.cut)
-                params.fill_from = spl_draw_list_find_cut(list, batch->key.cut)->word;
+                put_cut(list, batch->key.cut, &params);
             params.entries = left < batch->round_entries ? left : batch->round_entries;
             bindings[SPL_RESOURCE_FRAME] = put_params(tile, round++, &params);
             uint64_t sums = what->sum ? spl_tile_get_sum_work(tile, what->planes, params.entries) : 0;

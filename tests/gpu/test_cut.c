@@ -50,6 +50,7 @@ static const char *const shapes[] = {
     "polygon:%X-5,%Y-4,%X+5,%Y-3,%X+1,%Y,%X+4,%Y+5@%Z-4..%Z+2.5",
     "axis:%X,%Y,%Z,1,0.3,0.2<0.3",
     "plane:%X,%Y,%Z,1,-0.4,0.5>0 and plane:%X,%Y,%Z+1,0.3,0.2,1<=0",
+    "box:%X-3,%Y-2,%Z-3,%X+2,%Y+2,%Z+3<0.1",
 };
 
 static void same_by_both(const struct spl_dataset *dataset, struct spl_view *view, const char *what)
@@ -200,6 +201,50 @@ static void cuts_are_exact(void **state)
         fail_msg("%zu of %zu samples are off", off, within);
 }
 
+/* A loop of a software driver's kernel ends after 65535 rounds, those of loops within it counted: of as many large discs as
+ * an invocation draws, the last and nearest is whole, whatever asks its samples. */
+static void large_discs_are_whole(void **state)
+{
+    enum { discs = SPL_RUN_SPLATS, side = 2 * SPL_WINDOW };
+    static const char *const around[] = {
+        "z<%Z+100",
+        "axis:%X,%Y,%Z,0,1,0<10",
+        "box:%X-100,%Y-100,%Z-100,%X+100,%Y+100,%Z+100",
+        "box:%X-100,%Y-100,%Z-100,%X+100,%Y+100,%Z+100,30",
+    };
+    (void)state;
+    struct make_splat *splats = random_splats(discs + 1, origin, 3);
+    struct spl_view view = looking(origin, 3.2, side, side);
+    for (int i = 0; i < discs; i++)
+        for (int a = 0; a < 3; a++) { /* facing the eye, each nearer than the one before */
+            splats[i].position[a] = origin[a] - 0.01 * i * view.camera.rotation[6 + a];
+            splats[i].normal[a] = (float)-view.camera.rotation[6 + a];
+        }
+    memcpy(splats[discs].position, origin, sizeof origin);
+    splats[discs].position[2] += 30; /* what shapes leave out */
+    struct spl_dataset *dataset = make_dataset(splats, discs + 1);
+    free(splats);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    view.lod = 0;
+    view.layers = 1u << SPL_LAYER_DEPTH;
+    for (size_t method = 0; method < 2; method++) {
+        view.method = method ? SPL_METHOD_SPLAT : SPL_METHOD_NEAREST;
+        view.clip = (struct spl_terms){0};
+        struct spl_frame plain = render(dataset, &view);
+        for (size_t i = method; i < sizeof around / sizeof *around; i += 2) {
+            view.clip = terms_of("clip", around[i]);
+            struct spl_frame cut = render(dataset, &view);
+            const float *whole = plain.images[SPL_LAYER_DEPTH].pixels, *left = cut.images[SPL_LAYER_DEPTH].pixels;
+            for (size_t p = 0; p < (size_t)side * side; p++)
+                if (!(left[p] == whole[p]) || !isfinite(whole[p]))
+                    fail_msg("%s, method %s: pixel %zu, %zu", around[i], spl_method_name(view.method), p % side, p / side);
+            spl_frame_finish(&cut);
+        }
+        spl_frame_finish(&plain);
+    }
+    done(dataset);
+}
+
 /* What is not drawn is not drawn as soft, either; a clip that holds everywhere changes no byte. */
 static void soft_spheres_are_dropped(void **state)
 {
@@ -238,6 +283,7 @@ int main(int argc, char **argv)
         frames_test(panels_and_meshes_are_cut),
         frames_test(lines_are_cut),
         frames_test(cuts_are_exact),
+        frames_test(large_discs_are_whole),
         frames_test(soft_spheres_are_dropped),
     };
     return frames_run(argc, argv, "cut", tests, sizeof tests / sizeof *tests);
