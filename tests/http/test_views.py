@@ -11,7 +11,7 @@ import tempfile
 import time
 
 import openapi
-from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, run
+from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, npy, run
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/json"}
@@ -177,6 +177,13 @@ def test_a_saved_view_keeps_what_it_shows():
             pick = "/v1/datasets/wall/pick?x=32&y=16&width=64&height=48&view="
             assert d.ask(pick + "plain", headers=AUTH).json()["position"][2] > 1.2
             assert d.ask(pick + "door", headers=AUTH).json()["position"] is None
+            rays = [d.ask("/v1/datasets/wall/rays" + where, "POST", body, {**AUTH, "Content-Type": kind}) for where, body, kind in (
+                ("", '{"view": "door", "directions": [[0, 0, 1], [0, 0.5, 1]], "format": "json"}', "application/json"),
+                ("?view=door&format=json", npy([(0, 0, 1), (0, 0.5, 1)]), "application/x-npy"),
+                ("?view=plain&format=json", npy([(0, 0, 1)]), "application/x-npy"))]
+            assert rays[0].body == rays[1].body and camera(rays[0])["eye"] == DOOR["eye"] == camera(rays[2])["eye"]
+            assert json.loads(rays[1].headers["Splatd-Clip"]) == json.loads(named.headers["Splatd-Clip"])
+            assert rays[0].json()[0] and rays[2].headers["Splatd-Clip"] is None
             if os.environ["SPLATD_PROJ"] == "1":  # they are of the world whatever crs says
                 eye = d.ask("/v1/datasets/wall/place?crs=EPSG:4326&world=3,0,1", headers=AUTH).json()["position"]
                 far = get(d, f"view=door&{size}&crs=EPSG:4326&eye={','.join(map(repr, eye))}")
