@@ -8,7 +8,6 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "geom/ray_list.h"
 #include "service/request/request.h"
 #include "service/request/values.h"
 
@@ -298,51 +297,6 @@ static void ogc_names_mean_the_same(void **state)
         query("POC=1,2,3&poi=4,5,6&UP=0,1,0&Fovy=50&BackgroundColor=0xFF8000&TransparentBackground=FALSE", &b, &err),
         0);
     assert_memory_equal(&a, &b, sizeof a);
-}
-
-static void rays_look_along_their_frame(void **state)
-{
-    (void)state;
-    static const struct {
-        const char *query;
-        double hit[3]; /* where the list's one direction goes in the world */
-    } rows[] = {
-        {"", {-0.8, 0, 0.6}}, /* an eye at x = 10 that looks along -x: its right is +y */
-        {"frame=sensor", {0, -0.6, 0.8}},
-        {"frame=world", {0.6, 0, 0.8}},
-    };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const double list[][3] = {{0, -3, 4}, {0, 3, 4}, {3, 0, 4}}; /* up and ahead; left and up; the world's */
-        struct spl_rays *rays;
-        struct spl_view_request r;
-        struct spl_error err = {0};
-        assert_int_equal(spl_rays_create(list[i], 1, &rays, NULL), 0);
-        assert_int_equal(spl_rays_request_from(NULL, rows[i].query, strlen(rows[i].query), rays, &defaults, &limits, &r, &err), 0);
-        for (int k = 0; k < 3; k++) {
-            const double *m = r.view.camera.rotation + k, *d = rays->directions[0];
-            assert_true(fabs(m[0] * d[0] + m[3] * d[1] + m[6] * d[2] - rows[i].hit[k]) < 1e-12);
-        }
-        assert_true(r.view.rays == rays && r.view.layers == 1u << SPL_LAYER_RANGE && r.encode.format == SPL_FORMAT_NPY);
-        static const char *const lenses[] = {"fov=50", "width=9", "projection=cube", "fx=100", "elevation=1,2,3"};
-        for (size_t k = 0; k < sizeof lenses / sizeof *lenses; k++) {
-            struct spl_error why = {0};
-            assert_int_equal(spl_rays_request_from(NULL, lenses[k], strlen(lenses[k]), rays, &defaults, &limits, &r, &why), SPL_E_INPUT);
-            assert_int_equal(strncmp(lenses[k], why.field, strlen(why.field)), 0);
-        }
-        spl_rays_destroy(rays);
-    }
-}
-
-static void a_tile_lies_among_others(void **state)
-{
-    (void)state;
-    const struct spl_tile_view tile = {.eye = {1, 2, 30}, .up = {0, 1}, .scale = {4, 4}, .side = 256, .format = SPL_FORMAT_PNG};
-    struct spl_view_request r;
-    struct spl_error err = {0};
-    assert_int_equal(spl_tile_request_from_query("shade=edl", 9, &tile, &defaults, &limits, &r, &err), 0);
-    assert_true(r.view.surrounded && r.view.camera.projection == SPL_ORTHOGRAPHIC && r.view.camera.width == 256);
-    assert_int_equal(query("shade=edl", &r, &err), 0);
-    assert_false(r.view.surrounded);
 }
 
 static void demands_arrive(void **state)
@@ -809,8 +763,6 @@ int main(void)
         cmocka_unit_test(bodies_are_refused_by_name),
         cmocka_unit_test(percent_decoding_is_exact),
         cmocka_unit_test(demands_arrive),
-        cmocka_unit_test(rays_look_along_their_frame),
-        cmocka_unit_test(a_tile_lies_among_others),
         cmocka_unit_test(a_side_that_is_left_out_follows),
         cmocka_unit_test(matrices_are_taken_as_rows),
         cmocka_unit_test(colours_have_names),                cmocka_unit_test(refusals_say_what_to_write),
