@@ -169,6 +169,7 @@ static void compare_shown(const struct spl_dataset *dataset, struct spl_view *vi
     struct spl_frame frame;
     size_t shown = 0, differ = 0;
     view->color = (struct spl_color_params){0};
+    view->shade.kinds = SPL_SHADE_NONE; /* colours as they are */
     assert_int_equal(spl_color_parse(text, &view->color, NULL), 0);
     if (range)
         assert_int_equal(spl_color_parse_range(range, &view->color, NULL), 0);
@@ -250,6 +251,7 @@ static void flat_is_flat(void **state)
             struct spl_view view = looking(origin, 3, 160, 120);
             view.method = (enum spl_method)method;
             view.background[3] = 0;
+            view.shade.kinds = SPL_SHADE_NONE;
             if (soft)
                 assert_int_equal(spl_soft_parse("class:*", &view.soft, NULL), 0);
             assert_int_equal(spl_color_parse("flat:20a0f0", &view.color, NULL), 0);
