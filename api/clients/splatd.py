@@ -89,7 +89,7 @@ class Tiles:
 
     def __init__(self, service, info):
         self.service, self.info = service, info
-        self.url = urllib.parse.urljoin(service.url + "/", info["tiles"][0])
+        self.url = service.locate(info["tiles"][0])
         self.corner, self.side = info["splatd"]["corner"], info["splatd"]["side"]
         self.is_mercator = info["splatd"]["scheme"] == "mercator"
 
@@ -294,7 +294,7 @@ class Dataset:
 
 class Splatd:
     def __init__(self, url="http://127.0.0.1:8080", token=None, timeout=60, patience=30):
-        """`patience`: seconds that a busy service is asked again, when it says when. A `url` may be a page that `splatd sign`
+        """A `url` may end in a path, https://HOST/scans, that a proxy takes off. `patience`: seconds that a busy service is asked again, when it says when. A `url` may be a page that `splatd sign`
         has signed, https://HOST/embed/ID?exp=…&sig=…: dataset() is then the one that it is good for."""
         parts = urllib.parse.urlsplit(url if "://" in url else f"http://{url}")
         page, signature = re.search(r"/embed/([^/]+)$", parts.path), re.fullmatch(r"(exp=\d+)&sig=([\w-]+)", parts.query)
@@ -313,7 +313,7 @@ class Splatd:
         until = time.monotonic() + self.patience
         while True:
             try:
-                request = urllib.request.Request(urllib.parse.urljoin(self.url + "/", path), body, headers, method=method)
+                request = urllib.request.Request(self.locate(path), body, headers, method=method)
                 with urllib.request.urlopen(request, timeout=self.timeout) as reply:
                     return reply.read(), reply.headers
             except urllib.error.HTTPError as error:
@@ -325,6 +325,10 @@ class Splatd:
                         problem = {"title": error.reason}
                     raise SplatdError(error.code, problem) from None
             time.sleep(wait)
+
+    def locate(self, path):
+        """The URL of a path as the service says it, which knows of no folder that a proxy has put it into."""
+        return path if re.match(r"\w+://", path) else f"{self.url}/{path.lstrip('/')}"
 
     def json(self, path):
         return json.loads(self.ask(path)[0])
@@ -361,6 +365,7 @@ def sign(url, key, seconds=3600):
     given = urllib.parse.quote(given, safe="!$%&()*+,-./:;=?@[\\]^_`{|}~")  # as browsers write it
     given += f"{'&' if given else ''}exp={int(time.time()) + int(seconds)}"
     path = re.sub(r"^[^:/?]+://[^/]*", "", base)
+    path = re.sub(r"^.*?(?=/(v1/datasets|embed)/)", "", path, count=1)  # a folder that a proxy takes off
     path = re.sub(r"(/v1/datasets/[^/]+/tiles)(/\{z\}/\{x\}/\{y\}(\{r\}|@2x)?\.(png|webp)|\.json)$", r"\1/", path)
     path = re.sub(r"^/embed/.*", lambda page: urllib.parse.unquote(page[0]), path)
     digest = hmac.digest(key.rstrip("\r\n").encode(), f"{path}?{given}".encode(), "sha256")

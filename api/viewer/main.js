@@ -1,6 +1,7 @@
 // The page: ties the parts of the panel to the stage, and opens what the fragment names.
 
 import {Annotations} from "./annotations.js";
+import {fromParams} from "./camera.js";
 import {Chart} from "./chart.js";
 import {Classes} from "./classes.js";
 import {Clip} from "./clip.js";
@@ -28,6 +29,8 @@ import {renderTours} from "./tour_render.js";
 import {Views} from "./views.js";
 
 const $ = (id) => document.getElementById(id);
+const CAMERA = ["eye", "target", "up", "fov", "projection", "view_height"];
+const cameraOf = (wanted) => Object.fromEntries(CAMERA.filter((name) => wanted[name]).map((name) => [name, wanted[name]]));
 
 const stage = new Stage($("stage"));
 const points = new Points(stage, $("marks"));
@@ -145,9 +148,7 @@ async function open() {
     document.title = `${dataset.title ?? id} – splatd`;
     stage.element.ariaLabel = `View of ${id}`;
     stage.report(null);
-    const camera = Object.fromEntries(
-      ["eye", "target", "up", "fov", "projection", "view_height"].filter((n) => wanted[n]).map((n) => [n, wanted[n]]),
-    );
+    const camera = cameraOf(wanted);
     opened = turn;
     stage.open(dataset, camera);
     stations.open(dataset, wanted.station);
@@ -216,7 +217,7 @@ views.addEventListener("choose", ({detail: view}) => {
   const wanted = view ? named(dataset, {view: view.name}, stage.size) : {};
   show({...parts.picture.read(), ...wanted});
   stage.set(readSettings());
-  stage.setCamera(view ? {eye: wanted.eye, target: wanted.target, up: wanted.up, fov: wanted.fov} : stage.home);
+  stage.setCamera(view ? fromParams(cameraOf(wanted), stage.home) : stage.home);
 });
 $("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
 attachSides(stage, $);

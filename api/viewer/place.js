@@ -35,12 +35,12 @@ async function clipToWorld(dataset, crs, {eye, target, clip}) {
   return JSON.parse(said).clip.join(" and ");
 }
 
-/** Camera and settings of the view that `wanted` names, in an image of this size; nothing where it names none. */
-export function named(dataset, {view: name}, size) {
+/** Camera, as a view's parameters, and settings of the view that `wanted` names, in an image of this size; nothing where it names none. */
+export function named(dataset, {view: name, fov: own}, size) {
   if (name === undefined) return {};
   const view = dataset.views.find((one) => one.name === name);
   if (!view) throw new Problem("gone", `${dataset.id} has no view '${name}'`);
-  const {eye, target, up, fov, settings} = view;
+  const {eye, target, up, fov, projection, view_height, settings} = view;
   const text = (value, joint) => [value].flat().join(joint);
   return {
     ...settings,
@@ -50,6 +50,6 @@ export function named(dataset, {view: name}, size) {
     eye,
     target,
     up,
-    fov: fitted([fov, fov], size),
+    ...(projection && own === undefined ? {projection, view_height} : {fov: fitted([fov, fov], size)}),
   };
 }

@@ -155,6 +155,11 @@ export class Stage extends EventTarget {
     return performance.now() < this.restAt;
   }
 
+  /** By how much the eye of an orthographic camera is farther away in what the service is asked for. */
+  get back() {
+    return 1000 * this.least;
+  }
+
   /** near and far of them, which count from the eye: that of an orthographic camera is asked for from elsewhere. */
   planes(setting, back) {
     const given = ["near", "far"].filter((name) => this.camera.flat && setting[name] !== undefined);
@@ -172,7 +177,7 @@ export class Stage extends EventTarget {
     let quality = {...setting, ...(full ? {} : coarse)};
     if (full && budget) quality = {budget, ...keptOf(setting)};
     else if (!full && coarse.budget) quality = {...kept, ...coarse};
-    const back = 1000 * this.least;
+    const {back} = this;
     return {
       ...params(rounded(this.camera), back),
       width: Math.max(1, Math.floor(width * ratio)),

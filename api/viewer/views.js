@@ -2,6 +2,7 @@
 // a name, where the service lets who asks.
 
 import {choose} from "./methods.js";
+import {params, rounded} from "./camera.js";
 import {choices} from "./picture.js";
 import {ask, askJson} from "./service.js";
 import {keptOf} from "./soft_setting.js";
@@ -46,7 +47,10 @@ export class Views extends EventTarget {
     const kept = Object.entries(shown)
       .filter(([, value]) => value !== "")
       .map(([key, value]) => [key, /^(soft_(opacity|cover|blend)|edl_.*)$/.test(key) ? number(value) : `${value}`]);
-    const body = {eye, target, up, fov: Math.min(FOV_MOST, this.across(fov)), ...(kept.length ? {settings: Object.fromEntries(kept)} : {})};
+    const pose = camera.flat // as the picture on screen is asked for
+      ? params(rounded(camera), this.stage.back)
+      : {eye, target, up, fov: Math.min(FOV_MOST, this.across(fov))};
+    const body = {...pose, ...(kept.length ? {settings: Object.fromEntries(kept)} : {})};
     await ask(`${dataset.uri}/views/${encodeURIComponent(name)}`, {
       method: "PUT",
       body: JSON.stringify(body),

@@ -22,7 +22,8 @@ enum {
 };
 
 struct spl_shade_params {
-    uint32_t kinds;  /* SPL_SHADE_*; 0 = EDL where the dataset has no colours of its own, else none */
+    uint32_t kinds;  /* SPL_SHADE_*; 0 = EDL where colours show no shape: of a dataset that has none of its own, or classes or
+                        one colour in their place; else none */
     double sun[2];   /* of SUN: azimuth, degrees clockwise from +y (north), and elevation, -90 to 90 */
     double strength; /* of EDL: the share of its light that the deepest gap loses */
     uint32_t radius; /* of EDL: pixels that are looked away, 1 to 5 */
@@ -37,9 +38,6 @@ SPL_API int spl_shade_print(const struct spl_shade_params *shade, char *text, si
 
 /* Are kinds, sun, strength and radius in range? SPL_E_USAGE names the field. */
 SPL_API int spl_shade_check(const struct spl_shade_params *shade, struct spl_error *err);
-
-/* The kinds that a view of the dataset is shaded by, without NONE: 0 = none. */
-SPL_API uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_dataset_info *dataset);
 
 /* What colours show. */
 enum spl_color_by {
@@ -83,6 +81,10 @@ SPL_API int spl_color_print(const struct spl_color_params *color, char *text, si
 
 /* Is all of it in range? SPL_E_USAGE names the field. */
 SPL_API int spl_color_check(const struct spl_color_params *color, struct spl_error *err);
+
+/* The kinds that a view of the dataset in these colours is shaded by, without NONE: 0 = none. */
+SPL_API uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
+                               const struct spl_dataset_info *dataset);
 
 SPL_END_DECLARATIONS
 

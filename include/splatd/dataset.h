@@ -66,6 +66,7 @@ struct spl_saved_view {
     double eye[3], target[3], up[3]; /* world */
     double fov; /* degrees, vertical; across where an image is narrower than high */
     char settings[SPL_VIEW_SETTINGS_BYTES]; /* what of the dataset it shows and how, as a JSON object; "" = all, as ever */
+    double view_height; /* of an orthographic view, in the dataset's unit; 0 = a pinhole's */
 };
 
 struct spl_dataset_info {

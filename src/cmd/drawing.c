@@ -262,6 +262,6 @@ void spl_cmd_print_colors(FILE *out, size_t column)
     print_changing(out, SPL_CHANGES_COLORS, column);
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
                           "for shape: none, edl (darker where what lies around is nearer), headlight, "
-                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, else none)");
+                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, or classes in their place, else none)");
     print_changing(out, SPL_CHANGES_SHADE, column);
 }

@@ -131,19 +131,20 @@ static int take_error(void *arguments, const char *option, char *text, struct sp
     return SPL_OK;
 }
 
-/* "eye=X,Y,Z,target=X,Y,Z,up=X,Y,Z,fov=DEG", in any order. */
+/* "eye=X,Y,Z,target=X,Y,Z,up=X,Y,Z,fov=DEG,view_height=UNITS", in any order. */
 static int parse_view(const char *option, char *text, struct spl_saved_view *view, struct spl_error *err)
 {
-    static const char *const names[] = {"eye", "target", "up", "fov"};
-    bool given[4] = {0};
+    static const char *const names[] = {"eye", "target", "up", "fov", "view_height"};
+    enum { count = sizeof names / sizeof *names };
+    bool given[count] = {0};
     for (char *at = text, *next; at && *at; at = next) {
         int key = 0;
         size_t length = strcspn(at, "=");
-        while (key < 4 && (strlen(names[key]) != length || strncmp(at, names[key], length)))
+        while (key < count && (strlen(names[key]) != length || strncmp(at, names[key], length)))
             key++;
-        if (key == 4 || at[length] != '=' || given[key])
+        if (key == count || at[length] != '=' || given[key])
             return spl_fail_field(err, SPL_E_USAGE, option + 2,
-                                  "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z and fov=DEG, each once, not '%.60s'",
+                                  "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z, fov=DEG and view_height=UNITS, each once, not '%.60s'",
                                   option, at);
         given[key] = true;
         char *value = at + length + 1;
@@ -152,8 +153,9 @@ static int parse_view(const char *option, char *text, struct spl_saved_view *vie
         if (*next)
             *next++ = 0;
         double *out[] = {view->eye, view->target, view->up};
-        int rc = key < 3 ? spl_cmd_parse_vector(option, value, out[key], err)
-                         : spl_cmd_parse_real(option, value, 1e-6, 179, &view->fov, err);
+        int rc = key < 3    ? spl_cmd_parse_vector(option, value, out[key], err)
+                 : key == 3 ? spl_cmd_parse_real(option, value, 1e-6, 179, &view->fov, err)
+                            : spl_cmd_parse_real(option, value, 1e-9, 1e12, &view->view_height, err);
         if (rc)
             return rc;
     }
@@ -215,7 +217,7 @@ static const struct spl_cmd_option options[] = {
      "eye=X,Y,Z,target=X,Y,Z[,up=X,Y,Z][,fov=DEG]: what is shown where nobody says a camera; fov is vertical, of images "
      "narrower than high across",
      .otherwise = "one that shows all of it, or a room from inside", .take = take_default_view},
-    {"view", "NAME=VIEW", "the same under a name, for view=NAME; up to 64 times", .take = take_view},
+    {"view", "NAME=VIEW", "the same under a name, for view=NAME; up to 64 times; view_height=UNITS: orthographic, so high", .take = take_view},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",

@@ -351,6 +351,11 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     rc = rc ? rc : start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
+    if (from.view_height > 0 && !a->rays && isnan(a->fov) && isnan(a->fx) && isnan(a->view_height) && isnan(a->units_per_pixel) &&
+        (a->projection < 0 || a->projection == SPL_ORTHOGRAPHIC)) { /* as over HTTP */
+        a->projection = SPL_ORTHOGRAPHIC;
+        a->view_height = from.view_height;
+    }
     if (a->rays || a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel) || a->station != UINT64_MAX) {
         const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
         const double *fit = info->default_fit;

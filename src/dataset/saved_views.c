@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const double coordinate_most = 1e12; /* of a camera */
+static const double height_least = 1e-9, height_most = 1e12; /* as of orthographic cameras */
 
 bool spl_view_name_is_valid(const char *name)
 {
@@ -30,6 +31,9 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
                                       names[v], vectors[v][c]);
     if (!(view->fov > 0 && view->fov <= 179))
         return spl_fail_field(err, SPL_E_INPUT, "fov", "fov %g is outside 0 to 179 degrees", view->fov);
+    if (view->view_height != 0 && !(view->view_height >= height_least && view->view_height <= height_most))
+        return spl_fail_field(err, SPL_E_INPUT, "view_height", "view_height %g is outside %g to %g", view->view_height,
+                              height_least, height_most);
     if (view->settings[0]) { // a library's caller may say anything
         json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, 0, NULL) : NULL;
         const bool good = json_is_object(settings);
@@ -73,6 +77,24 @@ static int get_settings(const json_t *json, struct spl_saved_view *view, struct 
                           SPL_VIEW_SETTINGS_BYTES - 1);
 }
 
+/* Parallel rays where it or a height is said; left out, it is as high as the pinhole's image is where it looks. */
+static int get_height(const json_t *json, struct spl_saved_view *view, struct spl_error *err)
+{
+    const json_t *projection = json_object_get(json, "projection"), *height = json_object_get(json, "view_height");
+    const char *name = projection ? json_string_value(projection) : height ? "orthographic" : "perspective";
+    const bool flat = name && !strcmp(name, "orthographic");
+    double square = 0;
+    if (!flat && (!name || strcmp(name, "perspective")))
+        return spl_fail_field(err, SPL_E_INPUT, "projection", "a saved view's projection is perspective or orthographic");
+    if (height && (!flat || !json_is_number(height) || !(json_number_value(height) > 0)))
+        return spl_fail_field(err, SPL_E_INPUT, "view_height", "view_height must be a number above 0, with projection orthographic");
+    for (int c = 0; c < 3; c++)
+        square += (view->target[c] - view->eye[c]) * (view->target[c] - view->eye[c]);
+    if (flat)
+        view->view_height = height ? json_number_value(height) : 2 * tan(view->fov * M_PI / 360) * sqrt(square);
+    return SPL_OK;
+}
+
 int spl_saved_view_from_json(const json_t *json, const double up[3], bool named, bool strict,
                              struct spl_saved_view *view, struct spl_error *err)
 {
@@ -85,10 +107,11 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
     json_object_foreach((json_t *)json, key, value)
     {
         bool known = !strcmp(key, "eye") || !strcmp(key, "target") || !strcmp(key, "up") || !strcmp(key, "fov") ||
-                     !strcmp(key, "settings") || (named && !strcmp(key, "name"));
+                     !strcmp(key, "projection") || !strcmp(key, "view_height") || !strcmp(key, "settings") || (named && !strcmp(key, "name"));
         if (strict && !known)
             return spl_fail_field(err, SPL_E_INPUT, key,
-                                  "unknown field '%.60s' of a saved view; known are eye, target, up, fov and settings", key);
+                                  "unknown field '%.60s' of a saved view; known are eye, target, up, fov, projection, view_height "
+                                  "and settings", key);
     }
     const json_t *fov = json_object_get(json, "fov"), *name = json_object_get(json, "name");
     if (named && (!json_is_string(name) || json_string_length(name) >= sizeof view->name))
@@ -106,7 +129,7 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
         return spl_fail_field(err, SPL_E_INPUT, "fov", "fov must be a number of degrees");
     if (fov)
         view->fov = json_number_value(fov);
-    if ((rc = get_settings(json_object_get(json, "settings"), view, err)))
+    if ((rc = get_height(json, view, err)) || (rc = get_settings(json_object_get(json, "settings"), view, err)))
         return rc;
     return spl_saved_view_check(view, named, err);
 }
@@ -160,6 +183,12 @@ json_t *spl_saved_view_to_json(const struct spl_saved_view *view)
 {
     json_t *json = json_pack("{s:s, s:o, s:o, s:o, s:f}", "name", view->name, "eye", vector(view->eye), "target",
                              vector(view->target), "up", vector(view->up), "fov", view->fov);
+    if (json && view->view_height > 0 &&
+        (json_object_set_new(json, "projection", json_string("orthographic")) ||
+         json_object_set_new(json, "view_height", json_real(view->view_height)))) {
+        json_decref(json);
+        return NULL;
+    }
     if (json && view->settings[0] &&
         json_object_set_new(json, "settings", json_loads(view->settings, 0, NULL))) {
         json_decref(json);

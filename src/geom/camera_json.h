@@ -70,7 +70,7 @@ struct spl_camera_places {
 /* Who knows a dataset's views by name. */
 struct spl_camera_defaults;
 struct spl_camera_names {
-    /* Puts the view into eye, target, up, fov, fit and settings of `out`. SPL_E_INPUT, field "view", where there is none. */
+    /* Puts the view into eye, target, up, fov, fit, view_height and settings of `out`. SPL_E_INPUT, field "view", where there is none. */
     int (*find)(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
                 struct spl_error *err);
 };
@@ -78,6 +78,7 @@ struct spl_camera_names {
 /* What stands in for parameters that were left out: the default view of a dataset. */
 struct spl_camera_defaults {
     double eye[3], target[3], up[3], fov, near, far;
+    double view_height; /* of a view by its name that is orthographic; 0 = it is none */
     double fit[2]; /* degrees across and upright that an image of any shape shows; 0 = fov in all of them */
     const struct spl_camera_places *places; // may be NULL: nothing is known but the world
     const struct spl_camera_names *names;   // may be NULL: there are none

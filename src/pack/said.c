@@ -41,6 +41,8 @@ static int check_view(const struct spl_saved_view *given, const char *field, boo
     struct spl_error why = {0};
     bool upright = given->eye[0] == given->target[0] && given->eye[1] == given->target[1];
     struct spl_saved_view view = complete(given, upright ? (double[]){0, 1, 0} : (double[]){0, 0, 1});
+    if (!named && given->view_height != 0)
+        return spl_fail_field(err, SPL_E_USAGE, field, "--%s: it is a pinhole's; orthographic views have names", field);
     return spl_saved_view_check(&view, named, &why)
                ? spl_fail_field(err, SPL_E_USAGE, field, "--%s: %s", field, why.message)
                : SPL_OK;

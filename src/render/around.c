@@ -81,8 +81,7 @@ static double slope(double own, float before, float after)
     return down * up > 0 ? (fabs(down) < fabs(up) ? down : up) : 0; /* false for NAN */
 }
 
-/* View depth of a face at (x, y). */
-static double depth_at(const struct spl_image *image, double x, double y)
+double spl_around_depth_at(const struct spl_image *image, double x, double y)
 {
     const double column = fmin(fmax(floor(x), 1), image->width - 2.0), row = fmin(fmax(floor(y), 1), image->height - 2.0);
     const float *at = (const float *)image->pixels + (size_t)row * image->width + (size_t)column;
@@ -125,7 +124,7 @@ static void look_up_pixel(const struct job *j, uint32_t x, uint32_t y)
         if (!sees || !j->around->faces.cameras[face].width || !from[layer == SPL_LAYER_RANGE ? SPL_LAYER_DEPTH : layer].pixels)
             put_nothing(layer, j->wanted->background, to);
         else if (layer == SPL_LAYER_RANGE)
-            *(float *)to = (float)(depth_at(&from[SPL_LAYER_DEPTH], place[0], place[1]) / along);
+            *(float *)to = (float)(spl_around_depth_at(&from[SPL_LAYER_DEPTH], place[0], place[1]) / along);
         else
             spl_image_sample(&from[layer], place[0], place[1], edge, to);
     }

@@ -28,6 +28,10 @@ bool spl_around_is_empty(const struct spl_around *around);
 /* Of the faces that are not begun. */
 uint64_t spl_around_get_samples_left(const struct spl_around *around);
 
+/* View depth at (x, y) of a face's layer of depths, 3 x 3 pixels at least: the nearest pixel's, carried along its own surface;
+ * not finite where it has none. Pure. */
+double spl_around_depth_at(const struct spl_image *image, double x, double y);
+
 /* Looks up the rows [begin, end) of `images`, those of the view that was asked for, in the faces. Colours, coverage and
  * normals are between four pixels of a face, as spl_image_sample() has it; ids are the nearest pixel's. A range is that of
  * the nearest pixel, carried along its own surface: inverse depth is linear on planes, and the lesser slope to both

@@ -1,6 +1,8 @@
 /* The geometry of picks, shared by the library and the service. The world position is the point on the pixel's ray at
  * the depth that was rendered, so it agrees with the depth layer to the bit; class and primitive are those of the
- * nearest splat, panel or mesh, the normal is its plane's; a mesh lies on no plane that a pick could name. Pure functions; any thread. */
+ * nearest splat, panel or mesh, the normal is its plane's; a mesh lies on no plane that a pick could name. Of a bent camera it
+ * is the pixel of a face that the image is looked up in, with those around it, along which a range is carried: a ray of its own
+ * would pass by what a coarse image shows. Pure functions; any thread. */
 #include "render/pick.h"
 
 #include <math.h>
@@ -11,8 +13,10 @@
 #include "dataset/panels.h"
 #include "geom/faces.h"
 #include "geom/size.h"
+#include "render/around.h"
 #include "render/view.h"
 
+enum { BLOCK = 3 /* pixels on a side of what is drawn of a face */ };
 static const double nowhere = 1e30; // view depth: nothing lies so far away
 
 /* The camera that sees pixel (x, y) of `camera`'s image at at[0], at[1] of its own: itself, or of a bent one the face that
@@ -57,10 +61,12 @@ int spl_pick_view(const struct spl_view *view, double x, double y, struct spl_vi
         out->camera.far = INFINITY;
         return SPL_OK;
     }
+    const bool bent = spl_camera_is_bent(&view->camera);
+    out->surrounded = true; // specks are closed as in the whole
     out->camera = camera;
-    out->camera.cx += 0.5 - at[0];
-    out->camera.cy += 0.5 - at[1];
-    out->camera.width = out->camera.height = 1;
+    out->camera.cx += bent ? 1 - floor(at[0]) : 0.5 - at[0];
+    out->camera.cy += bent ? 1 - floor(at[1]) : 0.5 - at[1];
+    out->camera.width = out->camera.height = bent ? BLOCK : 1;
     return SPL_OK;
 }
 
@@ -116,8 +122,9 @@ void spl_pick_read(const struct spl_camera *camera, double x, double y, const st
                    const struct spl_dataset *dataset, struct spl_pick *pick)
 {
     const struct spl_image *images = frame->images;
-    float depth = *(const float *)images[SPL_LAYER_DEPTH].pixels;
-    uint32_t id = *(const uint32_t *)images[SPL_LAYER_ID].pixels;
+    const size_t middle = images[SPL_LAYER_DEPTH].width == BLOCK ? BLOCK + 1 : 0;
+    float depth = ((const float *)images[SPL_LAYER_DEPTH].pixels)[middle];
+    uint32_t id = ((const uint32_t *)images[SPL_LAYER_ID].pixels)[middle];
     const float *normal = images[SPL_LAYER_NORMAL].pixels;
     *pick = (struct spl_pick){.hit = isfinite(depth)};
     if (!pick->hit)
@@ -126,13 +133,17 @@ void spl_pick_read(const struct spl_camera *camera, double x, double y, const st
     double at[2];
     find_camera(camera, x, y, &own, at, NULL); // which has drawn the frame
     pick->depth = (double)depth;
-    pick->distance = (double)*(const float *)images[SPL_LAYER_RANGE].pixels;
+    pick->distance = (double)((const float *)images[SPL_LAYER_RANGE].pixels)[middle];
+    if (middle)
+        pick->depth = spl_around_depth_at(&images[SPL_LAYER_DEPTH], at[0] - floor(at[0]) + 1, at[1] - floor(at[1]) + 1);
     place(&own, at[0], at[1], pick->depth, pick->position);
-    if (spl_camera_is_bent(camera))
-        pick->depth = pick->distance;
+    if (middle) {
+        const double u = (at[0] - own.cx) / own.fx, v = (at[1] - own.cy) / own.fy;
+        pick->depth = pick->distance = pick->depth * sqrt(1 + u * u + v * v);
+    }
     for (int i = 0; i < 3 && normal; i++)
-        pick->normal[i] = (double)normal[i];
-    memcpy(pick->color, images[SPL_LAYER_COLOR].pixels, sizeof pick->color);
+        pick->normal[i] = (double)normal[3 * middle + (size_t)i];
+    memcpy(pick->color, (const uint8_t *)images[SPL_LAYER_COLOR].pixels + 4 * middle, sizeof pick->color);
     bool named = id != UINT32_MAX;
     pick->splat = named ? (int64_t)id : -1;
     pick->classification = named ? classification(dataset, id) : -1;

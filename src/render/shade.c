@@ -102,9 +102,16 @@ int spl_shade_check(const struct spl_shade_params *shade, struct spl_error *err)
     return SPL_OK;
 }
 
-uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_dataset_info *dataset)
+/* One colour, or one a class: what it lies on has no shape by itself. */
+static bool is_even(const struct spl_color_params *color)
+{
+    return color->by == SPL_COLOR_BY_FLAT || (color->by == SPL_COLOR_BY_ATTRIBUTE && !strcmp(color->name, "class"));
+}
+
+uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
+                       const struct spl_dataset_info *dataset)
 {
     if (!shade->kinds)
-        return dataset->has_color ? 0 : SPL_SHADE_EDL;
+        return dataset->has_color && (color->rgb || !is_even(color)) ? 0 : SPL_SHADE_EDL;
     return shade->kinds & ~(uint32_t)SPL_SHADE_NONE;
 }

@@ -166,7 +166,9 @@ static bool append_body(struct request *request, const char *data, size_t length
         return request->body_seen <= get_drained(request);
     if (!may_be_long(request))
         return true;
-    if (spl_array_reserve(request->body, request->body_capacity, request->body_seen, NULL))
+    /* a long one has all its room at once, most of it untouched: growing copies, which took 80 ms of 16 MiB */
+    const size_t room = request->is_long ? get_most(request) : request->body_seen;
+    if (spl_array_reserve(request->body, request->body_capacity, room, NULL))
         return false;
     memcpy(request->body + request->body_length, data, length);
     request->body_length += length;

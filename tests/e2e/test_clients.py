@@ -1,4 +1,6 @@
 """The clients of api/clients/ against real daemons, and the examples of their README as they are printed there."""
+import contextlib
+import http.server
 import json
 import math
 import os
@@ -8,12 +10,14 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import threading
+import urllib.request
 
 HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
 from harness import FAKE, MAPPED, REAL, WALL, Daemon, run, together
-from splatd import Splatd, SplatdError, ring
+from splatd import Splatd, SplatdError, ring, sign
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
 SMALL = dict(width=65, height=49)
@@ -207,6 +211,62 @@ def test_shell():
             assert not out and said in err and (code == 1 or "splatd.sh ring hall" in err), (arguments, err)
         assert shell(d, "--help")[0].startswith(b"splatd.sh datasets\n") and not pathlib.Path(folder, "x").exists()
         assert not pathlib.Path(folder, "b.jpg").exists() and not list(pathlib.Path(folder).glob("*.part"))
+
+
+@contextlib.contextmanager
+def folder_of(daemon, folder):
+    """A proxy that has the daemon below /folder/, and nothing elsewhere."""
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def forward(self):
+            if not self.path.startswith(f"/{folder}/"):
+                return self.send_error(404)
+            body = self.rfile.read(int(self.headers["Content-Length"] or 0))
+            kept = {name: value for name, value in self.headers.items() if name in ("Content-Type", "Authorization")}
+            connection = daemon.connect()
+            connection.request(self.command, self.path[len(folder) + 1:], body or None, kept)
+            reply = connection.getresponse()
+            content = reply.read()
+            self.send_response(reply.status)
+            for name in ("Content-Type", "Splatd-Camera", "Splatd-Unit"):
+                if reply.headers[name]:
+                    self.send_header(name, reply.headers[name])
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        do_GET = do_POST = forward
+        log_message = lambda *_: None
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/{folder}"
+        server.shutdown()
+
+
+def test_a_service_in_a_folder_of_a_proxy():
+    with tempfile.TemporaryDirectory() as home:
+        key = pathlib.Path(home, "key")
+        key.write_text("0123456789abcdef0123456789abcdef0123456789abcdef")
+        key.chmod(0o600)
+        tokens = pathlib.Path(home, "tokens")
+        tokens.write_text("a-token-of-the-tests view\n")
+        tokens.chmod(0o600)
+        with Daemon(REAL, "--url-key", str(key), "--tokens", str(tokens)) as d, folder_of(d, "our/scans") as where:
+            for base in where, where + "/":
+                service = Splatd(base, "a-token-of-the-tests")
+                assert service.datasets() == ["wall"] and service.status()
+                wall = service.dataset("wall")
+                assert wall.view(**POSE, **SMALL).bytes.startswith(JPEG) and wall.view(camera=POSE, **SMALL).bytes.startswith(JPEG)
+                assert wall.pick(32.5, 24.5, **POSE, **SMALL)["position"] and wall.thumbnail(width=64).bytes.startswith(JPEG)
+                tiles = wall.tiles()
+                assert tiles.url.startswith(where + "/v1/datasets/wall/tiles/{z}/") and tiles.tile(0, 0, 0).type == "image/png"
+            signed = sign(f"{where}/v1/datasets/wall/thumbnail.jpg?width=64", key.read_text())
+            assert signed.startswith(where) and urllib.request.urlopen(signed).read().startswith(JPEG)
+            odd = [sign(f"{base}/v1/datasets/embed/view?x=1", key.read_text()).partition("?")[2] for base in (where, "http://127.0.0.1", "")]
+            assert len(set(odd)) <= 2, odd  # but for a second that began between
+            page = sign(f"{where}/embed/wall", key.read_text())
+            assert Splatd(page).dataset().view(**POSE, **SMALL).bytes.startswith(JPEG)
 
 
 def test_tokens():

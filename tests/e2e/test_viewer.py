@@ -1159,12 +1159,16 @@ def test_classes_measures_annotations_and_views():
             auth = {"Authorization": "Bearer a-token-of-the-tests"}
             [view] = other.ask("/v1/datasets/site", headers=auth).json()["views"]
             assert view["settings"] == {"clip": "x<18", "color_by": "class", "shade": "edl"}, view
+            assert view["projection"] == "orthographic" and abs(view["view_height"] - 12) < 0.01, view
             with page(f"{site}/#dataset=site&view=from-above&mark={mark}", before=keep) as tab:
                 assert view["settings"].items() <= sent(tab).items() and tab.run("document.querySelector('#clip-rest').value") == "x<18"
+                plan = {name: sent(tab)[name] for name in ("eye", "target", "projection", "view_height")}
+                assert plan["projection"] == "orthographic" and abs(float(plan["view_height"]) - 12) < 0.01, plan
                 tab.choose("#views", "")
-                next_link(tab, lambda now: "clip" not in now)
+                next_link(tab, lambda now: "clip" not in now and "projection" not in now)
                 tab.choose("#views", "from-above")
-                next_link(tab, lambda now: now.get("clip") == "x<18" and now.get("shade") == "edl")
+                now = next_link(tab, lambda now: now.get("clip") == "x<18" and now.get("shade") == "edl" and "projection" in now)
+                assert now["projection"] == "orthographic" and abs(float(now["view_height"]) - 12) < 0.01, now
                 assert tab.text("#annotations strong") == evil and link(tab)["mark"].endswith(evil)
                 tab.press_on("#annotations button")
                 assert "mark" not in link(tab) and not tab.text("#names")

@@ -125,6 +125,26 @@ static struct spl_renderer *open_backend(const char *backend, const struct place
     return renderer;
 }
 
+/* 120 beams of a spinning scanner, 160 pulses of each; made once, for all views. */
+static const struct spl_rays *get_rays(void)
+{
+    static double directions[GOLDEN_HEIGHT][GOLDEN_WIDTH][3];
+    static struct spl_rays *rays;
+    for (int beam = 0; beam < GOLDEN_HEIGHT && !rays; beam++) {
+        const double s = 1 - (2 * beam + 1.0) / GOLDEN_HEIGHT, elevation = M_PI / 3 * s * (0.4 + 0.6 * s * s);
+        for (int pulse = 0; pulse < GOLDEN_WIDTH; pulse++) {
+            const double azimuth = 2 * M_PI * ((pulse + 0.5 + 0.25 * (beam % 4)) / GOLDEN_WIDTH - 0.5);
+            double *d = directions[beam][pulse];
+            d[0] = sin(azimuth) * cos(elevation); /* as of a camera: right, down, forward */
+            d[1] = -sin(elevation);
+            d[2] = cos(azimuth) * cos(elevation);
+        }
+    }
+    if (!rays && spl_rays_create(directions[0][0], GOLDEN_WIDTH * GOLDEN_HEIGHT, &rays, NULL))
+        abort();
+    return rays;
+}
+
 static struct spl_view make_view(const struct golden *golden)
 {
     struct spl_view view;
@@ -132,7 +152,9 @@ static struct spl_view make_view(const struct golden *golden)
     struct spl_camera *camera = &view.camera;
     const double height = golden->view_height, up[3] = {0, height > 0, height == 0};
     const uint32_t w = GOLDEN_WIDTH, h = GOLDEN_HEIGHT;
+    view.rays = golden->around == SPL_RAYS ? get_rays() : NULL;
     if ((height > 0                      ? spl_camera_set_orthographic(camera, height, w, h, NULL)
+         : view.rays                     ? spl_camera_set_rays(camera, view.rays, 0, NULL)
          : golden->around == SPL_FISHEYE ? spl_camera_set_fisheye(camera, golden->fov, w, h, NULL)
          : golden->around                ? spl_camera_set_around(camera, golden->around, w, h, NULL)
                                          : spl_camera_set_fov(camera, golden->fov, w, h, NULL)) ||
@@ -173,7 +195,12 @@ static bool render(struct spl_renderer *renderer, const struct spl_dataset *data
         fprintf(stderr, "rendering failed: %s\n", err.message);
         return false;
     }
-    bool good = !spl_image_encode(&frame.images[layer], &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), png,
+    struct spl_image image = frame.images[layer];
+    if (view->rays) { /* a pixel a ray, in their order */
+        image.width = GOLDEN_WIDTH;
+        image.height = GOLDEN_HEIGHT;
+    }
+    bool good = !spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), png,
                                   &err);
     if (!good)
         fprintf(stderr, "encoding failed: %s\n", err.message);

@@ -30,7 +30,7 @@ struct golden {
     const char *clip;         /* conditions of what is drawn; NULL = all */
     const char *shade, *color_by; /* NULL: none, rgb */
     double view_height;       /* of an orthographic view; 0 = fov */
-    enum spl_projection around; /* equirectangular, or a fisheye of fov; 0 = neither */
+    enum spl_projection around; /* equirectangular, a fisheye of fov, or the list of rays; 0 = none of them */
 };
 
 static const struct golden goldens[] = {
@@ -109,6 +109,11 @@ static const struct golden goldens[] = {
     /* ranges in a fisheye, parts of five faces; millimetres, and nothing around the circle */
     {"fisheye-range", {0, -2, 1.5}, {-1, 3, 1.5}, 200, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
      .around = SPL_FISHEYE},
+    /* a spinning lidar's list of rays, a row for each of its beams, which lie closest at the horizon and fire one behind the other: no
+     * grid. Millimetres, carried along the surface of a face's nearest pixel; where another is nearest by rounding, a ray beside an
+     * edge meets the other side of it */
+    {"rays-range", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+     .around = SPL_RAYS},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };
 

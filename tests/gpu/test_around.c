@@ -360,6 +360,58 @@ static void picks_lie_where_the_image_says(void **state)
     assert_true(pick.hit);
 }
 
+/* What a coarse image of far-apart discs shows, a pick finds, as far away, and nothing where it shows nothing: every method,
+ * of panoramas, fisheyes and pinholes. */
+static void picks_find_what_coarse_images_show(void **state)
+{
+    (void)state;
+    enum { w = 96, h = 48, count = 2000, picks = 40 };
+    struct make_splat *all = calloc(count, sizeof *all);
+    assert_non_null(all);
+    for (int i = 0; i < count; i++) {
+        const double z = 1 - (2 * i + 1.0) / count, around = sqrt(1 - z * z), angle = i * M_PI * (3 - sqrt(5)), far = 2 + i % 5;
+        const double n[3] = {around * cos(angle), around * sin(angle), z};
+        all[i] = (struct make_splat){.radius = 0.1f};
+        for (int k = 0; k < 3; k++) {
+            all[i].position[k] = far * n[k];
+            all[i].normal[k] = (float)-n[k];
+        }
+    }
+    struct spl_dataset *sieve = make_dataset(all, count);
+    free(all);
+    assert_int_equal(spl_renderer_add(renderer, sieve, NULL), SPL_OK);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        for (int kind = 0; kind < 3; kind++) {
+            static const char *const names[] = {"all around", "fisheye", "pinhole"};
+            struct spl_view view = all_around(0);
+            struct spl_frame frame;
+            struct spl_pick pick;
+            int hits = 0, others = 0;
+            view.method = method;
+            view.lod = 1;
+            view.layers = 1u << SPL_LAYER_RANGE | 1u << SPL_LAYER_ID;
+            assert_int_equal(kind == 2   ? spl_camera_set_fov(&view.camera, 80, w, h, NULL)
+                             : kind == 1 ? spl_camera_set_fisheye(&view.camera, 170, w, h, NULL)
+                                         : spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, w, h, NULL), SPL_OK);
+            assert_int_equal(spl_renderer_render(renderer, sieve, &view, &frame, NULL), SPL_OK);
+            const float *range = frame.images[SPL_LAYER_RANGE].pixels;
+            const uint32_t *id = frame.images[SPL_LAYER_ID].pixels;
+            for (int i = 0; i < picks; i++) {
+                const int x = (i * 37 + 5) % w, y = (i * 17 + 3) % h, at = y * w + x;
+                assert_int_equal(spl_renderer_pick(renderer, sieve, &view, x + 0.5, y + 0.5, &pick, NULL), SPL_OK);
+                hits += pick.hit;
+                const bool shown = isfinite(range[at]);
+                others += pick.hit != shown || (shown && (fabs(pick.distance - (double)range[at]) > 1e-5 * pick.distance ||
+                                                          pick.splat != (id[at] == UINT32_MAX ? -1 : (int64_t)id[at])));
+            }
+            print_message("%s, %s: %d of %d picks hit, %d otherwise\n", spl_method_name(method), names[kind], hits, picks, others);
+            assert_true(hits > 0 && hits < picks && others <= (method == SPL_METHOD_FILL ? picks / 4 : 0)); // its filter looks on and on
+            spl_frame_finish(&frame);
+        }
+    spl_renderer_remove(renderer, sieve);
+    spl_dataset_close(sieve);
+}
+
 /* No ray of it goes anywhere: nothing is drawn, in no time. */
 static void what_sees_nothing_is_empty(void **state)
 {
@@ -398,6 +450,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_cubes_faces_are_pinholes),
         cmocka_unit_test(layers_hold_their_kind),
         cmocka_unit_test(picks_lie_where_the_image_says),
+        cmocka_unit_test(picks_find_what_coarse_images_show),
         cmocka_unit_test(what_sees_nothing_is_empty),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

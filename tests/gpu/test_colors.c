@@ -132,6 +132,46 @@ static void shading_is_as_in_c(void **state)
     done(dataset);
 }
 
+/* A wall of discs that lean by up to six degrees, from aside: eye-dome lighting leaves it as it is, and finds the disc that
+ * stands before it. */
+static void walls_keep_their_colors(void **state)
+{
+    (void)state;
+    enum { side = 60, count = side * side + 1 };
+    struct make_splat *splats = calloc(count, sizeof *splats);
+    for (int i = 0; i < count; i++) {
+        const double lean[2] = {0.2 * (uniform() - 0.5), 0.2 * (uniform() - 0.5)}, length = hypot(hypot(lean[0], lean[1]), 1);
+        splats[i] = (struct make_splat){.position = {0.05 * (i % side) - 1.5, 0.05 * (i / side) - 1.5, 0},
+                                        .normal = {(float)(lean[0] / length), (float)(lean[1] / length), (float)(1 / length)},
+                                        .radius = 0.05f, .color = {200, 180, 160}};
+    }
+    splats[count - 1] = (struct make_splat){.position = {0, 0, 0.5}, .normal = {0, 0, 1}, .radius = 0.3f, .color = {200, 180, 160}};
+    struct spl_dataset *dataset = make_dataset(splats, count);
+    struct spl_view view = looking(origin, 2, 320, 240);
+    assert_int_equal(spl_camera_look_at(&view.camera, (double[]){0.4, -1.6, 1.2}, origin, (double[]){0, 0, 1}, NULL), 0);
+    size_t wall = 0, gaps = 0, drawn = 0;
+    view.lod = 0;
+    view.shade.kinds = SPL_SHADE_NONE;
+    struct spl_frame plain = render(dataset, &view);
+    view.shade.kinds = SPL_SHADE_EDL;
+    struct spl_frame shaded = render(dataset, &view);
+    for (size_t at = 0; at < 320 * 240; at++) {
+        const double z = depth_at(&plain, at);
+        const int lost = color_at(&plain, at)[0] - color_at(&shaded, at)[0];
+        drawn += !isnan(z);
+        wall += lost > 4;  /* 2 % */
+        gaps += lost > 40; /* around the disc */
+    }
+    assert_true(drawn > 30000);
+    assert_true(gaps > 100);
+    if (wall > gaps + drawn / 100)
+        fail_msg("%zu of %zu pixels are darker, %zu of them around the disc", wall, drawn, gaps);
+    spl_frame_finish(&plain);
+    spl_frame_finish(&shaded);
+    spl_dataset_close(dataset);
+    free(splats);
+}
+
 /* The places (by an entry more or less) among the palette that a value may have. */
 static bool is_shown(const struct spl_paint *paint, const uint8_t color[4], double value, int slack)
 {
@@ -172,6 +212,7 @@ static void compare_shown(const struct spl_dataset *dataset, struct spl_view *vi
     struct spl_frame frame;
     size_t shown = 0, differ = 0;
     view->color = (struct spl_color_params){0};
+    view->shade.kinds = SPL_SHADE_NONE; /* colours as they are */
     assert_int_equal(spl_color_parse(text, &view->color, NULL), 0);
     if (range)
         assert_int_equal(spl_color_parse_range(range, &view->color, NULL), 0);
@@ -253,6 +294,7 @@ static void flat_is_flat(void **state)
             struct spl_view view = looking(origin, 3, 160, 120);
             view.method = (enum spl_method)method;
             view.background[3] = 0;
+            view.shade.kinds = SPL_SHADE_NONE;
             if (soft)
                 assert_int_equal(spl_soft_parse("class:*", &view.soft, NULL), 0);
             assert_int_equal(spl_color_parse("flat:20a0f0", &view.color, NULL), 0);
@@ -312,7 +354,7 @@ static void tiles_show_the_same(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        frames_test(shading_is_as_in_c), frames_test(values_are_shown), frames_test(panels_show_theirs),
+        frames_test(shading_is_as_in_c), frames_test(walls_keep_their_colors), frames_test(values_are_shown), frames_test(panels_show_theirs),
         frames_test(flat_is_flat),       frames_test(tiles_show_the_same),
     };
     return frames_run(argc, argv, "colors", tests, sizeof tests / sizeof *tests);

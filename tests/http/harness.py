@@ -9,6 +9,7 @@ import os
 import queue
 import re
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -155,6 +156,14 @@ def parts(reply):
         headers = email.parser.BytesHeaderParser().parsebytes(head + b"\r\n\r\n")
         assert len(body) == int(headers["Content-Length"]) + 2 and body[-2:] == b"\r\n"
         yield headers.get_filename(), headers, body[:-2]
+
+
+def npy(rows, kind="f", order="False"):
+    """A body of directions: float32, or float64 with kind "d"."""
+    header = f"{{'descr': '<{'f4' if kind == 'f' else 'f8'}', 'fortran_order': {order}, 'shape': ({len(rows)}, 3), }}"
+    header += " " * (117 - len(header)) + "\n"
+    flat = [x for row in rows for x in row] if order == "False" else [row[k] for k in range(3) for row in rows]
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack(f"<{len(flat)}{kind}", *flat)
 
 
 def eventually(condition, seconds=30):

@@ -122,16 +122,20 @@ def properties_in(schema, value, prefix=""):
             yield from properties_in(schema["properties"][name], value[name], f"{prefix}{name}.")
 
 
-def all_properties(schema, prefix="", depth=0):
+def all_properties(schema, prefix="", depth=0, beside={}):
+    """But for those that stand as `false` beside a $ref, or in `beside`, which says so of what lies deeper."""
+    beside = beside or schema.get("properties", {}) if "$ref" in schema else beside
     schema = resolve(schema)
     for part in schema.get("allOf", []) + schema.get("oneOf", []) + schema.get("anyOf", []):
-        yield from all_properties(part, prefix, depth)
+        yield from all_properties(part, prefix, depth, beside)
     if "items" in schema:
         yield from all_properties(schema["items"], prefix, depth)
     for name, inner in schema.get("properties", {}).items():
+        if beside.get(name) is False:
+            continue
         yield prefix + name
         if depth < 4:
-            yield from all_properties(inner, f"{prefix}{name}.", depth + 1)
+            yield from all_properties(inner, f"{prefix}{name}.", depth + 1, beside.get(name, {}).get("properties", {}))
 
 
 used = set()  # "GET /v1/x", "GET /v1/x -> 200", "GET /v1/x ?name", "GET /v1/x body name"

@@ -301,7 +301,8 @@ def test_what_the_device_has_no_room_for_is_no_body_too_large():
     with Daemon(FAKE, FAKE_ROOM_PX="0") as d:
         pick = VIEW.replace("view", "pick")
         for reply in (d.view(width=640, height=480), d.post({"width": 64, "height": 48}),
-                      d.ask(pick + "?x=3&y=4"), d.post({"x": 3, "y": 4}, pick)):
+                      d.ask(pick + "?x=3&y=4"), d.post({"x": 3, "y": 4}, pick),
+                      d.post({"directions": [[0, 0, 1]]}, VIEW.replace("view", "rays"))):
             assert reply.status == 507 and reply.json()["type"] == "urn:splatd:error:limit", (reply.status, reply.body)
             assert "no room" in reply.json()["detail"] and reply.headers["Retry-After"] is None, reply.body
     with Daemon(FAKE, FAKE_ROOM_PX=str(64 * 48)) as d:

@@ -5,7 +5,9 @@ usage: test_openapi.py NAME…   the other tests"""
 import http.client
 import os
 import pathlib
+import subprocess
 import sys
+import tempfile
 
 import jsonschema
 
@@ -77,6 +79,29 @@ def test_what_is_not_documented_is_found():
         assert said in fault and bool(said) == bool(fault), (request, fault)
     openapi.used.clear()
     openapi.used.update(used)
+
+
+def test_signed_urls_are_documented_where_they_work():
+    """Of every GET, what `splatd sign` takes is what the document says."""
+    holes = {"id": "wall", "name": "a", "z": "1", "x": "0", "y": "0.png", "n": "0"}
+    with tempfile.TemporaryDirectory() as home:
+        key = pathlib.Path(home, "key")
+        key.write_text("0123456789abcdef0123456789abcdef0123456789abcdef")
+        key.chmod(0o600)
+        for template, method, operation, _ in openapi.operations():
+            documented = {"signedUrl": []} in operation.get("security", [])
+            assert method == "get" or not documented, (method, template)
+            if method == "get":
+                url = "http://127.0.0.1" + openapi.re.sub(r"\{(\w+)\}", lambda hole: holes[hole[1]], template)
+                signed = subprocess.run([harness.REAL, "sign", url, "--key", str(key)], capture_output=True)
+                assert (signed.returncode == 0) == documented, (template, documented, signed.stderr)
+
+
+def test_what_a_reference_leaves_out_is_not_asked_for():
+    rays = set(openapi.all_properties({"$ref": "#/components/schemas/RaysRequest"}))
+    assert {"camera.eye", "camera.gltf.matrix"} <= rays and not {"camera.fov", "camera.ros", "camera.gltf.perspective"} & rays
+    assert openapi.faults({"$ref": "#/components/schemas/RaysRequest"}, {"directions": [[0, 0, 1]], "camera": {"fov": 50}})
+    assert "camera.fov" in set(openapi.all_properties({"$ref": "#/components/schemas/ViewRequest"}))
 
 
 def test_it_is_served():

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 
-from harness import FAKE, MAPPED, REAL, VIEW, WALL, Daemon, eventually, run
+from harness import FAKE, MAPPED, REAL, VIEW, WALL, Daemon, eventually, npy, run
 
 if os.environ["SPLATD_PROJ"] != "1":
     print("skipped: built without PROJ")
@@ -98,6 +98,14 @@ def test_a_view_by_longitude_and_latitude_is_the_one_by_coordinates():
             reply = d.ask(VIEW, "POST", json.dumps({**posted, "width": 64, "height": 48}),
                           {"Content-Type": "application/json"})
             assert reply.body == first.body and camera_of(reply) == used
+        rays = [d.ask(f"{DATASET}/rays?{where}", "POST", json.dumps({"directions": [[0, 0, 1], [0.1, 0, 1]], "format": "json", **body}), kind)
+                for where, body, kind in (("", {"camera": {"eye": world, "target": middle}}, {"Content-Type": "application/json"}),
+                                          ("", {"camera": {"eye": eye, "target": target}, "crs": "EPSG:4326"}, {"Content-Type": "application/json"}),
+                                          ("", {"camera": {"eye": eye, "target": target, "crs": "EPSG:4326"}}, {"Content-Type": "application/json"}))]
+        rays.append(d.ask(f"{DATASET}/rays?crs=EPSG:4326&eye={text(eye)}&target={text(target)}&format=json", "POST", npy([(0, 0, 1), (0.1, 0, 1)]),
+                          {"Content-Type": "application/x-npy"}))
+        assert rays[0].json()[0] and all(camera_of(one) == camera_of(rays[0]) for one in rays[1:])
+        assert len({one.body for one in rays[:3]}) == 1 and abs(rays[3].json()[0] - rays[0].json()[0]) < 1e-6
         # what is left out is the default view's, in the world
         only = camera_of(d.ask(f"{VIEW}?{SMALL}&crs=EPSG:4326&target={text(target)}"))
         assert only["eye"] == d.ask(DATASET).json()["default_view"]["eye"]
@@ -326,6 +334,7 @@ def test_without_the_list_of_systems():
         refused(d.ask(f"{DATASET}/pick?x=1&y=1&crs=EPSG:4326"), 501, "crs")
         refused(d.ask(f"{DATASET}/pick", "POST", '{"x": 1, "y": 1, "crs": "EPSG:4326"}', json_type), 501, "crs")
         refused(d.ask(f"{DATASET}/views", "POST", '{"views": [{"crs": "EPSG:4326"}]}', json_type), 501, "crs")
+        refused(d.ask(f"{DATASET}/rays", "POST", '{"directions": [[0, 0, 1]], "crs": "EPSG:4326"}', json_type), 501, "crs")
         assert d.ask(f"{VIEW}?{SMALL}").status == 200
 
 

@@ -4,9 +4,10 @@ import io
 import json
 import math
 import struct
+import urllib.parse
 import zipfile
 
-from harness import REAL, VIEW, Daemon, eventually, run
+from harness import REAL, VIEW, Daemon, eventually, npy, run
 
 RAYS = VIEW.replace("/view", "/rays")
 POSE = {"eye": [3, 0.8, 1], "target": [0, 0.8, 1]}
@@ -16,13 +17,6 @@ DIRECTIONS = [(math.sin(a) * math.cos(e), math.sin(e), math.cos(a) * math.cos(e)
               for e in (math.radians(-10 + 2 * row) for row in range(11)) for a in (math.radians(column - 20) for column in range(41))]
 SCAN = f"{VIEW}?projection=equirectangular&azimuth=-20,20,41&elevation=10,-10,11&{QUERY}&layer=range&format=raw"
 RESOLUTION = "resolution=57.3"  # a degree
-
-
-def npy(rows, kind="f", order="False"):
-    header = f"{{'descr': '<{'f4' if kind == 'f' else 'f8'}', 'fortran_order': {order}, 'shape': ({len(rows)}, 3), }}"
-    header += " " * (117 - len(header)) + "\n"
-    flat = [x for row in rows for x in row] if order == "False" else [row[k] for k in range(3) for row in rows]
-    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack(f"<{len(flat)}{kind}", *flat)
 
 
 def floats(body):
@@ -85,6 +79,53 @@ def test_what_views_take_rays_take():
         posed = d.post({"camera": {"matrix": [1, 0, 0, 3, 0, 1, 0, 0.8, 0, 0, 1, 1, 0, 0, 0, 1], "convention": "opencv"}, "directions": [[-1, 0, 0]],
                         "format": "json"}, RAYS)
         assert 2.5 < posed.json()[0] < 3.2
+
+
+def in_url(value):
+    return urllib.parse.quote(str(value).lower() if isinstance(value, bool) else str(value), safe=",:")
+
+
+def test_settings_of_a_view_mean_the_same_in_url_and_json():
+    """Each parameter that rays take, in one of a few requests; a query's numbers are its JSON's."""
+    splats = {"margin": 2, "atoms": 0, "maps": "off", "primitives": "off", "up": [0, 0, 1], "near": 0.1, "far": 90, "lod": 1,
+              "supersample": 1, "quality": 50, "chroma": 444, "depth_scale": 100}
+    fill = {"method": "fill", "visibility": "none", "kernel": 5, "threshold": 0.3, "pyramid": 4, "clip": "z<1.8", "class": "!9"}
+    soft = {"soft": "plane:0,0,1,0,0,1>0", "soft_model": "base", "soft_opacity": 0.9, "soft_cover": 0.8, "soft_blend": 0.1, "of": "first"}
+    colors = {"layers": "range,color", "container": "zip", "color_by": "height", "ramp": "terrain", "range": "0..2",
+              "shade": "edl", "edl_strength": 0.3, "edl_radius": 1, "background": "red", "transparent": True}
+    with Daemon(REAL) as d:
+        version, seen = d.ask("/v1/datasets/wall").json()["version"], []
+        for settings in splats, fill, soft, colors:
+            wait = settings is not fill
+            query = "&".join(f"{name}={in_url(','.join(map(str, value)) if isinstance(value, list) else value)}" for name, value in settings.items())
+            asked = post(d, DIRECTIONS, f"{QUERY}&{query}&v={version}&wait={int(wait)}", kind="d")
+            camera = {**POSE, **{name: settings[name] for name in ("up", "near", "far") if name in settings}}
+            beside = {name: value for name, value in settings.items() if name not in camera}
+            posted = d.post({"camera": camera, "directions": DIRECTIONS, "v": version, "wait": wait, **beside}, RAYS)
+            assert posted.body == asked.body and posted.headers["Splatd-Camera"] == asked.headers["Splatd-Camera"], settings
+            seen.append(asked.body)
+        assert len(set(seen)) == 4
+        with zipfile.ZipFile(io.BytesIO(seen[3])) as parts:
+            ranges = floats(parts.read("range.npy")[128:])
+            colors = struct.iter_unpack("<4B", parts.read("color.npy")[128:])
+        assert all((r != r) == (c[3] == 0) for r, c in zip(ranges, colors)) and any(r != r for r in ranges)
+        for body, query in ({"near": 0.1, "far": 90}, "&near=0.1&far=90"), ({"layer": "id"}, "&layer=id"):
+            assert d.post({"camera": POSE, "directions": DIRECTIONS, **body}, RAYS).body == post(d, DIRECTIONS, QUERY + query, kind="d").body
+
+
+def test_poses_in_every_form_that_says_no_lens():
+    forms = ({"matrix": [0, 0, -1, 3, 1, 0, 0, 0.8, 0, -1, 0, 1, 0, 0, 0, 1], "convention": "opencv"},
+             {"q": [0.5, 0.5, 0.5, -0.5], "t": [-0.8, 1, 3]},
+             {"gltf": {"type": "perspective", "matrix": [0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 3, 0.8, 1, 1]}})
+    with Daemon(REAL) as d:
+        wanted = floats(post(d, DIRECTIONS, f"{QUERY}&format=raw", kind="d").body)
+        for form in forms:
+            got = d.post({"camera": form, "directions": DIRECTIONS, "format": "raw"}, RAYS)
+            assert got.status == 200 and same(floats(got.body), wanted, 1e-5), (form, got.body[:200])
+        for form, field in (({"fov": 50}, "fov"), ({"gltf": {"perspective": {"yfov": 1, "znear": 0.1}}}, "gltf.perspective.yfov"),
+                            ({"ros": {"k": [50, 0, 32, 0, 50, 24, 0, 0, 1], "width": 64, "height": 48}}, "ros.k")):
+            reply = d.post({"camera": {**POSE, **form}, "directions": [[0, 0, 1]]}, RAYS)
+            assert reply.status == 400 and reply.json()["field"] == field, reply.body
 
 
 def test_bad_ones_are_named():

@@ -133,6 +133,7 @@ def test_a_dataset_that_is_cut_or_overwritten_while_served():
                 eventually(lambda: d.ops("/readyz").status == 200)
                 assert view("b").status == 200
                 for reply in (view("a"), d.ask("/v1/datasets/a/view", "POST", "{}", {"Content-Type": "application/json"}),
+                              d.post({"directions": [[0, 0, 1]]}, "/v1/datasets/a/rays"),
                               d.ask("/v1/datasets/a/thumbnail.jpg"), d.ask("/v1/datasets/a/tiles/0/0/0.png")):
                     assert reply.status == 500 and "rename" in reply.json()["detail"], reply.body
                     assert folder not in reply.json()["detail"], "a client is told where the file lies"

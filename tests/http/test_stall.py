@@ -3,10 +3,12 @@ on disk listed, read and fetched, and in all of it no turn of the loop of 50 ms,
 
 A turn is judged by the processor time that it took, which others on the machine do not change; by the clock it may have
 been as much longer as the kernel says that the loop's thread waited for a processor."""
+import array
 import json
 import math
 import os
 import pathlib
+import random
 import re
 import tempfile
 import time
@@ -161,6 +163,45 @@ def test_paths_of_a_mib_stall_nobody():
             watch.blame(name + ", deleted")
         watch.judge()
         eventually(lambda: not os.listdir(folder))
+        assert peak_bytes(d) < MEMORY, peak_bytes(d) / MIB
+
+
+def lists():
+    """Bodies of a million rays, NPY and what becomes of it; as many as JSON holds; and what is wrong at their ends."""
+    million, most = 1 << 20, 1 << 15
+    rng = random.Random(5)
+    directions = array.array("d", [rng.uniform(-1, 1) for _ in range(3 * million)])  # all around, in no order
+    header = "{'descr': '<f%d', 'fortran_order': %s, 'shape': (%d, 3), }"
+
+    def body(kind, order="False", numbers=directions):
+        text = (header % (8 if kind == "d" else 4, order, len(numbers) // 3)).ljust(117) + "\n"
+        return b"\x93NUMPY\x01\x00v\x00" + text.encode() + (numbers if kind == "d" else array.array("f", numbers)).tobytes()
+    broken = directions[:]
+    broken[-1] = math.nan
+    double, kind = body("d"), "application/x-npy"
+    for name, sent, query, status in (
+            ("doubles", double, "", 200), ("doubles, sent again", double, "", 200),
+            ("floats by columns", body("f", "True"), "&frame=world&resolution=1000&format=raw", 200),
+            ("every layer as ZIP", double, "&layers=range,color,normal,id,coverage,primitive&container=zip", 200),
+            ("a million as JSON", double, "&format=json", 400), ("no number at the end", body("d", numbers=broken), "", 400),
+            ("cut off", double[:-1], "", 400), ("too many", body("d", numbers=directions + directions[:3]), "", 400)):
+        yield name, sent, query, kind, status
+    listed = json.dumps({"camera": {"eye": [3, 0, 1], "target": [0, 0, 1]}, "format": "json", "layers": ["range", "color", "normal"],
+                         "directions": [[round(x, 5) for x in directions[3 * i:3 * i + 3]] for i in range(most)]}).encode()
+    spoiled = json.dumps({"directions": [[1, 0, 0]] * (most - 1) + [[1, 0, None]]}).encode()
+    for name, sent, status in (("JSON", listed, 200), ("JSON, spoiled at its end", spoiled, 400), ("JSON of blanks", b" " * MIB, 400)):
+        yield name, sent.ljust(MIB - 1), "", "application/json", status
+
+
+def test_a_million_rays_stall_nobody():
+    with Daemon(FAKE, "--deadline", "60000", FAKE_FRAME_MS=1) as d:
+        watch = Watch(d)
+        for name, body, query, kind, status in lists():
+            where = VIEW.replace("view", "rays") + ("" if kind.endswith("json") else f"?eye=3,0,1&target=0,0,1{query}")
+            reply = d.ask(where, "POST", body, {"Content-Type": kind})
+            assert reply.status == status, (name, reply.status, reply.body[:300])
+            watch.blame(name)
+        watch.judge()
         assert peak_bytes(d) < MEMORY, peak_bytes(d) / MIB
 
 

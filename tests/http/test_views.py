@@ -11,7 +11,7 @@ import tempfile
 import time
 
 import openapi
-from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, run
+from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, npy, run
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/json"}
@@ -102,6 +102,18 @@ def test_what_it_was_packed_with():
                                   capture_output=True).returncode == 2
 
 
+def test_a_plan_is_packed():
+    with tempfile.TemporaryDirectory() as folder:
+        made = pack(folder, "--view", "plan=eye=10,5,20,target=10,5,0,up=0,1,0,view_height=12")
+        assert made.returncode == 0, made.stderr
+        seen = [subprocess.run([REAL, "render", f"{folder}/site.spld", "--size", "64x48", "--format", "png", "-o", "-", *options], capture_output=True).stdout
+                for options in (["--view", "plan"], ["--view", "plan", "--view-height", "12"], ["--view", "plan", "--fov", "60"],
+                                ["--view", "plan", "--projection", "orthographic", "--view-height", "9"])]
+        assert seen[0] == seen[1] and seen[0] and len(set(seen)) == 3
+        made = pack(folder, "--default-view", "eye=10,5,20,target=10,5,0,up=0,1,0,view_height=12")
+        assert made.returncode == 2 and "--default-view" in made.stderr, made.stderr
+
+
 def test_what_is_said_wrongly():
     with tempfile.TemporaryDirectory() as folder:
         for options, word in [
@@ -177,6 +189,13 @@ def test_a_saved_view_keeps_what_it_shows():
             pick = "/v1/datasets/wall/pick?x=32&y=16&width=64&height=48&view="
             assert d.ask(pick + "plain", headers=AUTH).json()["position"][2] > 1.2
             assert d.ask(pick + "door", headers=AUTH).json()["position"] is None
+            rays = [d.ask("/v1/datasets/wall/rays" + where, "POST", body, {**AUTH, "Content-Type": kind}) for where, body, kind in (
+                ("", '{"view": "door", "directions": [[0, 0, 1], [0, 0.5, 1]], "format": "json"}', "application/json"),
+                ("?view=door&format=json", npy([(0, 0, 1), (0, 0.5, 1)]), "application/x-npy"),
+                ("?view=plain&format=json", npy([(0, 0, 1)]), "application/x-npy"))]
+            assert rays[0].body == rays[1].body and camera(rays[0])["eye"] == DOOR["eye"] == camera(rays[2])["eye"]
+            assert json.loads(rays[1].headers["Splatd-Clip"]) == json.loads(named.headers["Splatd-Clip"])
+            assert rays[0].json()[0] and rays[2].headers["Splatd-Clip"] is None
             if os.environ["SPLATD_PROJ"] == "1":  # they are of the world whatever crs says
                 eye = d.ask("/v1/datasets/wall/place?crs=EPSG:4326&world=3,0,1", headers=AUTH).json()["position"]
                 far = get(d, f"view=door&{size}&crs=EPSG:4326&eye={','.join(map(repr, eye))}")
@@ -213,6 +232,34 @@ def test_thumbnails_show_what_is_kept():
         assert whole.body != part.body and json.loads(part.headers["Splatd-Clip"])["clip"] == ["z<1", "!class:7"]
         for wrong, field in (("&clip=nonsense", "clip"), ("&class=x", "class"), ("&color_by=height", "color_by")):
             assert thumbnail(wrong).json()["field"] == field
+
+
+def test_a_plan_stays_a_plan():
+    """An orthographic view comes back as one, from the file too; a request that says a lens of its own has that."""
+    size, above = "width=64&height=48", {"eye": [3, 0, 9], "target": [0, 0, 1], "up": [0, 0, 1]}
+    with serving() as (home, start):
+        with start() as d:
+            plan = {**above, "projection": "orthographic", "view_height": 12.5}
+            assert put(d, "plan", plan).json() == {"name": "plan", **plan, "fov": 60, "from": "service"}
+            reply = put(d, "as-high", {**above, "fov": 90, "projection": "orthographic"})
+            assert abs(reply.json()["view_height"] - 2 * math.dist(above["eye"], above["target"])) < 1e-9, reply.body
+            assert put(d, "implied", {**above, "view_height": 2}).json()["projection"] == "orthographic"
+            assert "projection" not in put(d, "pinhole", {**above, "projection": "perspective"}).json()
+            for wrong, field in (({"view_height": 0}, "view_height"), ({"view_height": 1e13}, "view_height"), ({"view_height": "5"}, "view_height"),
+                                 ({"view_height": 5, "projection": "perspective"}, "view_height"), ({"projection": "cube"}, "projection"),
+                                 ({"projection": 1}, "projection")):
+                reply = put(d, "wrong", {**above, **wrong})
+                assert reply.status == 400 and reply.json()["field"] == field, (wrong, reply.body)
+        with start() as d:  # another process reads the file
+            assert views(d)["plan"]["view_height"] == 12.5 and views(d)["plan"]["projection"] == "orthographic"
+            pose = "eye=3,0,9&target=0,0,1&up=0,0,1"
+            for said, spelt in (("", "view_height=12.5"), ("&view_height=3", "view_height=3"), ("&units_per_pixel=0.5", "units_per_pixel=0.5"),
+                                ("&projection=orthographic", "view_height=12.5"), ("&fov=50", "fov=50"), ("&fx=50", "fx=50"),
+                                ("&projection=equirectangular", "projection=equirectangular"), ("&projection=perspective", "fov=60")):
+                one, other = (get(d, f"{query}&{size}").headers for query in (f"view=plan{said}", f"{pose}&{spelt}"))
+                assert one["ETag"] == other["ETag"] and one["Splatd-Camera"] == other["Splatd-Camera"], (said, one["Splatd-Camera"], other["Splatd-Camera"])
+            body = d.ask("/v1/datasets/wall/view", "POST", json.dumps({"view": "plan", "width": 64, "height": 48}), AUTH)
+            assert camera(body)["projection"] == "orthographic" and camera(body)["fx"] == 48 / 12.5
 
 
 def test_a_saved_view_hides_one_of_the_pack():

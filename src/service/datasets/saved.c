@@ -44,6 +44,7 @@ static int find(const struct spl_camera_names *names, const char *name, struct s
         memcpy(out->up, view->up, sizeof out->up);
         memcpy(out->settings, view->settings, sizeof out->settings);
         out->fov = out->fit[0] = out->fit[1] = view->fov;
+        out->view_height = view->view_height;
     }
     pthread_mutex_unlock(&saved->mutex);
     return view ? SPL_OK

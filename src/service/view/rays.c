@@ -90,6 +90,8 @@ static void read_list(uv_work_t *work)
 {
     struct spl_ray_wish *wish = work->data;
     (wish->npy ? read_npy : read_json)(wish, &wish->err);
+    free(wish->body); // here, since the loop would take milliseconds to hand 24 MiB back
+    wish->body = NULL;
 }
 
 /* What is drawn has a reference of its own to the list: a client that reads its reply slowly keeps none, and no place of

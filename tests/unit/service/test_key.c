@@ -225,6 +225,29 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
     }
 }
 
+/* Lists differ by their directions, lengths apart, and by what they are sent as. */
+static void rays_are_part_of_it(void **state)
+{
+    (void)state;
+    const double lists[4][2][3] = {{{0, 0, 1}, {1, 0, 1}}, {{0, 0, 3}, {2, 0, 2}}, {{0, 0, 1}, {1, 0, 1.0000001}}, {{1, 0, 1}, {0, 0, 1}}};
+    struct spl_view_request request = {.encode.quality = 90};
+    struct spl_key keys[4];
+    spl_view_init(&request.view);
+    for (int i = 0; i < 4; i++) {
+        struct spl_rays *rays;
+        assert_int_equal(spl_rays_create(lists[i][0], 2, &rays, NULL), 0);
+        assert_int_equal(spl_camera_set_rays(&request.view.camera, rays, 100, NULL), 0);
+        request.view.rays = rays;
+        request.listed = false;
+        keys[i] = spl_key_make(&request, &plain, 1);
+        request.listed = true;
+        const struct spl_key listed = spl_key_make(&request, &plain, 1);
+        assert_false(spl_key_equal(&keys[i], &listed));
+        assert_true(spl_key_equal(&keys[i], &keys[0]) == (i < 2));
+        spl_rays_destroy(rays);
+    }
+}
+
 static void version_and_renderer_are_part_of_it(void **state)
 {
     (void)state;
@@ -301,6 +324,7 @@ int main(void)
         cmocka_unit_test(what_means_the_same_has_one_key),
         cmocka_unit_test(what_a_dataset_lacks_is_left_out),
         cmocka_unit_test(what_changes_a_byte_has_a_key_of_its_own),
+        cmocka_unit_test(rays_are_part_of_it),
         cmocka_unit_test(version_and_renderer_are_part_of_it),
         cmocka_unit_test(if_none_match_is_read_as_the_standard_says),
     };
