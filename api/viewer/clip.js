@@ -146,7 +146,8 @@ export class Clip extends EventTarget {
   }
 
   lengthText(x) {
-    return withUnit(x.toFixed(Math.min(3, this.digits)), this.dataset.unit);
+    const digits = Math.min(3, this.digits);
+    return withUnit((Number(x.toFixed(digits)) + 0).toFixed(digits), this.dataset.unit);
   }
 
   /** A slider with what it says, from where to where it goes. */

@@ -14,15 +14,19 @@ function seenFrom({camera, home}) {
   return (camera.flat && SIDES.find(from)) || null;
 }
 
-/** The camera from that side that shows all of the bounds in a picture of this size. */
+/** The camera from that side that shows all of the bounds in a picture of this size; its target stays as deep as it is, if that
+ * is within them. */
 export function framed(camera, side, home, bounds, [width, height]) {
-  const middle = bounds.min.map((x, i) => (x + bounds.max[i]) / 2),
-    from = fromSide(camera, side, home),
-    {right, down} = axes(from);
+  const from = fromSide(camera, side, home),
+    {right, down, forward} = axes(from),
+    middle = bounds.min.map((x, i) => (x + bounds.max[i]) / 2),
+    [near, far] = span(bounds, forward),
+    depth = Math.min(far, Math.max(near, dot(camera.target, forward))),
+    target = add(middle, times(forward, depth - dot(middle, forward)));
   const [across, upright] = [right, down].map((axis) => span(bounds, axis)).map(([low, high]) => high - low);
   const shown = MARGIN * Math.max(upright, (across * height) / width) || distance(camera);
   const back = shown / 2 / Math.tan((camera.fov * Math.PI) / 360);
-  return {...from, target: middle, eye: sub(middle, times(axes(from).forward, back))};
+  return {...from, target, eye: sub(target, times(forward, back))};
 }
 
 /** Ties the buttons, by the names of their sides, to the stage; gives what is to be called with the section that has been

@@ -172,7 +172,7 @@ def test_plans_and_elevations():
         size, (width, height) = [b - a for a, b in zip(bounds["min"], bounds["max"])], tab.run("[stage.clientWidth, stage.clientHeight]")
 
         def frames(view, across, upright):  # the whole of it, in the middle, in the picture's aspect
-            assert all(abs(c - (a + b) / 2) < 1e-3 for c, a, b in zip(view["target"], bounds["min"], bounds["max"])), (view, bounds)
+            assert all(abs(view["target"][i] - (bounds["min"][i] + bounds["max"][i]) / 2) < 1e-3 for i in (across, upright)), (view, bounds)
             assert abs(float(view["view_height"]) / max(size[upright], size[across] * height / width) - 1.04) < 1e-2, (view, size)
 
         frames(top, 0, 1)
@@ -294,6 +294,9 @@ def test_clicks_give_coordinates_and_a_distance():
         circle = tab.run("+document.querySelector('#marks circle').getAttribute('cx')")
         tab.drag((x, y), (x + 50, y))
         assert tab.run("+document.querySelector('#marks circle').getAttribute('cx')") != circle
+        texts = tab.run("""import('/viewer/measure.js').then(m => [[[0, 0, 0], [3.496, 0, -0.233]], [[0, 0, 0], [0.3, 0, -0.0001]]].map(
+            points => m.measure(points, 'length', 'm').map(({text}) => text)))""")
+        assert texts == [["3.504 m", "-0.233 m", "3.496 m"], ["300.0 mm", "-0.1 mm", "300.0 mm"]], texts  # one unit for all
         tab.key("Escape")
         tab.until("!document.querySelector('#marks').children.length && document.querySelector('#clear').disabled")
         settled(tab)
