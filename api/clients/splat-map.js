@@ -6,15 +6,24 @@
 //
 // Attributes: dataset; src (the service; by default where this file came from); photo and surface, how each layer's tiles are
 // drawn: parameters of api/maps.md, or all that stands behind the '?' of a URL of `splatd sign …/tiles/{z}/{x}/{y}.png?…`.
-// `surface=""` leaves that one out. The element's `map` is Leaflet's, there from its event `ready` on.
+// `surface=""` leaves that one out. legend: parameters of …/legend.svg, by default what the surface says of its colours; beside a
+// signed surface all that stands behind the '?' of a signed legend, since a signature for tiles is none for legends. The element's `map` is Leaflet's, there from its event `ready` on.
 //
 // For maps of your own: `await openTiles(L, service, "hall", "class=!3-5")` gives {layer, crs, bounds, toLatLng, info}.
+
+/* A browser does not say why a script got no answer. */
+function unread(service) {
+  const origin = location.origin === "null" ? "'*'" : location.origin; // a file has none
+  return `No answer from ${service} that this page may read: either it cannot be reached, or it was started without --cors ${origin}`;
+}
 
 /** One way to draw a dataset from above: a layer of Leaflet's, and the coordinate system that its map must have. */
 export async function openTiles(L, service, dataset, query = "") {
   const address = new URL(`/v1/datasets/${encodeURIComponent(dataset)}/tiles.json`, service);
   address.search = query;
-  const reply = await fetch(address);
+  const reply = await fetch(address).catch(() => {
+    throw new Error(unread(service));
+  });
   const info = await reply.json();
   if (!reply.ok) throw new Error(info.detail ?? `${reply.status} of ${address}`);
   const {scheme, corner: [west, north], side, bounds: [x0, y0, x1, y1]} = info.splatd;
@@ -29,6 +38,12 @@ export async function openTiles(L, service, dataset, query = "") {
   // a hair less than all, or rounding would ask for tiles that lie beside and are none
   const layer = L.tileLayer(template, {bounds: bounds.pad(-1e-9), maxZoom, noWrap: true});
   return {layer, crs, bounds, info, maxZoom, toLatLng: (x, y) => L.latLng(y, x)};
+}
+
+/* What a query says of colours, as parameters of a legend; "" where it says none. */
+function colorsOf(given) {
+  const names = ["color_by", "ramp", "range"].filter((name) => given.has(name));
+  return given.has("color_by") ? names.map((name) => `${name}=${encodeURIComponent(given.get(name))}`).join("&") : "";
 }
 
 const named = (name, value, unit) => `${name} ${value.toFixed(unit === "°" ? 7 : 2)}${unit}`;
@@ -75,16 +90,21 @@ class SplatMap extends HTMLElement {
     this.dispatchEvent(new Event("ready"));
   }
 
-  /* What the surface's colours mean; a signature for tiles is none for legends. */
+  /* What the surface's colours mean, or nothing where it has none or `legend` is empty. */
   #legend(service, dataset, query) {
-    const given = new URLSearchParams(query), asked = new URLSearchParams();
-    for (const name of ["color_by", "ramp", "range"]) if (given.has(name)) asked.set(name, given.get(name));
-    if (!asked.has("color_by") || given.has("sig")) return undefined;
+    const given = new URLSearchParams(query), asked = this.getAttribute("legend") ?? colorsOf(given);
+    const of = new URLSearchParams(asked).get("color_by") ?? given.get("color_by");
+    if (!asked || !of) return undefined;
+    if (given.has("sig") && !this.hasAttribute("legend")) {
+      console.warn(`<splat-map>: no legend: a signature for tiles is none for legends. Sign …/legend.svg?${asked} and say legend="${asked}&exp=…&sig=…"`);
+      return undefined;
+    }
     const control = L.control({position: "bottomright"});
     control.onAdd = () => {
       const image = document.createElement("img");
-      image.src = new URL(`/v1/datasets/${encodeURIComponent(dataset)}/legend.svg?${asked}`, service);
-      image.alt = `Legend: ${asked.get("color_by")}`;
+      const address = new URL(`/v1/datasets/${encodeURIComponent(dataset)}/legend.svg`, service);
+      image.src = `${address}?${asked}`; // as it was signed, sign by sign
+      image.alt = `Legend: ${of}`;
       return image;
     };
     return control;

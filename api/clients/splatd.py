@@ -29,11 +29,13 @@ CAMERA = ("eye", "target", "up", "station", "fov", "fx", "fy", "cx", "cy", "proj
 
 
 class SplatdError(Exception):
-    """What the service refused: `status`, `field` (the parameter at fault, or ""), and its words."""
+    """What the service refused: `status`, `field` (the parameter at fault, or ""), and its words. `status` is 0 where it gave
+    no answer; the words name its address then."""
 
     def __init__(self, status, problem):
         self.status, self.field = status, problem.get("field", "")
-        super().__init__(f"{status}: {problem.get('detail') or problem.get('title') or 'no reason given'}")
+        said = problem.get("detail") or problem.get("title") or "no reason given"
+        super().__init__(f"{status}: {said}" if status else said)
 
 
 class View:
@@ -324,6 +326,9 @@ class Splatd:
                     except ValueError:
                         problem = {"title": error.reason}
                     raise SplatdError(error.code, problem) from None
+            except OSError as error:  # URLError is one, a connection that ends in the middle another
+                reason = getattr(error, "reason", error)
+                raise SplatdError(0, {"detail": f"no answer from {self.url}: {reason}"}) from error
             time.sleep(wait)
 
     def locate(self, path):

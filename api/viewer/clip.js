@@ -9,8 +9,8 @@ const $ = (id) => document.getElementById(id);
 const STEPS = 500,
   LEAST = 1e-3; // of a side, as a share of the dataset's size
 
-/** 1, 2 or 5 times a power of ten, near x. */
-function rounded(x) {
+/** 1, 2 or 5 times a power of ten, not above x. */
+export function roundDown(x) {
   const power = 10 ** Math.floor(Math.log10(x));
   return [5, 2, 1].find((n) => n * power <= x * 1.001) * power;
 }
@@ -19,7 +19,8 @@ function rounded(x) {
 export const FACES = [0, 1, 2].flatMap((axis) => [-1, 1].map((side) => ({axis, side, name: `${side < 0 ? "Low" : "High"} ${"xyz"[axis]}`})));
 
 export class Clip extends EventTarget {
-  /** Fires "input" while a control moves and "change" when one has been set. */
+  /** Fires "input" while a control moves, "change" when one has been set, and "section" when one has been chosen; detail: the
+   * section, or null for none. */
   constructor(stage) {
     super();
     this.stage = stage;
@@ -37,7 +38,10 @@ export class Clip extends EventTarget {
       if (target.checkValidity() && Number(target.value) > 0) this.setSection({thick: Number(target.value)});
     });
     $("clip-rest").addEventListener("change", ({target}) => this.write({...this.state, rest: target.value}));
-    $("clip-clear").addEventListener("click", () => this.set({box: null, section: null, rest: ""}));
+    $("clip-clear").addEventListener("click", () => {
+      this.set({box: null, section: null, rest: ""});
+      this.tellSection();
+    });
   }
 
   get state() {
@@ -120,8 +124,13 @@ export class Clip extends EventTarget {
     const {camera} = this.stage,
       normal = AXES[name] ?? unit(axes(camera).forward);
     const [low, high] = span(this.dataset.bounds, normal);
-    const thick = this.section?.thick ?? rounded((high - low || this.size) / 20);
+    const thick = this.section?.thick ?? roundDown((high - low || this.size) / 20);
     this.set({section: name ? {axis: name, normal, at: along(normal, camera.target), thick} : null});
+    this.tellSection();
+  }
+
+  tellSection() {
+    this.dispatchEvent(new CustomEvent("section", {detail: this.section}));
   }
 
   set(values, moving = false) {
@@ -137,7 +146,8 @@ export class Clip extends EventTarget {
   }
 
   lengthText(x) {
-    return withUnit(x.toFixed(Math.min(3, this.digits)), this.dataset.unit);
+    const digits = Math.min(3, this.digits);
+    return withUnit((Number(x.toFixed(digits)) + 0).toFixed(digits), this.dataset.unit);
   }
 
   /** A slider with what it says, from where to where it goes. */

@@ -27,7 +27,9 @@ let asked = false;
 async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
-    const wanted = parse(location.hash);
+    const wrong = [],
+      wanted = parse(location.hash, wrong);
+    for (const what of wrong) console.warn(what); // there is no place for it here but the console
     const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, mark, ...setting} = {
       ...named(dataset, wanted, stage.size),
       ...(await toWorld(dataset, wanted)),

@@ -12,8 +12,9 @@ const isText = (name) => TEXTS.includes(name) || findParameter(name)?.type === "
 /** Is it a number, as a parameter of a view? */
 export const isNumber = (name) => NUMBERS.includes(name) || (Boolean(findParameter(name)) && !isText(name));
 
-/** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out. Needs the table of methods. */
-export function parse(fragment) {
+/** {eye: […], fov: …, layer: …} of a fragment; what is malformed or unknown is left out, and `wrong` gets a sentence about what
+ * is malformed. Needs the table of methods. */
+export function parse(fragment, wrong = []) {
   const found = {};
   for (const [name, text] of new URLSearchParams(fragment.replace(/^#/, "").replaceAll("+", "%2B"))) {
     const numbers = text.split(",").map((part) => (part.trim() ? Number(part) : NaN));
@@ -22,6 +23,8 @@ export function parse(fragment) {
     else if (Object.hasOwn(JOINTS, name)) found[name] = found[name] ? found[name] + JOINTS[name] + text : text;
     else if (name === "mark") (found.mark ??= []).push(text);
     else if (isText(name)) found[name] = text;
+    else if (VECTORS.includes(name)) wrong.push(`${name} of the link is left out: it has to be three numbers, not '${text}'`);
+    else if (isNumber(name)) wrong.push(`${name} of the link is left out: it has to be a number, not '${text}'`);
   }
   return found;
 }

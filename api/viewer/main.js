@@ -17,6 +17,7 @@ import {choices, Picture} from "./picture.js";
 import {named, toWorld} from "./place.js";
 import {Points} from "./points.js";
 import {showPoints} from "./points_panel.js";
+import {attachScaleBar} from "./scale_bar.js";
 import {Problem, askJson, query, setToken} from "./service.js";
 import {attachSides} from "./sides.js";
 import {Soft} from "./soft.js";
@@ -121,7 +122,8 @@ async function open() {
       askJson("/v1/status"),
       loadTable(),
     ]);
-    const wanted = parse(fragment);
+    const wrong = [],
+      wanted = parse(fragment, wrong);
     const ids = datasets.map(({id}) => id);
     if (turn !== opening) return;
     if (!wanted.dataset && datasets.length > 1) return showGallery(datasets, keptOf(wanted));
@@ -157,6 +159,7 @@ async function open() {
     annotations.open(wanted.mark);
     tour.open(id);
     chart.open(dataset);
+    if (wrong.length) say(wrong.join(". "));
   } catch (problem) {
     if (turn !== opening) return;
     stage.close();
@@ -220,7 +223,9 @@ views.addEventListener("choose", ({detail: view}) => {
   stage.setCamera(view ? fromParams(cameraOf(wanted), stage.home) : stage.home);
 });
 $("home").addEventListener("click", () => stage.dataset && stage.setCamera(stage.home));
-attachSides(stage, $);
+const faceSection = attachSides(stage, $);
+clip.addEventListener("section", ({detail}) => stage.dataset && faceSection(detail));
+attachScaleBar(stage, $("scale"));
 $("link").addEventListener("click", () => copied(location.href, "Link"));
 $("curl").addEventListener("click", () => stage.dataset && copied(curl(stage.url(), stage.settings.layer), "Command"));
 $("token").addEventListener("submit", (event) => {

@@ -4,11 +4,11 @@ import {cross, dot, length, sub} from "./camera.js";
 
 /** Units without a name are numbers of metres: "0.201168 m". */
 export const withUnit = (text, unit) => `${text} ${/^\d/.test(unit) ? "× " : ""}${unit}`;
-/** A length in the dataset's unit, as people read it. */
-export const lengthText = (x, unit) =>
-  unit === "m" && Math.abs(x) < 1
+/** A length in the dataset's unit, as people read it; beside others, of which the longest is `most`, in the unit that suits that. */
+export const lengthText = (x, unit, most = x) =>
+  unit === "m" && Math.abs(most) < 1
     ? `${(x * 1000).toFixed(1)} mm`
-    : withUnit(Math.abs(x) < 1 ? Number(x.toPrecision(4)) + 0 : x.toFixed(3), unit);
+    : withUnit(unit !== "m" && Math.abs(x) < 1 ? Number(x.toPrecision(4)) + 0 : (Math.round(x * 1000) / 1000 + 0).toFixed(3), unit);
 const areaText = (x, unit) => withUnit(x < 1 ? x.toPrecision(4) : x.toFixed(3), /^\d/.test(unit) ? `(${unit})²` : `${unit}²`);
 export const angleText = (x) => `${x.toFixed(2)}°`;
 export const coordinates = (p) => p.map((x) => (Math.round(x * 1000) / 1000 + 0).toFixed(3)).join(", ");
@@ -34,11 +34,11 @@ const sum = (list) => list.reduce((a, b) => a + b, 0);
 
 /** [{name, value, unit, text}] of positions, the first being what was asked for. `what`: "length", "area" or "angle". */
 export function measure(points, what, unit) {
-  const n = points.length,
-    of = (name, value, text = lengthText(value, unit), in_ = unit) => ({name, value, unit: in_, text});
+  const n = points.length;
   if (n < 2) return [];
   const lengths = segments(points),
-    [from, to] = [points[0], points[n - 1]],
+    of = (name, value, text = lengthText(value, unit, sum(lengths)), in_ = unit) => ({name, value, unit: in_, text});
+  const [from, to] = [points[0], points[n - 1]],
     way = `${letter(0)} – ${letter(n - 1)}`;
   const steps = lengths.map((x, i) => of(`${letter(i)} – ${letter(i + 1)}`, x));
   if (what === "angle") return n < 3 ? steps : [of("Angle at B", angle(...points), angleText(angle(...points)), "°"), ...steps];

@@ -123,7 +123,7 @@ export class Points extends EventTarget {
       shapes.push(shape("line", {x1, y1, x2, y2}));
       if (what === "length" && n <= LABELS_MOST) {
         const place = {x: (x1 + x2) / 2, y: (y1 + y2) / 2 - 8, "text-anchor": "middle"};
-        shapes.push(shape("text", place, lengthText(lengths[i], dataset.unit)));
+        shapes.push(shape("text", place, lengthText(lengths[i], dataset.unit, lengths.reduce((a, b) => a + b))));
       }
     }
     const [first] = this.measures,

@@ -20,7 +20,7 @@ function fill(list, rows) {
 /** As what a point is drawn, and how far off the points are that its panel stands for. */
 function describePrimitive({primitive, plane}, unit) {
   if (!primitive) return [];
-  const off = plane && [plane.error_mean, plane.error_most].map((x) => lengthText(x, unit));
+  const off = plane && [plane.error_mean, plane.error_most].map((x) => lengthText(x, unit, plane.error_most));
   return [["drawn as", primitive], ...(plane ? [["points off it", `${off[0]}, at most ${off[1]}`]] : [])];
 }
 

@@ -7,6 +7,7 @@ import os
 import pathlib
 import re
 import shlex
+import socket
 import subprocess
 import sys
 import tempfile
@@ -121,6 +122,17 @@ def test_python_refusals():
                 raise RuntimeError("nothing was refused")
             except TypeError as error:
                 assert "'class:3-5'" in str(error) and repr(soft) in str(error), error
+
+
+def test_python_names_a_service_that_is_not_there():
+    with socket.socket() as nobody:  # bound, but it does not listen
+        nobody.bind(("127.0.0.1", 0))
+        address = f"http://127.0.0.1:{nobody.getsockname()[1]}"
+        try:
+            Splatd(address).dataset("wall")
+            raise RuntimeError("nobody answered")
+        except SplatdError as error:
+            assert error.status == 0 and str(error).startswith(f"no answer from {address}: "), error
 
 
 def test_a_busy_service_is_asked_again():

@@ -228,7 +228,8 @@ def test_a_map_of_a_plane_and_its_surface():
 def test_what_goes_wrong_is_said():
     with serving(cors=False) as (d, service), site(service, "yard") as url:
         with page(url, "CORS|Failed to load", ready=False) as tab:
-            assert "Failed to fetch" in tab.until("document.querySelector('splat-map[role=alert]')?.textContent")
+            told = tab.until("document.querySelector('splat-map[role=alert]')?.textContent")
+            assert f"No answer from {service} " in told and told.endswith(f" --cors {url}"), told
     with serving() as (d, service):
         for dataset, more, said in (("none", {}, "there is no dataset 'none'"), ("yard", {"photo": "lod=-1"}, "lod"),
                                     ("yard", {"surface": "color_by=nothing"}, "nothing")):
@@ -244,14 +245,20 @@ def test_a_public_map_needs_no_token():
         tokens.chmod(0o600)
         key.chmod(0o600)
         with serving("--tokens", str(tokens), "--url-key", str(key)) as (d, service):
-            signed = {name: sign(f"/v1/datasets/yard/tiles/{{z}}/{{x}}/{{y}}.png{query}", KEY).partition("?")[2]
-                      for name, query in (("photo", ""), ("surface", "?color_by=height&shade=edl"))}
+            tiles = "tiles/{z}/{x}/{y}.png"
+            signed = {name: sign(f"/v1/datasets/yard/{path}", KEY).partition("?")[2] for name, path in (
+                ("photo", tiles), ("surface", f"{tiles}?color_by=height&shade=edl"), ("legend", "legend.svg?color_by=height&ramp=viridis"))}
+            with site(service, "yard", photo=signed["photo"], surface=signed["surface"]) as url, page(url, "no legend") as tab:
+                tab.run("document.querySelectorAll('.leaflet-control-layers-base input')[1].click()")
+                said = [c for c in tab.complaints if "legend.svg?color_by=height and say legend=" in c]
+                assert len(said) == 1 and not tab.run("document.querySelector('splat-map img[src*=legend]')"), tab.complaints
             with site(service, "yard", **signed) as url, page(url) as tab:
                 pixels = look(tab, RED[1], RED[0], 3)
                 assert is_red(pixels).sum() > 400
                 addresses = tab.run("[...document.querySelectorAll('img.leaflet-tile')].map(i => i.src)")
                 assert addresses and all("sig=" in a and "token" not in a for a in addresses), addresses
                 tab.run("document.querySelectorAll('.leaflet-control-layers-base input')[1].click()")
+                tab.until("(i => i && i.complete && i.naturalWidth > 20)(document.querySelector('splat-map img[src*=legend]'))")
                 still(tab)
                 assert not is_red(pixels_of(tab)[200:600, 200:600]).any()
             with site(service, "yard", photo=signed["photo"][:-1] + ("A" if signed["photo"][-1] != "A" else "B")) as url, page(url, "Failed to load", ready=False) as tab:

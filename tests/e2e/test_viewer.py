@@ -168,12 +168,22 @@ def test_plans_and_elevations():
         top = next_link(tab, lambda now: now.get("projection") == "orthographic")
         assert settled(tab, before)[1] > 0 and "fov" not in top and far(top["eye"][:2], top["target"][:2]) < 1e-6
         assert top["eye"][2] > top["target"][2] and top["up"] == [0, 1, 0]
-        high = 2 * far(home["eye"], home["target"]) * math.tan(math.radians(float(home["fov"])) / 2)
-        assert abs(float(top["view_height"]) / high - 1) < 1e-3, (top, home)
+        bounds = daemon.ask("/v1/datasets/wall").json()["bounds"]
+        size, (width, height) = [b - a for a, b in zip(bounds["min"], bounds["max"])], tab.run("[stage.clientWidth, stage.clientHeight]")
+
+        def frames(view, across, upright):  # the whole of it, in the middle, in the picture's aspect
+            assert all(abs(view["target"][i] - (bounds["min"][i] + bounds["max"][i]) / 2) < 1e-3 for i in (across, upright)), (view, bounds)
+            assert abs(float(view["view_height"]) / max(size[upright], size[across] * height / width) - 1.04) < 1e-2, (view, size)
+
+        frames(top, 0, 1)
+        long, unit = tab.text("#scale").split()
+        bar = tab.run("document.querySelector('#scale i').getBoundingClientRect().width")
+        assert abs(bar * float(top["view_height"]) / height / float(long) - 1) < 0.02 and unit == "us-ft" and re.fullmatch(r"0\.0*[125]|[125]0*", long), (bar, long)
         assert tab.run("document.querySelector('#top').ariaPressed") == "true"
         tab.run("document.querySelector('#front').click()")
         front = next_link(tab, lambda now: now["up"] == [0, 0, 1] and "projection" in now)
         assert abs(front["eye"][2] - front["target"][2]) < 1e-6 and front["eye"][1] < front["target"][1]
+        frames(front, 0, 2)
         tab.run("document.querySelector('#front').click()")
         again = next_link(tab, lambda now: "fov" in now)
         assert far(again["eye"], home["eye"]) < 0.01 and tab.run("document.querySelector('#front').ariaPressed") == "false"
@@ -284,6 +294,9 @@ def test_clicks_give_coordinates_and_a_distance():
         circle = tab.run("+document.querySelector('#marks circle').getAttribute('cx')")
         tab.drag((x, y), (x + 50, y))
         assert tab.run("+document.querySelector('#marks circle').getAttribute('cx')") != circle
+        texts = tab.run("""import('/viewer/measure.js').then(m => [[[0, 0, 0], [3.496, 0, -0.233]], [[0, 0, 0], [0.3, 0, -0.0001]]].map(
+            points => m.measure(points, 'length', 'm').map(({text}) => text)))""")
+        assert texts == [["3.504 m", "-0.233 m", "3.496 m"], ["300.0 mm", "-0.1 mm", "300.0 mm"]], texts  # one unit for all
         tab.key("Escape")
         tab.until("!document.querySelector('#marks').children.length && document.querySelector('#clear').disabled")
         settled(tab)
@@ -663,6 +676,10 @@ def test_the_first_view_fits_the_window():
 
 
 def test_wrong_links_say_so():
+    with page(f"{SITE}/#dataset=wall&eye=1,2&target=0,0,1&fov=wide", ready=f"{REST} && !!document.querySelector('#said').textContent") as tab:
+        told = tab.text("#said")
+        assert "eye of the link is left out: it has to be three numbers, not '1,2'" in told and "fov of the link is left out" in told, told
+        assert "target" not in told, told
     with page(f"{SITE}/?dataset=wall", ready="document.querySelector('.problem') !== null", complaints="400") as tab:
         assert "dataset" in tab.text(".problem p")
         tab.press_on(".problem a")
@@ -1056,6 +1073,8 @@ def test_a_clip_box_has_handles():
         higher = next_link(tab, lambda link: link["clip"].split(" and ")[0] != turned)["clip"]
         assert float(higher.split(",")[2]) > float(turned.split(",")[2]) and far(link(tab)["eye"], (3, 0, 1)) < 1e-3, "the view stays"
         tab.choose("#section-axis", "z")
+        plan = next_link(tab, lambda link: "projection" in link)  # a section is looked at as a plan
+        assert far(plan["eye"][:2], plan["target"][:2]) < 1e-6 and tab.run("document.querySelector('#top').ariaPressed") == "true", plan
         assert re.search(r" and z:[\d.]+\.\.[\d.]+ and z<1.8$", next_link(tab, lambda link: " and z:" in link["clip"])["clip"])
         tab.choose("#section-thick", "0.4")
         tab.run("(e => { e.value = 1; e.dispatchEvent(new Event('input')); })(document.querySelector('#section-at'))")
@@ -1065,7 +1084,8 @@ def test_a_clip_box_has_handles():
         assert "-0.2<plane:" in next_link(tab, lambda link: "plane:" in link["clip"])["clip"]
         assert tab.run("document.documentElement.scrollWidth <= innerWidth")
         tab.press_on("#clip-clear")
-        next_link(tab, lambda link: "clip" not in link)
+        last = next_link(tab, lambda link: "clip" not in link and "fov" in link)  # and without it, as before
+        assert far(last["eye"], (3, 0, 1)) < 1e-3 and far(last["target"], (0, 0, 1)) < 1e-3, last
         assert tab.run(f"{ROUND}.hidden")
         again = """import('/viewer/clip_terms.js').then(({parseClip, formatClip}) => JSON.parse('%s').map(text =>
             formatClip(parseClip(text), 3, [0, 0, 0])))"""
