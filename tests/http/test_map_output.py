@@ -97,10 +97,13 @@ def test_geotiffs_are_where_they_say():
             assert d.ask(f"{PLAN}&format=tiff").json()["field"] == "format"
         return
     with Daemon(REAL, datasets=[TREE]) as d:
-        tags, color = read_tiff(d.ask(f"{PLAN}&transparent=true&format=tiff").body)
+        tags, color = read_tiff(d.ask(f"{PLAN}&format=tiff").body)
         assert tags[SCALE] == (0.25, 0.25, 0) and tags[TIEPOINT] == (0, 0, 0, 10.125 - 12, 9.25 + 8, 0), tags
         assert tags[KEYS] == (1, 1, 1, 1, 1025, 0, 1, 1) and tags[338] == (2,) and NODATA not in tags, tags
-        assert d.ask(f"{PLAN}&transparent=true&format=raw").body == color
+        assert d.ask(f"{PLAN}&transparent=true&format=raw").body == color and 0 in color[3::4]
+        for opaque in ("background=black", "transparent=false"):
+            assert read_tiff(d.ask(f"{PLAN}&{opaque}&format=tiff").body)[1] == d.ask(f"{PLAN}&format=raw").body, opaque
+        assert read_tiff(d.ask(f"{PLAN}&background=red&transparent=true&format=tiff").body)[1][3::4] == color[3::4]
         reply = d.ask(f"{PLAN}&layer=depth&format=tiff")
         assert reply.headers["Content-Type"] == "image/tiff" and reply.headers["Splatd-Height-Unit"]
         assert "Splatd-Depth-Unit" not in reply.headers
