@@ -429,7 +429,7 @@ def test_a_matrix_may_be_rows():
 
 
 def test_a_wrong_path_is_told_what_there_is():
-    with Daemon(FAKE) as d:
+    with Daemon(REAL) as d:
         for path, known in (("/v1/datasets/wall/veiw", "below /v1/datasets/{id}/ there are profile, "), ("/v1/tours/a/b/c", "below /v1/tours/{name}/ "
                             "there are events, "), ("/v1/dataset", "below /v1/ there are "), ("/v2", "/ lists what there is")):
             reply = d.ask(path)
