@@ -41,8 +41,8 @@ static int next_line(struct spl_source *source, const char **line, size_t *lengt
     return code;
 }
 
-/* A line of numbers and not of names; "1,5;2,5" is one too, and refused as such when it is read. Where columns are known,
- * x, y and z say it: others may hold names. `layout` may be NULL: then it is the first field. */
+/* A line of numbers and not of names; "1,5;2,5" is one too, and refused as such when it is read. Where columns are
+ * known, x, y and z say it: others may hold names. `layout` may be NULL: then it is the first field. */
 static bool is_data(const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));

@@ -20,7 +20,8 @@
 const bool spl_tiff_is_built = true;
 
 enum { strip_bytes = 64 << 10, header_bytes_max = 1 << 20 };
-enum { MODEL_PIXEL_SCALE = 33550, MODEL_TIEPOINT = 33922, MODEL_TRANSFORMATION = 34264, GEO_KEYS = 34735, GEO_DOUBLES, GEO_TEXT };
+enum { MODEL_PIXEL_SCALE = 33550, MODEL_TIEPOINT = 33922, MODEL_TRANSFORMATION = 34264 };
+enum { GEO_KEYS = 34735, GEO_DOUBLES, GEO_TEXT };
 enum { GDAL_METADATA = 42112, GDAL_NODATA };
 enum { MODEL_TYPE = 1024, RASTER_TYPE = 1025, CITATION = 1026, GEOGRAPHIC_TYPE = 2048, PROJECTED_TYPE = 3072 };
 enum { LINEAR_UNIT = 3076, LINEAR_UNIT_SIZE = 3077 };
@@ -117,8 +118,8 @@ static TIFF *open_memory(struct memory *m)
     return tiff;
 }
 
-/* A system without a number: some plane, of which only the unit is known. Neither projected nor geographic, since readers
- * would take a datum for granted then. */
+/* A system without a number: some plane, of which only the unit is known. Neither projected nor geographic, since
+ * readers would take a datum for granted then. */
 static bool set_plane(TIFF *tiff, const char *unit)
 {
     static const struct {
@@ -152,8 +153,8 @@ static bool set_heights(TIFF *tiff, const char *unit)
         return false;
     if (!spl_unit_parse(unit, &metres) || !(metres > 0))
         return true;
-    snprintf(text, sizeof text, "<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">%.31s</Item></GDALMetadata>",
-             unit);
+    snprintf(text, sizeof text,
+             "<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">%.31s</Item></GDALMetadata>", unit);
     return TIFFSetField(tiff, GDAL_METADATA, text) == 1;
 }
 
