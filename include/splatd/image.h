@@ -71,7 +71,7 @@ struct spl_encode_options {
     int quality;          /* JPEG and WebP, 1..100; 0 = 90 */
     int chroma;           /* JPEG: 420 (colour at half the resolution) or 444; 0 = 444 from quality 95 on, else 420 */
     double depth_scale;   /* steps per unit in 16 bit PNG; 0 = 1000 (millimetres of a metre dataset, ROS REP 118) */
-    char unit[32];        /* of distances, for the note that a 16 bit PNG carries: "m", "ft"; "" = "unit" */
+    char unit[32];        /* of distances, for what 16 bit PNG and GeoTIFF say: "m", "ft"; "" = "unit" */
     struct spl_ground ground; /* of GeoTIFF, which is refused without */
     bool list;            /* NPY of an image of one column, of rays: (n), not (n,1); (n,4), not (n,1,4) */
 };

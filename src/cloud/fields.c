@@ -169,6 +169,8 @@ enum spl_field spl_fields_text(struct spl_fields *fields, size_t *length)
         return SPL_FIELD_END;
     if (*p == '"') {
         const char *close = memchr(p + 1, '"', (size_t)(fields->end - p - 1));
+        while (close && close + 1 < fields->end && close[1] == '"')
+            close = memchr(close + 2, '"', (size_t)(fields->end - close - 2));
         if (!close)
             return SPL_FIELD_BAD;
         fields->start = p + 1;

@@ -30,7 +30,8 @@ static inline struct spl_fields spl_fields_begin(const char *line, size_t length
 /* Takes the next field as a number; a separator at the end of the line opens no field. */
 enum spl_field spl_fields_number(struct spl_fields *fields, double *value);
 
-/* Takes the next field whatever it is; its text is [fields->start, fields->start + *length), quotes taken off. */
+/* Takes the next field whatever it is; its text is [fields->start, fields->start + *length), quotes taken off;
+ * "" within quotes is a quotation mark, and stays as it is written. */
 enum spl_field spl_fields_text(struct spl_fields *fields, size_t *length);
 
 /* Fields of a line, and whether there is nothing but blanks. */

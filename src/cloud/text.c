@@ -41,13 +41,23 @@ static int next_line(struct spl_source *source, const char **line, size_t *lengt
     return code;
 }
 
-/* A line of numbers and not of names; "1,5;2,5" is one too, and refused as such when it is read. */
-static bool is_data(const char *line, size_t length)
+/* A line of numbers and not of names; "1,5;2,5" is one too, and refused as such when it is read. Where columns are
+ * known, x, y and z say it: others may hold names. `layout` may be NULL: then it is the first field. */
+static bool is_data(const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
-    double ignored;
-    enum spl_field got = spl_fields_number(&fields, &ignored);
-    return got == SPL_FIELD_OK || (got == SPL_FIELD_BAD && strchr("+-.0123456789", *fields.start));
+    for (unsigned i = 0; i < (layout ? layout->fields : 1); i++) {
+        struct spl_fields field = fields;
+        bool counts = !layout || (layout->column[i] >= SPL_COLUMN_X && layout->column[i] <= SPL_COLUMN_Z);
+        double number;
+        size_t text;
+        enum spl_field got = spl_fields_number(&field, &number);
+        if (counts && (got == SPL_FIELD_OK || (got == SPL_FIELD_BAD && strchr("+-.0123456789", *field.start))))
+            return true;
+        if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
+            return false;
+    }
+    return false;
 }
 
 static bool is_count(const char *line, size_t length, uint64_t *count)
@@ -102,7 +112,7 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
         &cloud->source, cloud->source.line, lacks, err,
         "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
         "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
-        "with --columns%s",
+        "with --columns, '-' for one that is none of them%s",
         length < shown ? (int)length : shown, line, length < shown ? "" : "…",
         spl_text_names_degrees(line, length)
             ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
@@ -148,10 +158,8 @@ static int take_preamble(struct spl_cloud *cloud, bool *named, const char **line
                 return code;
             continue;
         }
-        if (is_data(*line, *length))
+        if (header || is_data(*named ? layout : NULL, *line, *length)) /* only one line has names */
             return SPL_OK;
-        if (header)
-            return spl_source_fail_line(source, source->line, "", err, "is neither numbers nor a comment");
         header = true;
         if (option)
             continue;
@@ -279,14 +287,20 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
         int column = layout->column[i];
         enum spl_field got =
             column >= 0 ? spl_fields_number(&fields, &rows->value[column][row]) : spl_fields_text(&fields, &ignored);
-        if (got != SPL_FIELD_OK && column >= SPL_COLUMN_INTENSITY &&
+        if (got != SPL_FIELD_OK && (column < 0 || column >= SPL_COLUMN_INTENSITY) &&
             is_empty(&fields, i + 1 == layout->fields, line, length)) {
-            rows->value[column][row] = (double)NAN;
+            if (column >= 0)
+                rows->value[column][row] = (double)NAN;
             got = spl_fields_text(&fields, &ignored) == SPL_FIELD_BAD ? SPL_FIELD_BAD : SPL_FIELD_OK;
         }
         if (got == SPL_FIELD_END)
             return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, column), err,
                                         "column %u of %u is missing", i + 1, layout->fields);
+        if (got == SPL_FIELD_BAD && column < 0)
+            return spl_source_fail_line(source, source->line, "", err,
+                                        "column %u, which is skipped, has a quotation mark without its other one, or "
+                                        "something behind that",
+                                        i + 1);
         if (got == SPL_FIELD_BAD)
             return refuse_number(cloud, layout, i, &fields, err);
     }

@@ -13,7 +13,7 @@ struct spl_layout {
     char separator; /* ' ', ',' or ';' */
 };
 
-/* The separator that a line uses. */
+/* The separator that a line uses outside of "quoted text". */
 char spl_text_separator(const char *line, size_t length);
 
 /* From a line of names. False when there are more than SPL_TEXT_FIELDS; unknown names are skipped columns. */

@@ -11,7 +11,14 @@
 
 char spl_text_separator(const char *line, size_t length)
 {
-    return memchr(line, ';', length) ? ';' : memchr(line, ',', length) ? ',' : ' ';
+    char found = ' ';
+    bool quoted = false;
+    for (size_t i = 0; i < length && found != ';'; i++) {
+        quoted ^= line[i] == '"';
+        if (!quoted && (line[i] == ';' || line[i] == ','))
+            found = line[i];
+    }
+    return found;
 }
 
 static bool has_column(const struct spl_layout *layout, int column)

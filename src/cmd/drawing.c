@@ -172,7 +172,9 @@ void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *da
 
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
 {
-    return spl_cmd_parse_color(option, text, ((struct spl_cmd_drawing *)drawing)->view.background, err);
+    struct spl_cmd_drawing *d = drawing;
+    d->has_background = true;
+    return spl_cmd_parse_color(option, text, d->view.background, err);
 }
 
 int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err)

@@ -14,7 +14,7 @@
 struct spl_cmd_drawing {
     uint32_t size[2];                    /* of --size; else what it was before */
     int format, layer;                   /* enum; format: -1 = not given */
-    bool no_verify;
+    bool no_verify, has_background;      /* the latter: --background was given */
     const char *output;                  /* argument of -o; NULL = not given */
     char soft_option[24];                /* the last of those that say how what is soft is drawn; "" = none */
     struct spl_view view;                /* all but the camera */
@@ -59,7 +59,7 @@ void spl_cmd_print_methods(FILE *out, size_t column);
      SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
         {"supersample", "N", "samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
          .otherwise = "1", SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                           \
-        {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black",        \
+        {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black, of a GeoTIFF transparent", \
          .take = spl_cmd_take_background},                                                                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
         {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \

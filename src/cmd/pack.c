@@ -19,6 +19,7 @@
 #include "cmd/pack_report.h"
 #include "cmd/table.h"
 #include "geom/unit.h"
+#include "service/datasets/catalog.h"
 
 /* Of the dataset; of the scan while photographs or maps are put onto it, and of its points where it has panels; and the
  * parts of these two. */
@@ -384,6 +385,17 @@ static int check(const struct arguments *a, struct spl_error *err)
     return contradiction ? spl_fail(err, SPL_E_USAGE, "%s", contradiction) : SPL_OK;
 }
 
+/* A file may have any name, a dataset that is served may not. */
+static void warn_of_name(const char *path)
+{
+    size_t length;
+    if (spl_catalog_id_of(path, &length))
+        return;
+    fputs("splatd: warning: '", stderr);
+    spl_cmd_put_text(stderr, path, 0);
+    fputs("' cannot be served under this name: an id has at most " SPL_CATALOG_ID_RULE "\n", stderr);
+}
+
 int spl_cmd_pack(int argc, char **argv)
 {
     struct spl_cmd_pack_listener listener = {0};
@@ -414,6 +426,7 @@ int spl_cmd_pack(int argc, char **argv)
     a.maps.images = a.photos.cameras ? NULL : a.photos.images; /* a second list's photographs lie where that says */
     a.maps.find = !a.wants_maps;
     a.pack.maps = a.no_panoramas || (a.maps.find && (a.pack.photos || a.pack.points_only)) ? NULL : &a.maps;
+    warn_of_name(a.pack.output);
     catch_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);

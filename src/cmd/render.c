@@ -222,6 +222,8 @@ static int resolve_format(struct arguments *a, struct spl_error *err)
                         "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
+    if (a->drawing.format == SPL_FORMAT_TIFF && !a->drawing.has_background)
+        a->drawing.view.background[3] = 0; // a map lies over others
     a->drawing.encode.list = a->rays_file;
     if (a->rays_file && a->drawing.format != SPL_FORMAT_NPY && a->drawing.format != SPL_FORMAT_RAW)
         return spl_fail(err, SPL_E_USAGE, "--rays are written as .npy, .json or --format raw, not %s",

@@ -14,14 +14,18 @@
 
 #include "base/memory.h"
 #include "geom/ground.h"
+#include "geom/unit.h"
 #include "image/encode.h"
 
 const bool spl_tiff_is_built = true;
 
 enum { strip_bytes = 64 << 10, header_bytes_max = 1 << 20 };
-enum { MODEL_PIXEL_SCALE = 33550, MODEL_TIEPOINT = 33922, MODEL_TRANSFORMATION = 34264, GEO_KEYS = 34735, GDAL_NODATA = 42113 };
-enum { MODEL_TYPE = 1024, RASTER_TYPE = 1025, GEOGRAPHIC_TYPE = 2048, PROJECTED_TYPE = 3072 };
-enum { PROJECTED = 1, GEOGRAPHIC = 2, PIXEL_IS_AREA = 1 };
+enum { MODEL_PIXEL_SCALE = 33550, MODEL_TIEPOINT = 33922, MODEL_TRANSFORMATION = 34264 };
+enum { GEO_KEYS = 34735, GEO_DOUBLES, GEO_TEXT };
+enum { GDAL_METADATA = 42112, GDAL_NODATA };
+enum { MODEL_TYPE = 1024, RASTER_TYPE = 1025, CITATION = 1026, GEOGRAPHIC_TYPE = 2048, PROJECTED_TYPE = 3072 };
+enum { LINEAR_UNIT = 3076, LINEAR_UNIT_SIZE = 3077 };
+enum { PROJECTED = 1, GEOGRAPHIC = 2, PIXEL_IS_AREA = 1, USER_DEFINED = 32767 };
 
 /* A file in memory. */
 struct memory {
@@ -114,29 +118,71 @@ static TIFF *open_memory(struct memory *m)
     return tiff;
 }
 
-static bool set_ground(TIFF *tiff, const struct spl_ground *ground, bool heights)
+/* A system without a number: some plane, of which only the unit is known. Neither projected nor geographic, since
+ * readers would take a datum for granted then. */
+static bool set_plane(TIFF *tiff, const char *unit)
+{
+    static const struct {
+        const char *name;
+        uint16_t epsg;
+    } known[] = {{"m", 9001}, {"ft", 9002}, {"us-ft", 9003}};
+    double metres = 0;
+    char citation[96];
+    uint16_t code = USER_DEFINED;
+    if (!spl_unit_parse(unit, &metres) || !(metres > 0)) {
+        const uint16_t keys[] = {1, 1, 1, 1, RASTER_TYPE, 0, 1, PIXEL_IS_AREA};
+        return TIFFSetField(tiff, GEO_KEYS, 8, keys) == 1;
+    }
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        code = strcmp(known[i].name, unit) ? code : known[i].epsg;
+    snprintf(citation, sizeof citation, "no EPSG number; units are %.31s|", unit); /* '|' ends a text */
+    const uint16_t keys[] = {1, 1, 1, 4 + (code == USER_DEFINED), MODEL_TYPE, 0, 1, USER_DEFINED,
+                             RASTER_TYPE, 0, 1, PIXEL_IS_AREA, CITATION, GEO_TEXT, (uint16_t)strlen(citation), 0,
+                             LINEAR_UNIT, 0, 1, code, LINEAR_UNIT_SIZE, GEO_DOUBLES, 1, 0};
+    return TIFFSetField(tiff, GEO_KEYS, code == USER_DEFINED ? 24 : 20, keys) == 1 &&
+           TIFFSetField(tiff, GEO_TEXT, citation) == 1 &&
+           (code != USER_DEFINED || TIFFSetField(tiff, GEO_DOUBLES, 1, &metres) == 1);
+}
+
+/* Heights: where there is nothing, and their unit, as GDAL says both. */
+static bool set_heights(TIFF *tiff, const char *unit)
+{
+    char text[160];
+    double metres;
+    if (TIFFSetField(tiff, GDAL_NODATA, "nan") != 1)
+        return false;
+    if (!spl_unit_parse(unit, &metres) || !(metres > 0))
+        return true;
+    snprintf(text, sizeof text,
+             "<GDALMetadata><Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">%.31s</Item></GDALMetadata>", unit);
+    return TIFFSetField(tiff, GDAL_METADATA, text) == 1;
+}
+
+static bool set_ground(TIFF *tiff, const struct spl_ground *ground, const char *unit, bool heights)
 {
     static const TIFFFieldInfo fields[] = {
         {MODEL_PIXEL_SCALE, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, (char *)"ModelPixelScale"},
         {MODEL_TIEPOINT, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, (char *)"ModelTiepoint"},
         {MODEL_TRANSFORMATION, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, (char *)"ModelTransformation"},
         {GEO_KEYS, -1, -1, TIFF_SHORT, FIELD_CUSTOM, 1, 1, (char *)"GeoKeyDirectory"},
+        {GEO_DOUBLES, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, (char *)"GeoDoubleParams"},
+        {GEO_TEXT, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, (char *)"GeoAsciiParams"},
+        {GDAL_METADATA, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, (char *)"GDAL_METADATA"},
         {GDAL_NODATA, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, (char *)"GDAL_NODATA"},
     };
     const double *o = ground->origin, *a = ground->across, *d = ground->down;
-    uint16_t keys[16] = {1, 1, 1, 1, RASTER_TYPE, 0, 1, PIXEL_IS_AREA};
-    int count = 8;
-    if (ground->epsg >= 1024 && ground->epsg < 32767) {
-        const bool geographic = ground->epsg >= 4000 && ground->epsg < 5000; /* where the list has them */
-        const uint16_t own[] = {1, 1, 1, 3, MODEL_TYPE, 0, 1, geographic ? GEOGRAPHIC : PROJECTED,
-                                RASTER_TYPE, 0, 1, PIXEL_IS_AREA,
-                                geographic ? GEOGRAPHIC_TYPE : PROJECTED_TYPE, 0, 1, (uint16_t)ground->epsg};
-        memcpy(keys, own, sizeof own);
-        count = 16;
-    }
     if (TIFFMergeFieldInfo(tiff, fields, sizeof fields / sizeof *fields))
         return false;
-    bool good = TIFFSetField(tiff, GEO_KEYS, count, keys) == 1;
+    bool good;
+    if (ground->epsg >= 1024 && ground->epsg < 32767) {
+        const bool geographic = ground->epsg >= 4000 && ground->epsg < 5000; /* where the list has them */
+        const uint16_t keys[] = {1, 1, 1, 3, MODEL_TYPE, 0, 1, geographic ? GEOGRAPHIC : PROJECTED,
+                                RASTER_TYPE, 0, 1, PIXEL_IS_AREA,
+                                geographic ? GEOGRAPHIC_TYPE : PROJECTED_TYPE, 0, 1, (uint16_t)ground->epsg};
+        good = TIFFSetField(tiff, GEO_KEYS, 16, keys) == 1;
+    } else {
+        good = set_plane(tiff, unit);
+    }
     if (spl_ground_is_north_up(ground)) {
         good = good && TIFFSetField(tiff, MODEL_PIXEL_SCALE, 3, (double[]){a[0], -d[1], 0}) == 1 &&
                TIFFSetField(tiff, MODEL_TIEPOINT, 6, (double[]){0, 0, 0, o[0], o[1], 0}) == 1;
@@ -144,10 +190,11 @@ static bool set_ground(TIFF *tiff, const struct spl_ground *ground, bool heights
         const double m[16] = {a[0], d[0], 0, o[0], a[1], d[1], 0, o[1], 0, 0, 0, 0, 0, 0, 0, 1};
         good = good && TIFFSetField(tiff, MODEL_TRANSFORMATION, 16, m) == 1;
     }
-    return good && (!heights || TIFFSetField(tiff, GDAL_NODATA, "nan") == 1);
+    return good && (!heights || set_heights(tiff, unit));
 }
 
-static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct spl_ground *ground, uint32_t rows)
+static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct spl_ground *ground, const char *unit,
+                       uint32_t rows)
 {
     const bool color = image->type == SPL_PIXEL_RGBA8, vector = image->type == SPL_PIXEL_F32X3;
     const bool floats = vector || image->type == SPL_PIXEL_F32;
@@ -167,7 +214,7 @@ static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct s
     if (good && samples > 1)
         good = TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, samples == 4 ? 1 : 2, samples == 4 ? &alpha : plain) == 1;
     bool heights = image->layer == SPL_LAYER_DEPTH || image->layer == SPL_LAYER_RANGE;
-    return good && set_ground(tiff, ground, heights);
+    return good && set_ground(tiff, ground, unit, heights);
 }
 
 /* Rows [first, first + count) as they are written. */
@@ -202,8 +249,8 @@ static int write_strips(TIFF *tiff, const struct spl_image *image, const struct 
     return good ? SPL_OK : SPL_E_NOMEM;
 }
 
-int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, struct spl_encoded *out,
-                    struct spl_error *err)
+int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, const char *unit,
+                    struct spl_encoded *out, struct spl_error *err)
 {
     if (!ground->placed)
         return spl_fail_field(err, SPL_E_INPUT, "format", "a GeoTIFF is of a view that is a map");
@@ -214,7 +261,7 @@ int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *grou
     const uint32_t rows = row >= strip_bytes ? 1 : (uint32_t)(strip_bytes / row);
     struct memory m = {.most = bytes + bytes / 64 + header_bytes_max}; /* what deflate cannot press grows by less */
     TIFF *tiff = open_memory(&m);
-    int rc = tiff && set_fields(tiff, image, ground, rows)
+    int rc = tiff && set_fields(tiff, image, ground, unit, rows)
                  ? write_strips(tiff, image, ground, rows, &m, err)
                  : spl_fail(err, SPL_E_INTERNAL, "a TIFF could not be begun: %s", m.message);
     if (!rc && !TIFFFlush(tiff))

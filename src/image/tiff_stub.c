@@ -3,11 +3,12 @@
 
 const bool spl_tiff_is_built = false;
 
-int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, struct spl_encoded *out,
-                    struct spl_error *err)
+int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, const char *unit,
+                    struct spl_encoded *out, struct spl_error *err)
 {
     (void)image;
     (void)ground;
+    (void)unit;
     (void)out;
     return spl_fail_field(err, SPL_E_UNSUPPORTED, "format", "this build makes no GeoTIFF; ask for png and its world file");
 }

@@ -45,10 +45,10 @@ struct spl_marks {
     double middle[3], reach;          /* a sphere that holds it; 0, 0 = not known */
 };
 
-/* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `left` is
- * what works without any, `hint` what may be meant, or NULL. */
+/* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `common` is
+ * what works with any dataset, `hint` what may be meant, or NULL. */
 int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name);
-int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *left,
+int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *common,
                           const char *hint, struct spl_error *err);
 double spl_marks_value_at(const struct spl_stream_values *values, double q); /* that a share q of the splats are below */
 

@@ -24,7 +24,7 @@ int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name)
     return -1;
 }
 
-int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *left,
+int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *common,
                           const char *hint, struct spl_error *err)
 {
     char known[SPL_STREAMS_MAX * (SPL_STREAM_TEXT_MAX + 2)] = "";
@@ -33,9 +33,8 @@ int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name,
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s%s%s%s%s", info->id,
-                          name, used ? known : "none, so that only ", used ? "" : left, used ? "" : " are left",
-                          hint ? "; " : "", hint ? hint : "");
+    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s, and any has %s%s%s",
+                          info->id, name, used ? known : "none", common, hint ? "; " : "", hint ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_term *term, const char *field,
@@ -92,7 +91,8 @@ static int resolve(const struct spl_term *term, double blend, const struct spl_d
     if (out->stream < 0) {
         char hint[SPL_TERMS_HINT_MAX];
         const bool hinted = spl_terms_hint_name(term, info, hint);
-        return spl_marks_refuse_name(info, term->name, field, "shapes are left: axis, plane, box, polygon, x, y and z", hinted ? hint : NULL, err);
+        return spl_marks_refuse_name(info, term->name, field, "x, y, z, box:, polygon:, plane: and axis:",
+                                     hinted ? hint : NULL, err);
     }
     values = spl_dataset_info_get_values(info, (uint32_t)out->stream);
     out->complete = values && values->count == info->leaf_splats;

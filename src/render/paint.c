@@ -88,7 +88,7 @@ static int find_attribute(struct spl_paint *paint, const struct spl_color_params
 {
     paint->stream = spl_marks_find_stream(info, color->name);
     if (paint->stream < 0)
-        return spl_marks_refuse_name(info, color->name, "color_by", "height, normal, plane and flat", NULL, err);
+        return spl_marks_refuse_name(info, color->name, "color_by", "rgb, height, normal, plane: and flat:", NULL, err);
     const enum spl_stream_type type = spl_stream_type_from_name(info->streams[paint->stream].type);
     paint->kind = type == SPL_STREAM_HALF_OCTAVES ? SPL_PAINT_OCTAVES : SPL_PAINT_NUMBERS;
     paint->steps = type == SPL_STREAM_STEPS;

@@ -225,6 +225,36 @@ static void enter(struct request *request, const struct route *route, enum spl_h
         route->handle(request, &call);
 }
 
+/* What is behind `parent`, a start of patterns, in `text`; false where `path` is not below it. */
+static bool list_below(const char *parent, const char *path, char *text, size_t bytes)
+{
+    size_t used = 0, length = strlen(parent);
+    const char *hole = strchr(parent, '{');
+    const char *id = path + (hole ? (size_t)(hole - parent) : length), *behind = hole ? id + strcspn(id, "/") : id;
+    if (strncmp(path, parent, (size_t)(hole ? hole - parent : (ptrdiff_t)length)) || (hole && (behind == id || !*behind)))
+        return false;
+    for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {
+        bool other = strncmp(routes[i].pattern, parent, length) || (!hole && strchr(routes[i].pattern + length, '/'));
+        for (size_t k = 0; k < i && !other; k++)
+            other = !strcmp(routes[k].pattern, routes[i].pattern);
+        if (!other && used < bytes)
+            used += (size_t)snprintf(text + used, bytes - used, "%s%s", used ? ", " : "", routes[i].pattern + length);
+    }
+    return true;
+}
+
+static void refuse_path(struct request *request)
+{
+    static const char *const parents[] = {"/v1/datasets/{id}/", "/v1/tours/{name}/", "/v1/"};
+    char known[384], detail[512] = "there is nothing here; / lists what there is";
+    for (size_t i = 0; i < sizeof parents / sizeof *parents; i++)
+        if (list_below(parents[i], request->uri, known, sizeof known)) {
+            snprintf(detail, sizeof detail, "there is nothing here; below %s there are %s", parents[i], known);
+            break;
+        }
+    spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "", detail);
+}
+
 void spl_route(struct request *request, const char *method)
 {
     if (!request->uri) {
@@ -253,5 +283,5 @@ void spl_route(struct request *request, const char *method)
     if (allowed)
         refuse_method(request, allowed, method);
     else
-        spl_reply_problem(request, MHD_HTTP_NOT_FOUND, "not-found", "", "there is nothing here; / lists what there is");
+        refuse_path(request);
 }

@@ -7,5 +7,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fuzz_cloud(data, size, "", NULL);
     fuzz_cloud(data, size, "", "x,y,z,-,r,g,b");
+    fuzz_cloud(data, size, "", "-,x,y,z");
     return 0;
 }

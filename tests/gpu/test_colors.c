@@ -147,6 +147,7 @@ static void walls_keep_their_colors(void **state)
     }
     splats[count - 1] = (struct make_splat){.position = {0, 0, 0.5}, .normal = {0, 0, 1}, .radius = 0.3f, .color = {200, 180, 160}};
     struct spl_dataset *dataset = make_dataset(splats, count);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     struct spl_view view = looking(origin, 2, 320, 240);
     assert_int_equal(spl_camera_look_at(&view.camera, (double[]){0.4, -1.6, 1.2}, origin, (double[]){0, 0, 1}, NULL), 0);
     size_t wall = 0, gaps = 0, drawn = 0;
@@ -168,7 +169,7 @@ static void walls_keep_their_colors(void **state)
         fail_msg("%zu of %zu pixels are darker, %zu of them around the disc", wall, drawn, gaps);
     spl_frame_finish(&plain);
     spl_frame_finish(&shaded);
-    spl_dataset_close(dataset);
+    done(dataset);
     free(splats);
 }
 

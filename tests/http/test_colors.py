@@ -59,6 +59,7 @@ def test_what_is_wrong_is_named():
         for query, field, says in [("shade=glow", "shade", "glow"), ("shade=none%2Bedl", "shade", "none+edl"), ("shade=sun:1", "shade", "sun"),
                                    ("edl_strength=2", "edl_strength", "2"), ("edl_radius=6", "edl_radius", "6"),
                                    ("edl_radius=1.5", "edl_radius", "1.5"), ("color_by=smell", "color_by", "it has class"),
+                                   ("color_by=hieght", "color_by", "and any has rgb, height, normal, plane: and flat:"),
                                    ("color_by=smell&budget=500ms", "color_by", "smell"), ("color_by=plane:1,2", "color_by", "plane:1,2"),
                                    ("color_by=", "color_by", "empty"), ("color_by=class&color_by=height", "color_by", "color_by"),
                                    ("color_by=height&ramp=jet", "ramp", "jet"),

@@ -5,6 +5,8 @@ import json
 import math
 import os
 import struct
+import subprocess
+import tempfile
 import zipfile
 import zlib
 
@@ -97,10 +99,13 @@ def test_geotiffs_are_where_they_say():
             assert d.ask(f"{PLAN}&format=tiff").json()["field"] == "format"
         return
     with Daemon(REAL, datasets=[TREE]) as d:
-        tags, color = read_tiff(d.ask(f"{PLAN}&transparent=true&format=tiff").body)
+        tags, color = read_tiff(d.ask(f"{PLAN}&format=tiff").body)
         assert tags[SCALE] == (0.25, 0.25, 0) and tags[TIEPOINT] == (0, 0, 0, 10.125 - 12, 9.25 + 8, 0), tags
         assert tags[KEYS] == (1, 1, 1, 1, 1025, 0, 1, 1) and tags[338] == (2,) and NODATA not in tags, tags
-        assert d.ask(f"{PLAN}&transparent=true&format=raw").body == color
+        assert d.ask(f"{PLAN}&transparent=true&format=raw").body == color and 0 in color[3::4]
+        for opaque in ("background=black", "transparent=false"):
+            assert read_tiff(d.ask(f"{PLAN}&{opaque}&format=tiff").body)[1] == d.ask(f"{PLAN}&format=raw").body, opaque
+        assert read_tiff(d.ask(f"{PLAN}&background=red&transparent=true&format=tiff").body)[1][3::4] == color[3::4]
         reply = d.ask(f"{PLAN}&layer=depth&format=tiff")
         assert reply.headers["Content-Type"] == "image/tiff" and reply.headers["Splatd-Height-Unit"]
         assert "Splatd-Depth-Unit" not in reply.headers
@@ -136,6 +141,31 @@ def test_geotiffs_are_where_they_say():
         views = d.post({"format": "tiff", "width": 8, "height": 8, "views": [
             {"camera": {"eye": [x, 0, 9], "target": [x, 0, 0], "view_height": 2}} for x in (0, 5)]}, VIEW + "s")
         assert views.headers["Splatd-Failed"] == "0" and views.body.count(b"image/tiff") == 2
+
+
+def test_geotiffs_say_the_unit_of_a_plane():
+    """Of a dataset whose coordinate system has no number."""
+    if not TIFF:
+        return
+    user, area = (1024, 0, 1, 32767), (1025, 0, 1, 1)
+    with tempfile.TemporaryDirectory() as top:
+        scan, made, out = (os.path.join(top, name) for name in ("scan.xyz", "made.spld", "map.tif"))
+        with open(scan, "w") as file:
+            file.writelines(f"{x / 4} {y / 4} 2\n" for x in range(20) for y in range(20))
+        for unit, keys, numbers in (("us-ft", (3076, 0, 1, 9003), None), ("cm", (3076, 0, 1, 32767, 3077, 34736, 1, 0), (0.01,)), ("unknown", (), None)):
+            subprocess.run([REAL, "pack", scan, "--unit", unit, "-o", made], check=True, capture_output=True)
+            for layer in ("depth", "color"):
+                subprocess.run([REAL, "render", made, "--projection", "orthographic", "--eye", "2,2,9", "--target", "2,2,0", "--units-per-pixel",
+                                "0.5", "--size", "16x16", "--layer", layer, "-o", out], check=True, capture_output=True)
+                with open(out, "rb") as file:
+                    tags, pixels = read_tiff(file.read())
+                text = f"no EPSG number; units are {unit}|"
+                said = (*user, *area, 1026, 34737, len(text), 0, *keys) if keys else area
+                assert tags[KEYS] == (1, 1, 1, len(said) // 4, *said) and tags.get(34736) == numbers, (unit, tags)
+                assert tags.get(34737) == (text if keys else None), (unit, tags)
+                assert (f">{unit}</Item>" in tags.get(42112, "")) == bool(keys and layer == "depth"), (unit, layer, tags)
+                if layer == "color":  # as over HTTP
+                    assert {pixels[3], pixels[-1]} == {0} and 255 in pixels[3::4]
 
 
 def test_world_files_lie_beside_pictures():

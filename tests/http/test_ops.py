@@ -237,7 +237,8 @@ def test_an_address_that_is_taken():
             Daemon(FAKE, "--ops-listen", taken)
             raise AssertionError("it started")
         except AssertionError as error:
-            assert "exit code 1 " in str(error) and taken in str(error), error
+            assert "exit code 1 " in str(error) and f"{taken}: " in str(error), error
+            assert "--ops-listen takes another address" in str(error), error
         with Daemon(FAKE, "--ops-listen", "") as quiet:
             assert quiet.ops_port is None and quiet.ask(SMALL).status == 200
     with socket.socket() as other:
@@ -255,7 +256,7 @@ def test_an_address_that_is_taken():
                 break
         process.send_signal(signal.SIGTERM)
         assert process.wait(30) == 0
-        assert any("warning" in line and "--ops-listen" in line for line in lines), lines
+        assert any("warning" in line and "--ops-listen takes another" in line for line in lines), lines
 
 
 run(globals())

@@ -428,6 +428,17 @@ def test_a_matrix_may_be_rows():
         assert gltf["field"] == "gltf.matrix" and "by columns" in gltf["detail"], gltf
 
 
+def test_a_wrong_path_is_told_what_there_is():
+    with Daemon(REAL) as d:
+        for path, known in (("/v1/datasets/wall/veiw", "below /v1/datasets/{id}/ there are profile, "), ("/v1/tours/a/b/c", "below /v1/tours/{name}/ "
+                            "there are events, "), ("/v1/dataset", "below /v1/ there are "), ("/v2", "/ lists what there is")):
+            reply = d.ask(path)
+            assert reply.status == 404 and known in reply.json()["detail"], reply.body
+        below = d.ask("/v1/datasets/wall/").json()["detail"]
+        assert below.count(" view,") == below.count("tiles/{z}/{x}/{y}") == 1 and below.endswith("rays"), below
+        assert "datasets, " in d.ask("/v1/").json()["detail"]
+
+
 def test_what_is_refused_points_to_what_is_served():
     with Daemon(REAL) as d:
         for reply in [d.view(zoom=1), d.post({"zoom": 1}), d.post({"camera": {"zoom": 1}}), d.post({"views": [{"zoom": 1}]}, VIEW + "s")]:

@@ -118,14 +118,15 @@ bool spl_catalog_may_pass(const struct spl_error *why)
     return why->code == SPL_E_IO || why->code == SPL_E_NOMEM || why->code == SPL_E_NOT_FOUND;
 }
 
-void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, size_t nameless)
+void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, const struct spl_catalog_files *files)
 {
     if (left_out && left_out != catalog->left_out)
         spl_log_warn("%zu datasets are left out: the first %d by name are served", left_out, (int)SPL_CATALOG_MAX);
+    const size_t nameless = files->nameless;
     if (nameless && nameless != catalog->nameless)
-        spl_log_warn("%zu files are left out: their names cannot be ids, which have at most %zu letters, digits, '.', "
-                     "'_' and '-'",
-                     nameless, sizeof((struct spl_dataset_info *)0)->id - 1);
+        spl_log_warn("%zu %s left out, as %s: a name is a dataset's id, which has at most " SPL_CATALOG_ID_RULE
+                     "; rename what is to be served", nameless, nameless == 1 ? "file is" : "files are",
+                     files->nameless_names);
     catalog->left_out = left_out;
     catalog->nameless = nameless;
 }
@@ -229,7 +230,7 @@ int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t pat
     }
     if (files.why.code)
         spl_log_warn("%s; its datasets are not served", files.why.message);
-    spl_catalog_say_left_out(catalog, files.left_out, files.nameless);
+    spl_catalog_say_left_out(catalog, files.left_out, &files);
     spl_parallel_for(0, files.count, 1, open_range, &opening);
     for (size_t i = 0; !rc && i < files.count; i++)
         rc = place(catalog, &files.items[i], &opening.entries[i], &opening.errors[i], err);

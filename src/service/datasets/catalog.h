@@ -49,6 +49,7 @@ struct spl_catalog_file {
 struct spl_catalog_files {
     struct spl_catalog_file *items; /* named files first, then by id; SPL_CATALOG_MAX at most */
     size_t count, capacity, left_out, nameless;
+    char nameless_names[192]; /* of the first, for people */
     const char **unlisted; /* paths that could not be listed, borrowed */
     size_t unlisted_count;
     struct spl_error why; /* of the first of them */
@@ -78,7 +79,7 @@ int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t pat
 bool spl_catalog_may_pass(const struct spl_error *why);
 
 /* Notes how many files a listing has left out; logs it when that is news. */
-void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, size_t nameless);
+void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, const struct spl_catalog_files *files);
 
 /* Gives the references back. */
 void spl_catalog_finish(struct spl_catalog *catalog);

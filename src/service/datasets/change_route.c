@@ -63,7 +63,7 @@ static struct change *begin(struct request *request, const struct spl_call *call
 {
     if (!spl_catalog_id_is_valid(call->id, strlen(call->id))) {
         spl_reply_problem(request, MHD_HTTP_BAD_REQUEST, "input", "id",
-                          "an id has at most 127 letters, digits, '.', '_' and '-', the first of them not a '.'");
+                          "an id has at most " SPL_CATALOG_ID_RULE);
         return NULL;
     }
     const char *ending = strrchr(call->id, '.');

@@ -72,6 +72,8 @@ void spl_catalog_entry_unref(struct spl_catalog_entry *entry); /* NULL-safe; any
 /* Whatever its references say; for its last owner. NULL-safe. Unmaps, which may take a while. */
 void spl_catalog_entry_destroy(struct spl_catalog_entry *entry);
 
+#define SPL_CATALOG_ID_RULE "127 letters a-z and A-Z, digits, '.', '_' and '-', the first of them not a '.'"
+
 /* May `id` (of `length` bytes) be a dataset's id? At most 127 letters, digits, '.', '_' and '-', the first not a '.'.
  */
 bool spl_catalog_id_is_valid(const char *id, size_t length);

@@ -283,7 +283,7 @@ static void after_look(uv_work_t *work, int status)
         for (size_t i = 0; i < look->files.count; i++)
             left_out += !meet(service, &look->files.items[i]);
         drop_missing(service, &look->files);
-        spl_catalog_say_left_out(&service->library->catalog, left_out, look->files.nameless);
+        spl_catalog_say_left_out(&service->library->catalog, left_out, &look->files);
     }
     spl_catalog_files_finish(&look->files);
     free(look);

@@ -56,6 +56,17 @@ static int add_file(struct spl_catalog_files *files, const char *directory, cons
     return 0;
 }
 
+/* Names of files may have any bytes; the log shows what is not printable as such. */
+static void note_nameless(struct spl_catalog_files *files, const char *name)
+{
+    enum { shown = 3 };
+    char *text = files->nameless_names;
+    size_t used = strlen(text);
+    if (files->nameless++ < shown)
+        snprintf(text + used, sizeof files->nameless_names - used, "%s'%.*s%s'", used ? ", " : "", 48, name,
+                 strlen(name) > 48 ? "…" : "");
+}
+
 /* SPL_E_IO for a directory that cannot be read to its end: nobody knows then what it does not have. */
 static int add_directory(struct spl_catalog_files *files, const char *directory, size_t place, struct spl_error *err)
 {
@@ -70,7 +81,7 @@ static int add_directory(struct spl_catalog_files *files, const char *directory,
         if (spl_catalog_id_of(item->d_name, &ignored))
             rc = add_file(files, directory, item->d_name, place, err);
         else
-            files->nameless++;
+            note_nameless(files, item->d_name);
     }
     if (!rc && errno)
         rc = spl_fail_errno(err, errno, "cannot list '%s'", directory);

@@ -156,7 +156,7 @@ int spl_ops_start(struct spl_service *service, struct spl_error *err)
         return 0;
     }
     if (rc == SPL_E_IO && options->origin[SPL_PARAMETER_ops_listen] == SPL_FROM_DEFAULT) {
-        spl_log_warn("%s: no /healthz, /readyz and /metrics; --ops-listen takes another address", busy.message);
+        spl_log_warn("no /healthz, /readyz and /metrics: %s", busy.message);
         return 0;
     }
     if (rc) {

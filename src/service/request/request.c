@@ -106,7 +106,8 @@ static int resolve_drawing(const struct values *values, struct spl_view_request 
     if (given(values, PARAM_background))
         for (int i = 0; i < 4; i++)
             view->background[i] = (uint8_t)values->v[PARAM_background].n[i];
-    if (get(values, PARAM_transparent, 0) != 0)
+    const bool clear = get(values, PARAM_format, SPL_FORMAT_RAW) == SPL_FORMAT_TIFF && !given(values, PARAM_background);
+    if (get(values, PARAM_transparent, clear) != 0) // a map lies over others
         view->background[3] = 0;
     return 0;
 }

@@ -121,6 +121,50 @@ static void surveyors_names_are_coordinates(void **state)
     loaded_finish(&l);
 }
 
+static void a_column_that_is_skipped_may_hold_text(void **state)
+{
+    static const struct {
+        const char *text, *columns;
+    } files[] = {
+        {"Punkt,Rechtswert,Hochwert,H\xc3\xb6he\nP1,1,2,3\nP2,4,5,6\n", "-,x,y,z"},
+        {"P1,1,2,3\n2,4,5,6\n", "-,x,y,z"},
+        {"\"P;1\",1,2,3\n\"P, \"\"2\"\"\",4,5,6\n", "-,x,y,z"},
+        {"Gro\xc3\x9f 1; 1; 2; 3\n;4;5;6\n", "-,x,y,z"},
+        {"\"Baum 1\" 1 2 3\nB2\t4\t5\t6\n", "-,x,y,z"},
+        {"1 Baum 2 3\n4 \"ein Baum\" 5 6\n", "x,-,y,z"},
+        {"1,2,3,Baum\n4,5,6,\n", "x,y,z,-"},
+        {"name,x,y,z,code\nP1,1,2,3,Baum\n,4,5,6,\n", NULL},
+        {"Punktnummer;Easting;Northing;Height\n\"a\";1;2;3\nb c;4;5;6\n", NULL},
+        {"# name x y z\nP1 1 2 3\nP2 4 5 6\n", NULL},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        struct loaded l;
+        load_text(files[i].text, files[i].columns, &l);
+        if (l.points != 2)
+            fail_msg("%zu: %llu points, %s", i, (unsigned long long)l.points, l.err.message);
+        assert_point(&l, 0, 1, 2, 3);
+        assert_point(&l, 1, 4, 5, 6);
+        loaded_finish(&l);
+    }
+}
+
+static void words_where_numbers_are_due_are_named(void **state)
+{
+    static struct bytes b;
+    static const char *const texts[] = {"P1,abc,2,3\n", "p,r,h,z\nP1,abc,2,3\n", "P0,0,0,0\nP1,abc,2,3\n"};
+    (void)state;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        b.length = 0;
+        put_text(&b, "%s", texts[i]);
+        refused(&b, "-,x,y,z", SPL_E_INPUT, "x", "\"abc\" in column 2 is not a number");
+    }
+    b.length = 0;
+    put_text(&b, "P1,1,2,3\n\"P2,4,5,6\n");
+    refused(&b, "-,x,y,z", SPL_E_INPUT, "", "line 2: column 1, which is skipped, has a quotation mark");
+    refused_text("P1 1 2 3\n", SPL_E_INPUT, "x", "'-' for one that is none of them");
+}
+
 static void decimal_commas_are_named(void **state)
 {
     (void)state;
@@ -179,7 +223,7 @@ static void broken_text_is_refused(void **state)
     (void)state;
     refused_text("X,Y,X\n1,2,3\n", SPL_E_INPUT, "z", "line 1");
     refused_text("This is prose.\n", SPL_E_INPUT, "x", "columns");
-    refused_text("X Y Z\nstill no numbers\n", SPL_E_INPUT, "", "line 2");
+    refused_text("X Y Z\nstill no numbers\n", SPL_E_INPUT, "x", "line 2: x: \"still\" in column 1 is not a number");
     refused_text("X Y Z\n", SPL_E_INPUT, "", "before any line of numbers");
     refused_text("# nothing\n\n", SPL_E_INPUT, "", "before any line of numbers");
     refused_text("1 2\n3 4\n", SPL_E_INPUT, "", "2 values");
@@ -267,6 +311,8 @@ int main(void)
         cmocka_unit_test(counted_files),
         cmocka_unit_test(a_header_without_names_asks_for_columns),
         cmocka_unit_test(surveyors_names_are_coordinates),
+        cmocka_unit_test(a_column_that_is_skipped_may_hold_text),
+        cmocka_unit_test(words_where_numbers_are_due_are_named),
         cmocka_unit_test(decimal_commas_are_named),
         cmocka_unit_test(samples_are_checked_against_the_rest),
         cmocka_unit_test(broken_text_is_refused),

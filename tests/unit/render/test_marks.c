@@ -325,7 +325,8 @@ static void terms_meet_their_dataset(void **state)
     err = (struct spl_error){0};
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "soft");
-    assert_non_null(strstr(err.message, "no attribute 'depth': it has class, height, uncertainty"));
+    assert_non_null(strstr(err.message, "no attribute 'depth': it has class, height, uncertainty, and any has x, y, z, "
+                                        "box:, polygon:, plane: and axis:"));
     err = (struct spl_error){0};
     assert_int_equal(spl_marks_resolve(&soft, &bare, NULL, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "it has none"));
