@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const double coordinate_most = 1e12; /* of a camera */
+static const double fov_least = 1e-9; /* degrees: focal lengths stay finite */
 static const double height_least = 1e-9, height_most = 1e12; /* as of orthographic cameras */
 
 bool spl_view_name_is_valid(const char *name)
@@ -29,8 +30,8 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
             if (!(fabs(vectors[v][c]) <= coordinate_most))
                 return spl_fail_field(err, SPL_E_INPUT, names[v], "%s holds %g; finite numbers up to 1e12 are taken",
                                       names[v], vectors[v][c]);
-    if (!(view->fov > 0 && view->fov <= 179))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "fov %g is outside 0 to 179 degrees", view->fov);
+    if (!(view->fov >= fov_least && view->fov <= 179))
+        return spl_fail_field(err, SPL_E_INPUT, "fov", "fov %g is outside %g to 179 degrees", view->fov, fov_least);
     if (view->view_height != 0 && !(view->view_height >= height_least && view->view_height <= height_most))
         return spl_fail_field(err, SPL_E_INPUT, "view_height", "view_height %g is outside %g to %g", view->view_height,
                               height_least, height_most);

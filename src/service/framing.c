@@ -17,6 +17,8 @@
 #include "service/http.h"
 #include "service/reply.h"
 
+enum { line_end = 2 }; /* bytes at most, which libmicrohttpd has made NULs of */
+
 struct framing {
     const char *begin, *end; /* of the request, as libmicrohttpd has cut it into strings; NULL: it is not known to */
     const char *at;          /* end of the last value */
@@ -60,7 +62,7 @@ static bool follows(struct framing *framing, const char *name, size_t name_lengt
         return true;
     if (name < framing->begin || !value || value < name + name_length || value + value_length > framing->end)
         return false; // folded: it was put together elsewhere
-    bool plain = (!framing->at || (name > framing->at && is_blank(framing->at, name, ""))) &&
+    bool plain = (!framing->at || (name > framing->at && name <= framing->at + line_end && is_blank(framing->at, name, ""))) &&
                  is_blank(name + name_length, value, " \t");
     framing->at = value + value_length;
     return plain;

@@ -224,7 +224,7 @@ def test_a_client_that_waits_to_send_nothing_gets_its_reply():
 def test_headers_that_are_not_what_they_seem():
     """Lines that libmicrohttpd takes for the end of the headers, or reads a part of."""
     with with_tours() as d:
-        for odd in (b": a", b":", b": ", b":a: b", b"\0: a", b"X: a\0b", b"X: a\r\n b", b"X:\r\n b", b"Host:\r\n evil.example",
+        for odd in (b": a", b":", b": ", b":a: b", b"\0: a", b"X: a\0b", b"X: a\0", b"X: \0", b"X: a\r\n b", b"X:\r\n b", b"Host:\r\n evil.example",
                     b"Content-Length: 5\0 6"):
             for before, behind in ((b"Host: localhost\r\n", b""), (b"", b"Host: localhost\r\n")):
                 with Wire(d) as wire:

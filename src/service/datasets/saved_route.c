@@ -39,6 +39,7 @@ static void run(uv_work_t *work)
     struct spl_saving *saving = work->data;
     const char *path = spl_saved_get_path(saving->entry->saved);
     struct spl_error why = {0};
+    spl_file_sweep_beside(path); /* what a kill left in the middle of this */
     int rc = spl_file_replace(path, saving->text, strlen(saving->text), &why);
     if (!rc && spl_file_sync_folder(path))
         rc = spl_fail_errno(&why, errno, "cannot sync the folder");
