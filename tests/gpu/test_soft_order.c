@@ -16,6 +16,9 @@
 #include "render/soft/order.h"
 #include "support/reference_soft.h"
 
+enum { frame_bytes = 512 };
+_Static_assert(sizeof(struct spl_frame_params) <= frame_bytes, "the parameters of a frame have room");
+
 static const char *device;
 static struct spl_gpu *gpu;
 static struct spl_kernels kernels;
@@ -58,7 +61,7 @@ static int open_all(void **state)
         fail_msg("%s", err.message);
     assert_int_equal(spl_soft_memory_init(&memory, &sizes, !many, make, NULL, gpu, &err), 0);
     assert_int_equal(spl_gpu_get_memory(gpu), spl_soft_memory_bytes(&sizes, !many));
-    frame = buffer(SPL_GPU_UPLOAD, 256);
+    frame = buffer(SPL_GPU_UPLOAD, frame_bytes);
     depth = buffer(SPL_GPU_UPLOAD, 8 * width_max * height_max);
     up = buffer(SPL_GPU_UPLOAD, 9 * 4 * items_max);
     down = buffer(SPL_GPU_READBACK, 16 * width_max * height_max);
@@ -125,7 +128,7 @@ static void draw_window(const struct scene *s, uint32_t first, uint32_t end, boo
     struct spl_soft_order order = {.gpu = gpu,
                                    .kernels = &kernels,
                                    .memory = &memory,
-                                   .frame = {.buffer = frame, .bytes = 256},
+                                   .frame = {.buffer = frame, .bytes = frame_bytes},
                                    .depth = depth,
                                    .columns = (s->params.width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,
                                    .rows = (s->params.height + SPL_SOFT_TILE_ROWS - 1) / SPL_SOFT_TILE_ROWS};
