@@ -20,8 +20,8 @@ def test_every_route_takes_them():
                             ("color_by=plane:0,0,1,0,0,1&range=-1..1", {"color_by": "plane:0,0,1,0,0,1", "range": "-1..1"}),
                             ("color_by=normal", {"color_by": "normal"}), ("color_by=flat:ff8000", {"color_by": "flat:ff8000"}),
                             ("shade=headlight", {"shade": "headlight"}), ("shade=sun:30,20", {"shade": "sun:30,20"}),
-                            ("shade=edl%2Bheadlight&edl_strength=1&edl_radius=5",
-                             {"shade": "edl+headlight", "edl_strength": 1, "edl_radius": 5})]:
+                            ("shade=edl%2Bsun:200,70&edl_strength=1&edl_radius=5",  # of a wall the sun alone makes a difference
+                             {"shade": "edl+sun:200,70", "edl_strength": 1, "edl_radius": 5})]:
             got = d.ask(f"{VIEW}?{SMALL}&{query}")
             assert got.status == 200, got.body
             seen.add(got.body)
