@@ -228,10 +228,12 @@ static void enter(struct request *request, const struct route *route, enum spl_h
 /* What is behind `parent`, a start of patterns, in `text`; false where `path` is not below it. */
 static bool list_below(const char *parent, const char *path, char *text, size_t bytes)
 {
-    size_t used = 0, length = strlen(parent);
     const char *hole = strchr(parent, '{');
-    const char *id = path + (hole ? (size_t)(hole - parent) : length), *behind = hole ? id + strcspn(id, "/") : id;
-    if (strncmp(path, parent, (size_t)(hole ? hole - parent : (ptrdiff_t)length)) || (hole && (behind == id || !*behind)))
+    size_t used = 0, length = strlen(parent), begin = hole ? (size_t)(hole - parent) : length;
+    if (strncmp(path, parent, begin))
+        return false;
+    const size_t id = hole ? strcspn(path + begin, "/") : 0;
+    if (hole && (!id || !path[begin + id]))
         return false;
     for (size_t i = 0; i < sizeof routes / sizeof *routes; i++) {
         bool other = strncmp(routes[i].pattern, parent, length) || (!hole && strchr(routes[i].pattern + length, '/'));
