@@ -133,7 +133,7 @@ if built asan; then
     suites asan "$here" gpu
     only="" timeouts="" run_under=""
     if [ "$mode" = "" ]; then
-        cp -p "$out"/asan/tests/http/exercised/* "$out/normal/tests/http/exercised/"
+        cp -p "$out"/asan/tests/http/exercised/* "$out/normal/tests/http/exercised/" || true # none has passed: the sum says so
         suites normal 1 sum
     fi
 fi

@@ -6,9 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double coordinate_most = 1e12; /* of a camera */
-static const double fov_least = 1e-9; /* degrees: focal lengths stay finite */
-static const double height_least = 1e-9, height_most = 1e12; /* as of orthographic cameras */
+#include "geom/size.h"
 
 bool spl_view_name_is_valid(const char *name)
 {
@@ -27,14 +25,9 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
                               view->name);
     for (int v = 0; v < 3; v++)
         for (int c = 0; c < 3; c++)
-            if (!(fabs(vectors[v][c]) <= coordinate_most))
+            if (!(fabs(vectors[v][c]) <= SPL_CAMERA_COORDINATE_MAX))
                 return spl_fail_field(err, SPL_E_INPUT, names[v], "%s holds %g; finite numbers up to 1e12 are taken",
                                       names[v], vectors[v][c]);
-    if (!(view->fov >= fov_least && view->fov <= 179))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "fov %g is outside %g to 179 degrees", view->fov, fov_least);
-    if (view->view_height != 0 && !(view->view_height >= height_least && view->view_height <= height_most))
-        return spl_fail_field(err, SPL_E_INPUT, "view_height", "view_height %g is outside %g to %g", view->view_height,
-                              height_least, height_most);
     if (view->settings[0]) { // a library's caller may say anything
         json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, 0, NULL) : NULL;
         const bool good = json_is_object(settings);
@@ -43,7 +36,10 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
             return spl_fail_field(err, SPL_E_INPUT, "settings", "settings must be a JSON object, as text");
     }
     struct spl_error why = {0};
-    int rc = spl_camera_look_at(&camera, view->eye, view->target, view->up, &why);
+    int rc = spl_camera_set_fov(&camera, view->fov, 1, UINT16_MAX, &why);
+    if (!rc && view->view_height != 0)
+        rc = spl_camera_set_orthographic(&camera, view->view_height, 1, UINT16_MAX, &why);
+    rc = rc ? rc : spl_camera_look_at(&camera, view->eye, view->target, view->up, &why);
     return rc ? spl_fail_field(err, SPL_E_INPUT, why.field, "%s", why.message) : SPL_OK;
 }
 

@@ -141,9 +141,10 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
 /* Kernels of chunks that have clip lines (common/clip.glsl), that a map trims (common/trim.glsl), of which some splats
  * are soft (common/marks.glsl), that shapes cut (common/cut.glsl), or several of these; NULL = as those that have none,
  * but for marks and cuts. */
-enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4, SPL_ENDS_COUNT = 48 };
-enum { SPL_ENDS_CUT = 3 }; /* from this bit on: what cuts them; one shape alone has kernels of its own, as SPL_SHAPE_* */
-enum spl_cut_by { SPL_CUT_BY_NONE, SPL_CUT_BY_SHAPES, SPL_CUT_BY_AXIS, SPL_CUT_BY_PLANE, SPL_CUT_BY_BOX };
+enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4 };
+/* From bit SPL_ENDS_CUT on: what cuts them; one shape alone has kernels of its own, as SPL_SHAPE_*. */
+enum spl_cut_by { SPL_CUT_BY_NONE, SPL_CUT_BY_SHAPES, SPL_CUT_BY_AXIS, SPL_CUT_BY_PLANE, SPL_CUT_BY_BOX, SPL_CUT_BY_COUNT };
+enum { SPL_ENDS_CUT = 3, SPL_ENDS_COUNT = SPL_CUT_BY_COUNT << SPL_ENDS_CUT };
 /* The constants that say whether a kernel looks at marks, what colours show (SPL_PAINT_*), and at shapes of which kinds. */
 enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4, SPL_CONSTANT_CUT = 5 };
 struct spl_disc_kernels {

@@ -74,8 +74,9 @@ void spl_catalog_entry_destroy(struct spl_catalog_entry *entry);
 
 #define SPL_CATALOG_ID_RULE "127 letters a-z and A-Z, digits, '.', '_' and '-', the first of them not a '.'"
 
-/* May `id` (of `length` bytes) be a dataset's id? At most 127 letters, digits, '.', '_' and '-', the first not a '.'.
- */
+_Static_assert(sizeof((struct spl_dataset_info *)0)->id == 128, "the rule names its length");
+
+/* May `id` (of `length` bytes) be a dataset's id, by that rule? */
 bool spl_catalog_id_is_valid(const char *id, size_t length);
 
 #endif
