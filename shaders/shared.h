@@ -77,6 +77,12 @@
 /* A sample within low_pass of a splat's centre, but off its disc, takes the depth of the disc's plane up to this many
  * sample sizes from the centre's depth (a slant of 76 degrees). */
 #define SPL_LOW_PASS_REACH 2.828427f
+
+/* Along parallel rays discs larger than a few samples are drawn at least this wide, samples. A line of width 1 has no
+ * gaps, whatever its direction; an ellipse is that wide up to where discs of one surface meet, half a radius off its
+ * centre. */
+#define SPL_THIN 1.16f
+
 /* A sample that a cell's middle falls on takes the depth of its plane, up to this many sample sizes behind it (a slant
  * of 88 degrees). */
 #define SPL_CELL_REACH 16.0f

@@ -1,10 +1,10 @@
 #!/bin/sh
 # Makes around.jpg: `splatd synth interior` all around, as six faces, and through a fisheye, in the folder OUT. Needs splatd in
-# PATH and ffmpeg.
+# PATH and ffmpeg; POINTS (1000000) says how many points the scan has.
 set -eu
 out=${1:?usage: around.sh OUT}
 mkdir -p "$out"
-splatd synth interior -o "$out/scan"
+splatd synth interior --points "${POINTS:-1000000}" -o "$out/scan"
 splatd pack "$out/scan/interior.ptx" --primitives all -o "$out/interior.spld"
 view() {
     splatd render "$out/interior.spld" --eye 3.2,1.6,1.6 --target 5,2.6,1.6 --supersample 2 "$@"

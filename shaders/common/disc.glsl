@@ -4,8 +4,8 @@
  * plane, whose depth is linear along the image then, is there. A splat that is smaller
  * than a sample still covers the sample that its centre falls on: within `low_pass` samples of the centre it counts as
  * covered. Its depth there is the plane's, clamped to what the disc spans, r sqrt(1 - n.z^2) around its centre, or to
- * SPL_LOW_PASS_REACH if that is more. Written without comparisons: software drivers pay more for a select than for a
- * product. */
+ * SPL_LOW_PASS_REACH if that is more. Along parallel rays a whole wall is seen edge-on at once, and would be dots: there a
+ * disc is as wide as SPL_THIN says. Written without comparisons: software drivers pay more for a select than for a product. */
 #ifndef SPL_DISC_GLSL
 #define SPL_DISC_GLSL
 
@@ -21,6 +21,7 @@ struct disc {
      * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth /
      * radius. Along parallel rays it is hit slope . uv nearer, off by (uv / f, - slope . uv) / radius. */
     vec2 slope;
+    float eased; /* along parallel rays: the slope's share with which the footprint is as wide as SPL_THIN */
     float reach;
     vec2 ray, pitch;   /* the centre's ray, one over the focal lengths; both times scale */
     float scale;
@@ -44,6 +45,16 @@ vec2 disc_extent(float p, float q, float n_p, float n_q, float n_other, float ra
     return result;
 }
 
+/* What a slope along parallel rays is multiplied with, so that its disc is seen SPL_THIN samples wide at least; discs
+ * of few samples, which others are near, as wide as at a slant of 76 degrees. */
+float ease(vec2 slope, float scale)
+{
+    precise float steep = sqrt(slope.x * slope.x + slope.y * slope.y);
+    float least = SPL_LOW_PASS_REACH / frame.low_pass * frame.inverse_fx;
+    precise float eased = max(2.0 / (SPL_THIN * scale), least) / max(steep, 1e-30);
+    return min(eased, 1.0);
+}
+
 /* The part of the disc that lies on the image's samples window_low to window_high, inclusive. */
 disc make_disc(splat s, vec2 window_low, vec2 window_high)
 {
@@ -55,6 +66,13 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     vec2 ex = disc_extent(p.x, p.z, n.x, n.z, n.y, s.radius), ey = disc_extent(p.y, p.z, n.y, n.z, n.x, s.radius);
     precise vec2 middle = vec2(frame.fx * ex.x + frame.cx, frame.fy * ey.x + frame.cy);
     precise vec2 half_size = vec2(frame.fx * ex.y, frame.fy * ey.y);
+    precise float towards = n.x * ray.x + n.y * ray.y + n.z;
+    precise float facing = PARALLEL != 0u ? n.z : towards;
+    precise float tilt = 1.0 / (abs(facing) < 1e-6 ? 1e-6 : facing);
+    precise vec2 slope = vec2(n.x * frame.inverse_fx * tilt, n.y * frame.inverse_fy * tilt);
+    precise float scale = ray_scale(p.z) / s.radius;
+    float eased = PARALLEL != 0u ? ease(slope, scale) : 1.0;
+    half_size += eased < 1.0 ? 0.5 * SPL_THIN : 0.0;
     vec2 low = min(middle - half_size, center - frame.low_pass);
     vec2 high = max(middle + half_size, center + frame.low_pass);
     d.first = ivec2(ceil(clamp(low - 0.5, window_low, window_high + 1.0)));
@@ -63,16 +81,12 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
         d.last.y = d.first.y - 1;
     d.center = center;
     d.depth = p.z;
-    precise float towards = n.x * ray.x + n.y * ray.y + n.z;
-    precise float facing = PARALLEL != 0u ? n.z : towards;
-    precise float tilt = 1.0 / (abs(facing) < 1e-6 ? 1e-6 : facing);
-    precise vec2 slope = vec2(n.x * frame.inverse_fx * tilt, n.y * frame.inverse_fy * tilt);
-    precise float scale = ray_scale(p.z) / s.radius;
     precise float spans = sqrt(max(1.0 - n.z * n.z, 0.0)) / scale;
     precise vec2 scaled_ray = ray * scale, pitch = vec2(frame.inverse_fx * scale, frame.inverse_fy * scale);
     precise float slant = min(max(abs(tilt), 1.0), SPL_MARGIN_SLANT);
     precise float margin = frame.margin * max(s.radius, frame.low_pass * ray_scale(p.z) * frame.inverse_fx) * slant;
     d.slope = slope;
+    d.eased = eased;
     d.reach = max(spans, SPL_LOW_PASS_REACH * frame.inverse_fx);
     d.ray = PARALLEL != 0u ? vec2(0.0) : scaled_ray;
     d.pitch = pitch;
@@ -98,14 +112,14 @@ float disc_sample(disc d, ivec2 at, out float z, out vec3 offset)
     precise vec2 uv = vec2(at) + (0.5 - d.center);
     precise float near_center = (uv.x * uv.x + uv.y * uv.y) * frame.inverse_low_pass_squared;
     precise float rise = d.slope.x * uv.x + d.slope.y * uv.y;
-    precise float ratio = 1.0 / max(1.0 + rise, 1e-6);
+    precise float ratio = 1.0 / max(1.0 + rise, 1e-6), eased = rise * d.eased;
     float k = PARALLEL != 0u ? 1.0 : ratio;
-    precise float w = PARALLEL != 0u ? -rise : k - 1.0;
+    precise float w = PARALLEL != 0u ? -eased : k - 1.0;
     precise vec2 q = d.ray * w + d.pitch * uv * k;
     precise float fall = d.scale * w;
     precise float distance = q.x * q.x + q.y * q.y + fall * fall;
     precise float along = d.depth * (1.0 + clamp(w, -d.reach, d.reach));
-    precise float beside = d.depth + clamp(w, -d.reach, d.reach);
+    precise float beside = d.depth - clamp(rise, -d.reach, d.reach);
     z = PARALLEL != 0u ? beside : along;
     offset = vec3(q, fall);
     return min(distance, near_center);

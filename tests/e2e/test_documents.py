@@ -138,15 +138,17 @@ def test_pictures():
         binaries = pathlib.Path(folder, "bin")
         binaries.mkdir()
         (binaries / "splatd").symlink_to(REAL)
-        for name, needs in (("default-views", "ffmpeg"), ("map-viewer", "chromium"), ("page", "chromium")):
-            kept = ROOT / f"api/pictures/{name}.jpg"
-            assert 20000 < kept.stat().st_size <= 150 * 1024, (name, kept.stat().st_size)
+        for name, needs in (("default-views", "ffmpeg"), ("clip", "ffmpeg"), ("around", "ffmpeg"), ("colors", "ffmpeg"),
+                            ("map-viewer", "chromium"), ("page", "chromium")):
+            pictures = [f"{name}.jpg"] if name != "colors" else ["colors-street.jpg", "colors-class.jpg", "colors-trees.jpg"]
             if not shutil.which(needs) or (needs == "chromium" and not pathlib.Path("/usr/share/javascript/leaflet/leaflet.js").exists()):
                 continue
             done = bash(f'"{ROOT}/api/pictures/{name}.sh" out', folder, POINTS="4000", PATH=f"{binaries}:{os.environ['PATH']}")
-            made = pathlib.Path(folder, "out", f"{name}.jpg")
-            assert done.returncode == 0 and made.read_bytes().startswith(b"\xff\xd8\xff"), (name, done.stderr[-800:])
-            assert size_of(made) == size_of(kept), (name, size_of(made))
+            for picture in pictures:
+                kept, made = ROOT / "api/pictures" / picture, pathlib.Path(folder, "out", picture)
+                assert 20000 < kept.stat().st_size <= 150 * 1024, (picture, kept.stat().st_size)
+                assert done.returncode == 0 and made.read_bytes().startswith(b"\xff\xd8\xff"), (name, done.stderr[-800:])
+                assert size_of(made) == size_of(kept), (picture, size_of(made))
 
 
 def size_of(jpeg):

@@ -154,6 +154,7 @@ static void soft_spheres_are_those_from_afar(void **state)
         struct spl_view view = parallel(2.2, 97, 75), pinhole;
         view.layers = 1u << SPL_LAYER_COLOR;
         view.lod = 0;
+        view.method = SPL_METHOD_POINTS; /* discs seen edge-on are wider along parallel rays */
         view.soft.what.count = 1;
         view.soft.what.terms[0] = (struct spl_term){.measure = SPL_TERM_PLANE, .least = 0, .most = INFINITY,
                                                      .shape = {0, 0, 0, 1, 0, 0}};
@@ -243,6 +244,55 @@ static void sections_and_picks_are_true(void **state)
     done(dataset);
 }
 
+/* Pixels of a wall of discs whose plane the rays lie in, `turn` radians from the image's rows, and columns or rows, along
+ * whichever it is longer, that have none of it. */
+static size_t count_wall(struct spl_view *view, double turn, size_t *gaps)
+{
+    enum { discs = 18, side = 201 };
+    struct make_splat splats[discs];
+    const double *r = view->camera.rotation, c = cos(turn), s = sin(turn);
+    for (int i = 0; i < discs; i++) {
+        double at = 0.1 * (i - (discs - 1) / 2.0);
+        splats[i] = (struct make_splat){.radius = 0.1f, .color = {200, 100, 50}};
+        for (int a = 0; a < 3; a++) {
+            splats[i].position[a] = origin[a] + at * (c * r[a] + s * r[3 + a]);
+            splats[i].normal[a] = (float)(c * r[3 + a] - s * r[a]);
+        }
+    }
+    struct spl_dataset *dataset = make_dataset(splats, discs);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_frame frame = render(dataset, view);
+    const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+    size_t covered = 0;
+    *gaps = 0;
+    for (int i = -70; i <= 70; i++) { /* of 84 or so */
+        bool across = c * c < s * s, found = false;
+        for (int j = 0; j < side; j++)
+            found |= !isnan(depth[across ? (100 + i) * side + j : j * side + 100 + i]);
+        *gaps += !found && fabs(i * (across ? c / s : s / c)) < 70 && i * i < 4900 * fmax(c * c, s * s);
+    }
+    for (int i = 0; i < side * side; i++)
+        covered += !isnan(depth[i]);
+    spl_frame_finish(&frame);
+    done(dataset);
+    return covered;
+}
+
+/* Not dots, and not as thick as its discs. */
+static void walls_along_their_edge_are_lines(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 12; i++) {
+        double turn = i / 2 * 0.31;
+        struct spl_view view = parallel(2.2, 201, 201);
+        view.method = i % 2 ? SPL_METHOD_SPLAT : SPL_METHOD_NEAREST;
+        view.lod = 0;
+        size_t gaps, covered = count_wall(&view, turn, &gaps);
+        if (gaps || covered < 150 || covered > 2 * 170)
+            fail_msg("turned by %.2f: %zu pixels covered, %zu gaps", turn, covered, gaps);
+    }
+}
+
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
@@ -253,6 +303,7 @@ int main(int argc, char **argv)
         frames_test(soft_spheres_are_those_from_afar),
         frames_test(tiles_change_no_byte),
         frames_test(sections_and_picks_are_true),
+        frames_test(walls_along_their_edge_are_lines),
     };
     return frames_run(argc, argv, "parallel", tests, sizeof tests / sizeof *tests);
 }

@@ -78,6 +78,15 @@ static void footprint(const struct scene *s, const struct disc *d, int first[2],
     }
 }
 
+/* What a slope of the disc's plane along parallel rays, depth by sample, is multiplied with, so that the disc is seen
+ * SPL_THIN samples wide. */
+static float ease(const struct scene *s, const float slope[2], float scale)
+{
+    float steep = sqrtf(slope[0] * slope[0] + slope[1] * slope[1]);
+    float low = SPL_LOW_PASS_REACH / SPL_LOW_PASS * (1 / (float)s->camera.fx);
+    return fminf(fmaxf(2 / (SPL_THIN * scale), low) / fmaxf(steep, 1e-30f), 1);
+}
+
 /* Squared distance to the centre; `offset` from it, radii, in view space; view depth. */
 static float coverage(const struct scene *s, const struct disc *d, const float center[2], int x, int y, float *z,
                       float offset[3])
@@ -92,10 +101,11 @@ static float coverage(const struct scene *s, const struct disc *d, const float c
     float reach = spans > low ? spans : low;
     if (s->camera.projection == SPL_ORTHOGRAPHIC) { /* depth is linear along the plane's image */
         float each = 1.0f / d->radius, flat = 1.0f / (fabsf(n[2]) < 1e-6f ? 1e-6f : n[2]);
-        float drop = -(n[0] * ifx * flat * ox + n[1] * ify * flat * oy);
+        float slope[2] = {n[0] * ifx * flat, n[1] * ify * flat}, eased = ease(s, slope, each);
+        float deep = -(slope[0] * ox + slope[1] * oy), drop = eased * deep;
         float most = fmaxf(sqrtf(fmaxf(1 - n[2] * n[2], 0)) / each, low);
         memcpy(offset, (float[]){ifx * each * ox, ify * each * oy, each * drop}, 3 * sizeof *offset);
-        *z = p[2] + (drop < -most ? -most : drop > most ? most : drop);
+        *z = p[2] + (deep < -most ? -most : deep > most ? most : deep);
         float there = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
         bool clipped = offset[0] * d->line[0] + offset[1] * d->line[1] + offset[2] * d->line[2] >= d->end;
         return clipped ? 1 : fminf(there, near_center);
