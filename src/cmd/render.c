@@ -189,7 +189,7 @@ static int read_rays(struct arguments *a, struct spl_error *err)
     int rc;
     if (json) {
         json_error_t where;
-        json_t *list = json_loadf(file, 0, &where);
+        json_t *list = json_loadf(file, JSON_REJECT_DUPLICATES, &where);
         rc = list ? spl_rays_from_json(list, &a->rays, err)
                   : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file, where.line,
                                    where.column, where.text);
@@ -418,6 +418,17 @@ static int write_world_file(const struct arguments *a, struct spl_error *err)
     return spl_cmd_write_output(path, text, strlen(text), err);
 }
 
+/* A plan whose eye is below the ground, a view that looks away. */
+static bool is_behind(const struct spl_camera *camera, const double low[3], const double high[3])
+{
+    double depth = 0; /* of the corner that is farthest ahead */
+    for (int i = 0; i < 3; i++) {
+        const double ahead = camera->rotation[6 + i];
+        depth += ahead * ((ahead > 0 ? high : low)[i] - camera->eye[i]);
+    }
+    return depth <= 0 && !spl_camera_is_bent(camera);
+}
+
 static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
@@ -443,8 +454,9 @@ static void report(const struct spl_device_info *device, const struct spl_datase
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
     fputc('\n', stderr);
     if (!drawn)
-        fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
-                low[0], low[1], low[2], high[0], high[1], high[2]);
+        fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g%s\n",
+                low[0], low[1], low[2], high[0], high[1], high[2],
+                is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
     else
         spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
@@ -513,7 +525,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (spl_cmd_check_soft(&a.drawing, &err) || check_rays(&a, &err) || resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_drawing(&a.drawing, &err) || check_rays(&a, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }
