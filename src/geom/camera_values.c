@@ -247,6 +247,18 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
     return spl_camera_check(camera, err);
 }
 
+void spl_camera_inherit_projection(struct spl_value values[SPL_CAMERA_PARAMS], double view_height)
+{
+    struct spl_value *projection = &values[SPL_CAMERA_projection], *height = &values[SPL_CAMERA_view_height];
+    bool own = projection->given && projection->n[0] != SPL_ORTHOGRAPHIC;
+    for (int i = SPL_CAMERA_model; i <= SPL_CAMERA_elevation; i++) /* what says another lens, or how high */
+        own = own || (values[i].given && i != SPL_CAMERA_projection && i != SPL_CAMERA_cx && i != SPL_CAMERA_cy);
+    if (own || !(view_height > 0))
+        return;
+    *projection = (struct spl_value){.given = true, .count = 1, .n = {SPL_ORTHOGRAPHIC}};
+    *height = (struct spl_value){.given = true, .count = 1, .n = {view_height}};
+}
+
 /* A value's fault is that of the member that said it. */
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
                            const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err)
