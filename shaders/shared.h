@@ -349,7 +349,7 @@ struct spl_draw_chunk {
  *                     no value; start; span; shift; floats: W at the lower end and of a number more, at the upper one
  *   SPL_TEST_TABLE    the same two; from SPL_TEST_TABLE_WORD on a mark for each of up to 32 codes, four a word
  *   SPL_TEST_SHAPE    word of the tests where it lies: three rows of view space -> shape (x, y, z, 1); half a box; least;
- *                     most; one over what W rises in behind each, 0 = at once; SPL_SHAPE_* */
+ *                     most; one over what W rises in behind each, 0 = at once; SPL_SHAPE_*, at the words below */
 #define SPL_TEST_WORDS 12
 #define SPL_TEST_NUMBERS 0u
 #define SPL_TEST_TABLE 1u
@@ -376,6 +376,14 @@ struct spl_draw_chunk {
 #define SPL_SHAPE_POLYGON 3u /* number of corners in place of half a box's x; these, x and y, behind the rest */
 #define SPL_SHAPE_WITH_LEAST 4u
 #define SPL_SHAPE_WITH_MOST 8u
+#define SPL_SHAPE_KIND(flags) ((flags) & 3u)
+/* Words of a shape, behind its rows. */
+#define SPL_SHAPE_HALF 12u /* of a polygon the number of corners */
+#define SPL_SHAPE_LEAST 15u
+#define SPL_SHAPE_MOST 16u
+#define SPL_SHAPE_RISE 17u /* two */
+#define SPL_SHAPE_FLAGS 19u
+#define SPL_SHAPE_WORDS 20u /* behind which a polygon's corners are */
 
 /* Shapes that samples are asked of: words of the tests, from frame.fill_from on: how many, and of each where it lies and
  * the flags of a test. Kernels are made for planes and coordinates alone, and for all. */

@@ -33,10 +33,10 @@ uint test_numbers(uint at, uint code, uint width, bool last_none)
 
 uint test_shape(uint at, vec3 p)
 {
-    uint flags = test_word(at + 19u);
-    float distance = distance_to(at, flags & 3u, p, true, POLYGONS);
-    float least = test_float(at + 15u), most = test_float(at + 16u);
-    float rise = test_float(at + 17u), fall = test_float(at + 18u);
+    uint flags = test_word(at + SPL_SHAPE_FLAGS);
+    float distance = distance_to(at, SPL_SHAPE_KIND(flags), p, true, POLYGONS);
+    float least = test_float(at + SPL_SHAPE_LEAST), most = test_float(at + SPL_SHAPE_MOST);
+    float rise = test_float(at + SPL_SHAPE_RISE), fall = test_float(at + (SPL_SHAPE_RISE + 1u));
     precise float low = (distance - least) * rise, high = (most - distance) * fall;
     return is_within(at, flags, distance) ? mark_of(min(rise > 0.0 ? low : 1.0, fall > 0.0 ? high : 1.0)) : 0u;
 }
@@ -117,10 +117,12 @@ uint make_panel_mark(spl_draw_chunk chunk, uint index, vec3 p, float reach)
             return UNKNOWN;
         float far = abs(p.x) + abs(p.y) + abs(p.z);
         for (uint i = 0u; i < 3u; i++)
-            far += abs(test_float(at + 4u * i + 3u)) + test_float(at + 12u + i);
-        float distance = distance_to(at, test_word(at + 19u) & 3u, p, true, POLYGONS), most = test_float(at + 16u);
-        float above = distance - reach - 1e-5 * far - test_float(at + 15u);
-        float below = most - distance - reach - 1e-5 * far, rise = test_float(at + 17u), fall = test_float(at + 18u);
+            far += abs(test_float(at + 4u * i + 3u)) + test_float(at + SPL_SHAPE_HALF + i);
+        float distance = distance_to(at, SPL_SHAPE_KIND(test_word(at + SPL_SHAPE_FLAGS)), p, true, POLYGONS);
+        float most = test_float(at + SPL_SHAPE_MOST);
+        float above = distance - reach - 1e-5 * far - test_float(at + SPL_SHAPE_LEAST);
+        float below = most - distance - reach - 1e-5 * far;
+        float rise = test_float(at + SPL_SHAPE_RISE), fall = test_float(at + (SPL_SHAPE_RISE + 1u));
         bool none = above < -2.0 * (reach + 1e-5 * far) || below < -2.0 * (reach + 1e-5 * far);
         bool whole = above > 0.0 && below > 0.0 && (rise == 0.0 || above * rise > 1.001) &&
                      (fall == 0.0 || below * fall > 1.001);

@@ -43,9 +43,9 @@ bool is_kept(vec3 p, uint known)
     uint at = frame.fill_from, count = test_word(at);
     term_fold f = begin_fold();
     for (uint t = 0u; t < count; t++) {
-        uint shape = test_word(at + 1u + 2u * t), flags = test_word(shape + 19u);
+        uint shape = test_word(at + 1u + 2u * t), flags = test_word(shape + SPL_SHAPE_FLAGS);
         uint joint = test_word(at + 2u + 2u * t), bit = joint >> SPL_TEST_BIT & 15u;
-        bool holds = is_within(shape, flags, distance_to(shape, flags & 3u, p, bodies, bodies));
+        bool holds = is_within(shape, flags, distance_to(shape, SPL_SHAPE_KIND(flags), p, bodies, bodies));
         fold_test(f, joint & ~(15u << SPL_TEST_BIT), holds, (known << 1u >> bit & 1u) != 0u && bit != 0u);
     }
     end_condition(f);

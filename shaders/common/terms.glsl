@@ -54,15 +54,16 @@ float distance_to(uint at, uint kind, vec3 p, bool bodies, bool polygons)
     for (uint i = 0u; i < 3u; i++) /* of fixed length: it is unrolled */
         q[i] = test_float(at + 4u * i) * p.x + test_float(at + 4u * i + 1u) * p.y + test_float(at + 4u * i + 2u) * p.z +
                test_float(at + 4u * i + 3u);
-    precise vec3 beyond = abs(q) - vec3(test_float(at + 12u), test_float(at + 13u), test_float(at + 14u));
+    precise vec3 beyond = abs(q) - vec3(test_float(at + SPL_SHAPE_HALF), test_float(at + (SPL_SHAPE_HALF + 1u)),
+                                             test_float(at + (SPL_SHAPE_HALF + 2u)));
     precise vec3 outside = max(beyond, 0.0);
     precise float axis = sqrt(q.x * q.x + q.y * q.y);
     precise float box = sqrt(outside.x * outside.x + outside.y * outside.y + outside.z * outside.z) +
                         min(max(max(beyond.x, beyond.y), beyond.z), 0.0);
     float distance = kind == SPL_SHAPE_AXIS ? axis : kind == SPL_SHAPE_PLANE ? q.z : box;
     if (polygons) {
-        uint count = kind == SPL_SHAPE_POLYGON ? test_word(at + 12u) : 0u;
-        float across = polygon_distance(at + 20u, count, q.xy);
+        uint count = kind == SPL_SHAPE_POLYGON ? test_word(at + SPL_SHAPE_HALF) : 0u;
+        float across = polygon_distance(at + SPL_SHAPE_WORDS, count, q.xy);
         precise vec2 away = vec2(max(across, 0.0), outside.z);
         precise float prism = sqrt(away.x * away.x + away.y * away.y) + min(max(across, beyond.z), 0.0);
         distance = kind == SPL_SHAPE_POLYGON ? prism : distance;
@@ -73,7 +74,7 @@ float distance_to(uint at, uint kind, vec3 p, bool bodies, bool polygons)
 /* Is a distance within the shape's ends? */
 bool is_within(uint at, uint flags, float distance)
 {
-    float least = test_float(at + 15u), most = test_float(at + 16u);
+    float least = test_float(at + SPL_SHAPE_LEAST), most = test_float(at + SPL_SHAPE_MOST);
     bool above = distance > least || ((flags & SPL_SHAPE_WITH_LEAST) != 0u && distance == least);
     bool below = distance < most || ((flags & SPL_SHAPE_WITH_MOST) != 0u && distance == most);
     return above && below;

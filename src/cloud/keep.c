@@ -5,6 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/text.h"
 #include "cloud/rows.h"
 
 static bool is_name(const char *name, size_t length, const char *other, size_t other_length)
@@ -26,9 +27,12 @@ static int take_name(struct spl_keep *keep, const char *name, size_t length, str
 {
     int column = spl_column_from_name(name, length);
     const char *own = spl_column_name(column);
-    for (size_t i = 0; i < length; i++)
-        if ((uint8_t)name[i] < ' ' || name[i] == 0x7f)
-            return spl_fail_field(err, SPL_E_USAGE, "keep", "keep: a name has a control character");
+    bool printable = true;
+    for (size_t i = 0; i < length; i += spl_text_next(name + i, &printable))
+        if (!printable)
+            break;
+    if (!printable)
+        return spl_fail_field(err, SPL_E_USAGE, "keep", "keep: a name has a control character, or another that cannot be shown");
     if (length == 0)
         return spl_fail_field(err, SPL_E_USAGE, "keep",
                               "keep: a name is empty; names lie between commas, as in \"gps_time,user_data\"");

@@ -45,7 +45,8 @@ int spl_layout_lacks(const struct spl_layout *layout)
     return SPL_COLUMN_SKIP;
 }
 
-/* What surveyors call x, y and z; so only where no column has the name itself. Longitudes and latitudes are neither. */
+/* What surveyors call x, y and z, also in German and French; so only where no column has the name itself. Longitudes and
+ * latitudes are neither. */
 static int column_from_synonym(const char *name, size_t length)
 {
     static const struct {
@@ -54,7 +55,27 @@ static int column_from_synonym(const char *name, size_t length)
     } synonyms[] = {{"easting", SPL_COLUMN_X},
                     {"northing", SPL_COLUMN_Y},
                     {"height", SPL_COLUMN_Z},
-                    {"elevation", SPL_COLUMN_Z}};
+                    {"elevation", SPL_COLUMN_Z},
+                    {"rechtswert", SPL_COLUMN_X},
+                    {"hochwert", SPL_COLUMN_Y},
+                    {"ostwert", SPL_COLUMN_X},
+                    {"nordwert", SPL_COLUMN_Y},
+                    {"hoehe", SPL_COLUMN_Z},
+                    {"h\xc3\xb6he", SPL_COLUMN_Z},
+                    {"H\xc3\x96HE", SPL_COLUMN_Z}, /* no letter of ASCII's, so none that strncasecmp() makes small */
+                    {"h\xf6he", SPL_COLUMN_Z},     /* Latin-1 */
+                    {"x_", SPL_COLUMN_X},
+                    {"y_", SPL_COLUMN_Y},
+                    {"z_", SPL_COLUMN_Z},
+                    {"x-coordinate", SPL_COLUMN_X},
+                    {"y-coordinate", SPL_COLUMN_Y},
+                    {"z-coordinate", SPL_COLUMN_Z},
+                    {"x_coord", SPL_COLUMN_X},
+                    {"y_coord", SPL_COLUMN_Y},
+                    {"z_coord", SPL_COLUMN_Z},
+                    {"coord_x", SPL_COLUMN_X},
+                    {"coord_y", SPL_COLUMN_Y},
+                    {"coord_z", SPL_COLUMN_Z}};
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
         if (strlen(synonyms[i].name) == length && !strncasecmp(synonyms[i].name, name, length))
             return synonyms[i].column;

@@ -92,6 +92,8 @@ int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl
         spl_view_set_param(&d->view, param, value);
     if (!rc && info->changes == SPL_CHANGES_SOFT)
         snprintf(d->soft_option, sizeof d->soft_option, "%s", option);
+    if (!rc && param == SPL_PARAM_ramp)
+        snprintf(d->ramp_option, sizeof d->ramp_option, "%s", option);
     return rc;
 }
 
@@ -126,7 +128,10 @@ int spl_cmd_take_color(void *drawing, const char *option, char *text, struct spl
 int spl_cmd_take_range(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     struct spl_error why = {0};
-    int rc = spl_color_parse_range(text, &((struct spl_cmd_drawing *)drawing)->view.color, &why);
+    struct spl_cmd_drawing *d = drawing;
+    int rc = spl_color_parse_range(text, &d->view.color, &why);
+    if (!rc)
+        snprintf(d->ramp_option, sizeof d->ramp_option, "%s", option);
     return rc ? spl_fail_field(err, SPL_E_USAGE, "range", "%s: %s", option, why.message) : SPL_OK;
 }
 
@@ -137,8 +142,13 @@ int spl_cmd_take_shade(void *drawing, const char *option, char *text, struct spl
     return rc ? spl_fail_field(err, SPL_E_USAGE, "shade", "%s: %s", option, why.message) : SPL_OK;
 }
 
-int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err)
+int spl_cmd_check_drawing(const struct spl_cmd_drawing *drawing, struct spl_error *err)
 {
+    const enum spl_color_by by = drawing->view.color.by;
+    if (*drawing->ramp_option && (by == SPL_COLOR_BY_RGB || by == SPL_COLOR_BY_NORMAL || by == SPL_COLOR_BY_FLAT))
+        return spl_fail_field(err, SPL_E_USAGE, drawing->ramp_option + 2,
+                              "%s is of values, and colours show none: say which with --color-by, as in --color-by height",
+                              drawing->ramp_option);
     if (!*drawing->soft_option || drawing->view.soft.what.count)
         return SPL_OK;
     return spl_fail_field(err, SPL_E_USAGE, "soft",

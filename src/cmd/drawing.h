@@ -17,6 +17,7 @@ struct spl_cmd_drawing {
     bool no_verify, has_background;      /* the latter: --background was given */
     const char *output;                  /* argument of -o; NULL = not given */
     char soft_option[24];                /* the last of those that say how what is soft is drawn; "" = none */
+    char ramp_option[16];                /* the last of those that say what values look like; "" = none */
     struct spl_view view;                /* all but the camera */
     struct spl_encode_options encode;    /* all but the format */
     struct spl_renderer_options renderer;
@@ -27,8 +28,8 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
 /* What a depth PNG says that its steps are of. */
 void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
 
-/* SPL_E_USAGE where an option says how soft spheres are drawn, and none what is soft. */
-int spl_cmd_check_soft(const struct spl_cmd_drawing *drawing, struct spl_error *err);
+/* SPL_E_USAGE where an option says how soft spheres are drawn, and none what is soft; or how values look, and none which. */
+int spl_cmd_check_drawing(const struct spl_cmd_drawing *drawing, struct spl_error *err);
 
 /* Says on stderr which terms select nothing of the dataset, or, if `stats` (may be NULL) has it, that no soft sphere of
  * the view was drawn. */

@@ -189,7 +189,7 @@ static int read_rays(struct arguments *a, struct spl_error *err)
     int rc;
     if (json) {
         json_error_t where;
-        json_t *list = json_loadf(file, 0, &where);
+        json_t *list = json_loadf(file, JSON_REJECT_DUPLICATES, &where);
         rc = list ? spl_rays_from_json(list, &a->rays, err)
                   : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file, where.line,
                                    where.column, where.text);
@@ -262,21 +262,11 @@ static void give(struct spl_value *values, enum spl_camera_param param, const do
     memcpy(values[param].n, numbers, count * sizeof *numbers);
 }
 
-/* Where a projection is said, all means what it means over HTTP. */
-static int resolve_projection(const struct arguments *a, const struct spl_dataset_info *info,
-                              const struct spl_saved_view *from, const double fit[2], struct spl_camera *camera,
-                              struct spl_error *err)
+static void give_all(const struct arguments *a, double view_height, struct spl_value values[SPL_CAMERA_PARAMS])
 {
     const double station = a->station == UINT64_MAX ? (double)NAN : (double)a->station;
     const double projection = a->rays ? SPL_RAYS : a->projection < 0 ? (double)NAN : a->projection;
     const double size[2] = {a->rays ? 1 : a->drawing.size[0], a->rays ? a->rays->count : a->drawing.size[1]};
-    const struct spl_camera_limits limits = {.side_px = a->rays ? SPL_RAYS_MAX : 65535, .pixels = UINT64_MAX};
-    struct spl_camera_defaults defaults = {
-        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far, .dataset = info};
-    struct spl_value values[SPL_CAMERA_PARAMS] = {0};
-    memcpy(defaults.eye, from->eye, sizeof defaults.eye);
-    memcpy(defaults.target, from->target, sizeof defaults.target);
-    memcpy(defaults.up, from->up, sizeof defaults.up);
     give(values, SPL_CAMERA_station, &station, 1);
     give(values, SPL_CAMERA_eye, a->eye, 3);
     give(values, SPL_CAMERA_target, a->target, 3);
@@ -297,6 +287,20 @@ static int resolve_projection(const struct arguments *a, const struct spl_datase
     }
     give(values, SPL_CAMERA_near, &a->near, 1);
     give(values, SPL_CAMERA_far, &a->far, 1);
+    spl_camera_inherit_projection(values, view_height);
+}
+
+/* Where a projection is said, all means what it means over HTTP. */
+static int resolve_projection(const struct arguments *a, const struct spl_value values[SPL_CAMERA_PARAMS],
+                              const struct spl_dataset_info *info, const struct spl_saved_view *from, const double fit[2],
+                              struct spl_camera *camera, struct spl_error *err)
+{
+    const struct spl_camera_limits limits = {.side_px = a->rays ? SPL_RAYS_MAX : 65535, .pixels = UINT64_MAX};
+    struct spl_camera_defaults defaults = {
+        .fov = from->fov, .fit = {fit[0], fit[1]}, .near = camera->near, .far = camera->far, .dataset = info};
+    memcpy(defaults.eye, from->eye, sizeof defaults.eye);
+    memcpy(defaults.target, from->target, sizeof defaults.target);
+    memcpy(defaults.up, from->up, sizeof defaults.up);
     return spl_camera_from_values(values, &defaults, &limits, camera, err);
 }
 
@@ -353,15 +357,13 @@ static int resolve_camera(struct arguments *a, const struct spl_dataset *dataset
     rc = rc ? rc : start_camera(a, dataset, &from, camera, err);
     if (rc || (rc = place(a, dataset, err)))
         return rc;
-    if (from.view_height > 0 && !a->rays && isnan(a->fov) && isnan(a->fx) && isnan(a->view_height) && isnan(a->units_per_pixel) &&
-        (a->projection < 0 || a->projection == SPL_ORTHOGRAPHIC)) { /* as over HTTP */
-        a->projection = SPL_ORTHOGRAPHIC;
-        a->view_height = from.view_height;
-    }
-    if (a->rays || a->projection >= 0 || !isnan(a->view_height) || !isnan(a->units_per_pixel) || a->station != UINT64_MAX) {
+    struct spl_value values[SPL_CAMERA_PARAMS] = {0};
+    give_all(a, from.view_height, values);
+    if (values[SPL_CAMERA_projection].given || values[SPL_CAMERA_view_height].given ||
+        values[SPL_CAMERA_units_per_pixel].given || values[SPL_CAMERA_station].given) {
         const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
         const double *fit = info->default_fit;
-        rc = resolve_projection(a, info, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
+        rc = resolve_projection(a, values, info, &from, a->view ? (double[]){from.fov, from.fov} : fit, camera, err);
         if (!rc && a->rays)
             rc = spl_view_set_rays(&a->drawing.view, a->rays, (enum spl_ray_frame)a->frame, a->resolution, err);
         return rc ? rc : spl_view_check(&a->drawing.view, err);
@@ -418,6 +420,17 @@ static int write_world_file(const struct arguments *a, struct spl_error *err)
     return spl_cmd_write_output(path, text, strlen(text), err);
 }
 
+/* A plan whose eye is below the ground, a view that looks away. */
+static bool is_behind(const struct spl_camera *camera, const double low[3], const double high[3])
+{
+    double depth = 0; /* of the corner that is farthest ahead */
+    for (int i = 0; i < 3; i++) {
+        const double ahead = camera->rotation[6 + i];
+        depth += ahead * ((ahead > 0 ? high : low)[i] - camera->eye[i]);
+    }
+    return depth <= 0 && !spl_camera_is_bent(camera);
+}
+
 static void report(const struct spl_device_info *device, const struct spl_dataset *dataset,
                    const struct spl_frame_stats *stats, const struct arguments *a, const struct spl_encoded *encoded)
 {
@@ -443,8 +456,9 @@ static void report(const struct spl_device_info *device, const struct spl_datase
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
     fputc('\n', stderr);
     if (!drawn)
-        fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g\n",
-                low[0], low[1], low[2], high[0], high[1], high[2]);
+        fprintf(stderr, "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g%s\n",
+                low[0], low[1], low[2], high[0], high[1], high[2],
+                is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
     else
         spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
@@ -513,7 +527,7 @@ int spl_cmd_render(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (spl_cmd_check_soft(&a.drawing, &err) || check_rays(&a, &err) || resolve_format(&a, &err) || render(&a, &err))
+    if (spl_cmd_check_drawing(&a.drawing, &err) || check_rays(&a, &err) || resolve_format(&a, &err) || render(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

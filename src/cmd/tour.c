@@ -275,7 +275,7 @@ int spl_cmd_tour(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     a.dataset = argv[optind];
-    if (spl_cmd_check_soft(&a.drawing, &err) || resolve_output(&a, &err) || run(&a, &err))
+    if (spl_cmd_check_drawing(&a.drawing, &err) || resolve_output(&a, &err) || run(&a, &err))
         return spl_cmd_fail(&err);
     return 0;
 }

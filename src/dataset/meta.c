@@ -309,7 +309,9 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     const char *count = "a whole number, 1 or more";
     uint64_t levels = 0, whole = UINT64_MAX;
-    int rc = get_count(dataset, "points", INT64_MAX, count, &info->points, err);
+    int rc = spl_dataset_clean_meta(dataset, err);
+    if (!rc)
+        rc = get_count(dataset, "points", INT64_MAX, count, &info->points, err);
     if (!rc)
         rc = get_count(dataset, "leaf_splats", INT64_MAX, count, &info->leaf_splats, err);
     if (!rc && json_object_get(dataset->meta, "part_of"))

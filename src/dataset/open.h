@@ -111,6 +111,9 @@ int spl_dataset_check_sections(struct spl_dataset *dataset, struct spl_error *er
  * META: parses it and fills info from it. */
 int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err);
 
+/* META's texts: what cannot be shown in them becomes '?', and the log names the first. check_meta calls it. */
+int spl_dataset_clean_meta(struct spl_dataset *dataset, struct spl_error *err);
+
 /* META's list of streams: fills info and `streams`. check_meta calls it. */
 int spl_dataset_read_streams(struct spl_dataset *dataset, struct spl_error *err);
 

@@ -29,7 +29,7 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
                 return spl_fail_field(err, SPL_E_INPUT, names[v], "%s holds %g; finite numbers up to 1e12 are taken",
                                       names[v], vectors[v][c]);
     if (view->settings[0]) { // a library's caller may say anything
-        json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, 0, NULL) : NULL;
+        json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, JSON_REJECT_DUPLICATES, NULL) : NULL;
         const bool good = json_is_object(settings);
         json_decref(settings);
         if (!good)

@@ -143,6 +143,10 @@ const char *spl_json_show_shape(const json_t *json, char text[40]);
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
                            const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
+/* Of a view by its name that is orthographic, `view_height` high (0: it is not): so are the values, unless they say how high,
+ * or through which lens. */
+void spl_camera_inherit_projection(struct spl_value values[SPL_CAMERA_PARAMS], double view_height);
+
 /* One view of a list: an object with "camera" (parameters of place SPL_CAMERA) and beside it parameters of place
  * SPL_BODY, as in the body of POST /v1/datasets/{id}/view. Keys named in `others` (ends in NULL) are the caller's; all
  * other keys are refused by name. `defaults` as above. Borrows `view`. */

@@ -15,6 +15,7 @@ const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
 const char *const spl_path_ease_names[] = {"none", "in", "out", "in-out", NULL};
 
 static const double fps_default = 30, fps_max = 1000, seconds_max = 86400;
+static const double time_max = 1e20, step_min = 1e-12; /* speeds between keys stay finite, nanoseconds of 1970 count */
 
 void spl_camera_path_finish(struct spl_camera_path *path)
 {
@@ -64,11 +65,14 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
     }
     if (path->count && isnan(time) != !path->times)
         return spl_fail_field(err, SPL_E_INPUT, "time", "a time must be given for every camera or for none");
-    if (path->times && !isfinite(time))
-        return spl_fail_field(err, SPL_E_INPUT, "time", "time %g is not finite", time);
+    if (path->times && !(fabs(time) <= time_max))
+        return spl_fail_field(err, SPL_E_INPUT, "time", "time %.17g is not within %g of 0", time, time_max);
     if (path->times && path->count && !(time > path->times[path->count - 1]))
         return spl_fail_field(err, SPL_E_INPUT, "time", "time %.17g is not later than the one before, %.17g", time,
                               path->times[path->count - 1]);
+    if (path->times && path->count && time - path->times[path->count - 1] < step_min)
+        return spl_fail_field(err, SPL_E_INPUT, "time", "time %.17g is less than %g after the one before, %.17g", time,
+                              step_min, path->times[path->count - 1]);
     path->cameras[path->count] = *camera;
     if (path->times)
         path->times[path->count] = time;
@@ -97,6 +101,9 @@ int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, dou
     if (!frames && !given && path->closed) // the way back takes the mean of the others
         seconds *= (double)path->count / (double)(path->count - 1);
     double count = each ? (double)path->count : frames ? (double)frames : floor(seconds * *fps_out + 0.5);
+    if (count > (double)most && !frames && !each && !given)
+        return spl_fail_field(err, SPL_E_LIMIT, "time", "the times are %.6g s long, %.6g frames; the limit is %zu", seconds,
+                              count, most);
     if (count > (double)most)
         return spl_fail_field(err, SPL_E_LIMIT, frames || each ? "frames" : "seconds", "%.0f frames; the limit is %zu",
                               count, most);

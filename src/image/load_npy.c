@@ -1,7 +1,7 @@
 /* NPY 1.0 to 3.0 in: the layer's own numbers, no conversion.
  *
- * The header is a Python dictionary with three keys that numpy always writes; its values are looked for by key, so that
- * their order does not matter. The file must be as long as its header says before anything is allocated. Any thread. */
+ * The header is a Python dictionary with three keys that numpy always writes; its values are looked for by key, each of which
+ * is there once, so that their order does not matter. The file must be as long as its header says before anything is allocated. Any thread. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +26,22 @@ static int fail(const char *path, const char *field, const char *what, struct sp
     return spl_fail_field(err, SPL_E_INPUT, field, "%s: NPY header: %s", path, what);
 }
 
+/* A key that is there twice means one thing to us and another to numpy, which takes the last. */
+static int check_keys(const char *path, const char *header, struct spl_error *err)
+{
+    static const char *const keys[] = {"'descr'", "'fortran_order'", "'shape'"}, *const fields[] = {"descr", "fortran_order", "shape"};
+    for (int i = 0; i < 3; i++) {
+        const char *at = strstr(header, keys[i]);
+        at = at ? strstr(at + strlen(keys[i]), keys[i]) : NULL;
+        if (at) {
+            char what[64];
+            snprintf(what, sizeof what, "%s is there twice", keys[i]);
+            return fail(path, fields[i], what, err);
+        }
+    }
+    return SPL_OK;
+}
+
 /* The text between magic and pixels, as a string; the file stands at the pixels. */
 int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_MAX], struct spl_error *err)
 {
@@ -44,7 +60,7 @@ int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_M
     if (fread(text, 1, length, file) != length)
         return fail(path, "header", "cut off", err);
     text[length] = 0;
-    return SPL_OK;
+    return check_keys(path, text, err);
 }
 
 /* What stands behind 'key': */

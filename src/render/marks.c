@@ -352,19 +352,19 @@ uint32_t spl_marks_see(const struct spl_marks *marks, const struct spl_camera *c
         for (int i = 0; i < 12; i++)
             out[i] = float_word(shape->rows[i]);
         for (int i = 0; i < 3; i++)
-            out[12 + i] = float_word(shape->half[i]);
+            out[SPL_SHAPE_HALF + (uint32_t)i] = float_word(shape->half[i]);
         const bool blends[2] = {term->blend_least > 0 && isfinite(term->least),
                                 term->blend_most > 0 && isfinite(term->most)};
-        out[15] = float_word(term->least - shape->base);
-        out[16] = float_word(term->most - shape->base);
-        out[17] = float_word(blends[0] ? 1 / term->blend_least : 0);
-        out[18] = float_word(blends[1] ? 1 / term->blend_most : 0);
-        out[19] = kind_of(term) | (term->with_least ? SPL_SHAPE_WITH_LEAST : 0) |
-                  (term->with_most ? SPL_SHAPE_WITH_MOST : 0);
+        out[SPL_SHAPE_LEAST] = float_word(term->least - shape->base);
+        out[SPL_SHAPE_MOST] = float_word(term->most - shape->base);
+        out[SPL_SHAPE_RISE] = float_word(blends[0] ? 1 / term->blend_least : 0);
+        out[SPL_SHAPE_RISE + 1] = float_word(blends[1] ? 1 / term->blend_most : 0);
+        out[SPL_SHAPE_FLAGS] = kind_of(term) | (term->with_least ? SPL_SHAPE_WITH_LEAST : 0) |
+                               (term->with_most ? SPL_SHAPE_WITH_MOST : 0);
         used += SPL_MARKS_SHAPE_WORDS;
         if (term->measure != SPL_TERM_POLYGON)
             continue;
-        out[12] = term->corners;
+        out[SPL_SHAPE_HALF] = term->corners;
         for (uint32_t i = 0; i < 2 * term->corners; i++)
             words[used++] = float_word(view->corners[term->first_corner + i / 2][i % 2]);
     }

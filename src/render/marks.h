@@ -74,7 +74,7 @@ void spl_marks_find_numbers(struct spl_marks *marks);
 
 /* Their shapes as a camera sees them, as words for its tests; 0 words where there is none. */
 enum {
-    SPL_MARKS_SHAPE_WORDS = 20,
+    SPL_MARKS_SHAPE_WORDS = SPL_SHAPE_WORDS,
     SPL_MARKS_SHAPES_MAX = SPL_MARKS_SHAPE_WORDS * SPL_TERMS_MAX + 2 * SPL_TERMS_CORNERS_MAX
 };
 struct spl_marks_shape {

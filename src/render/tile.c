@@ -26,8 +26,8 @@ static enum spl_cut_by cut_by(const struct spl_draw_list *list, uint32_t cut)
     if (!shape)
         return cut ? SPL_CUT_BY_SHAPES : SPL_CUT_BY_NONE;
     float ends[2];
-    memcpy(ends, shape + 15, sizeof ends);
-    switch (shape[19] & 3) {
+    memcpy(ends, shape + SPL_SHAPE_LEAST, sizeof ends);
+    switch (SPL_SHAPE_KIND(shape[SPL_SHAPE_FLAGS])) {
     case SPL_SHAPE_AXIS:
         return SPL_CUT_BY_AXIS;
     case SPL_SHAPE_PLANE:
@@ -128,10 +128,10 @@ static void put_cut(const struct spl_draw_list *list, uint32_t cut, struct spl_f
     if (!shape)
         return;
     memcpy(params->cut_rows, shape, sizeof params->cut_rows);
-    memcpy(params->cut_half, shape + 12, sizeof params->cut_half);
-    memcpy(&params->cut_least, shape + 15, sizeof params->cut_least);
-    memcpy(&params->cut_most, shape + 16, sizeof params->cut_most);
-    params->cut_flags |= shape[19];
+    memcpy(params->cut_half, shape + SPL_SHAPE_HALF, sizeof params->cut_half);
+    memcpy(&params->cut_least, shape + SPL_SHAPE_LEAST, sizeof params->cut_least);
+    memcpy(&params->cut_most, shape + SPL_SHAPE_MOST, sizeof params->cut_most);
+    params->cut_flags |= shape[SPL_SHAPE_FLAGS];
 }
 
 static int too_many(struct spl_error *err)

@@ -34,6 +34,30 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         memcpy((char *)view + sizeof size, (const char *)&known + sizeof size, bytes - sizeof size);
 }
 
+/* But for the pose. */
+static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
+{
+    return a->projection == b->projection && a->width == b->width && a->height == b->height && a->fx == b->fx &&
+           a->fy == b->fy && a->cx == b->cx && a->cy == b->cy && a->near == b->near && a->far == b->far &&
+           a->lens.kind == b->lens.kind && a->lens.reach == b->lens.reach &&
+           !memcmp(a->lens.k, b->lens.k, sizeof a->lens.k) && !memcmp(a->lens.p, b->lens.p, sizeof a->lens.p);
+}
+
+/* What samples are taken of. */
+static struct spl_camera coarsened(const struct spl_view *view)
+{
+    struct spl_camera camera = view->camera;
+    if (view->supersample < 1)
+        spl_camera_coarsen(&camera, view->supersample);
+    return camera;
+}
+
+bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b)
+{
+    const struct spl_camera mine = coarsened(a), other = coarsened(b);
+    return is_same_lens(&mine, &other);
+}
+
 /* Pixels of the faces that the view is looked up in; 0 where it is in none. Tracing a lens takes up to two milliseconds,
  * and is asked for several times of a request and of each view of a batch: the last ones are kept. */
 static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, struct spl_error *err)
@@ -43,11 +67,9 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
         uint64_t pixels;
     } kept[SPL_VIEW_LENSES_KEPT];
     static _Thread_local unsigned next;
-    struct spl_camera camera = view->camera;
+    struct spl_camera camera = coarsened(view);
     struct spl_faces faces;
     *pixels = 0;
-    if (view->supersample < 1)
-        spl_camera_coarsen(&camera, view->supersample);
     if (!spl_camera_is_bent(&camera))
         return SPL_OK;
     if (camera.projection == SPL_RAYS) { // whose list knows what it takes
@@ -58,7 +80,7 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
     memset(camera.eye, 0, sizeof camera.eye);
     memset(camera.rotation, 0, sizeof camera.rotation);
     for (unsigned i = 0; i < SPL_VIEW_LENSES_KEPT; i++)
-        if (!memcmp(&camera, &kept[i].camera, sizeof camera)) {
+        if (kept[i].camera.width && is_same_lens(&camera, &kept[i].camera)) {
             *pixels = kept[i].pixels;
             return SPL_OK;
         }
@@ -66,7 +88,7 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
     if (rc)
         return rc;
     *pixels = kept[next].pixels = spl_faces_get_pixels(&faces);
-    memcpy(&kept[next].camera, &camera, sizeof camera); // its padding, too
+    kept[next].camera = camera;
     next = (next + 1) % SPL_VIEW_LENSES_KEPT;
     return SPL_OK;
 }

@@ -15,6 +15,9 @@ enum {
  * thread. */
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err);
 
+/* Do bent views take samples of the same lens, so that it is traced once? Poses may differ. */
+bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b);
+
 /* Can a dataset show what the view's colours and its soft terms ask for? SPL_E_INPUT with the field; part of
  * spl_view_check_layers(). */
 int spl_view_check_colors(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);

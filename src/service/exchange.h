@@ -45,6 +45,7 @@ struct request {
     bool wants_body;               /* it is routed again once its body is there */
     size_t body_most;              /* bytes that body may have, set by then; 0 = body_max */
     bool is_long;                  /* it has more than body_max: one of spl_http.long_bodies */
+    uint64_t steps, stepped_ns;    /* how far it has come then, and when; for long_bodies.c alone */
     struct spl_ray_wish *ray_wish; // may be NULL; the list of rays being read that it waits for
     struct spl_rays *rays;         // may be NULL: not read yet; with what stood beside it in JSON:
     json_t *rest;                  // may be NULL: the query has it

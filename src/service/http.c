@@ -73,7 +73,7 @@ void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode
     request->service->http->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
-    request->service->http->long_bodies -= request->is_long;
+    spl_long_body_end(request);
     spl_rays_destroy(request->rays);
     json_decref(request->rest);
     free(request->body);
@@ -141,30 +141,12 @@ static size_t get_drained(const struct request *request)
     return get_most(request) > drain_max ? get_most(request) : drain_max;
 }
 
-/* One of the few whose bodies may be long at a time; false: there are enough, and it is refused. */
-static bool may_be_long(struct request *request)
-{
-    struct spl_http *http = request->service->http;
-    struct spl_error err = {0};
-    if (request->is_long || request->body_seen <= body_max)
-        return true;
-    if (http->long_bodies == long_bodies_max) {
-        spl_fail_field(&err, SPL_E_BUSY, "body", "%d bodies of more than 1 MiB are on their way; come back later",
-                       (int)long_bodies_max);
-        spl_reply_error(request, &err);
-        return false;
-    }
-    request->is_long = true;
-    http->long_bodies++;
-    return true;
-}
-
 static bool append_body(struct request *request, const char *data, size_t length)
 {
     request->body_seen += length;
     if (request->body_seen > get_most(request))
         return request->body_seen <= get_drained(request);
-    if (!may_be_long(request))
+    if (!spl_long_body_begin(request))
         return true;
     /* a long one has all its room at once, most of it untouched: growing copies, which took 80 ms of 16 MiB */
     const size_t room = request->is_long ? get_most(request) : request->body_seen;

@@ -85,6 +85,11 @@ void spl_connections_watch(struct spl_service *service);                    /* f
  * `version` are libmicrohttpd's method, where the request's bytes begin, and version. */
 bool spl_check_framing(struct request *request, const char *line, const char *version);
 
+/* long_bodies.c: one of the few whose bodies may be long at a time, at each piece of it that is there; false: there are
+ * enough, and it is refused. And its place for another: idempotent. */
+bool spl_long_body_begin(struct request *request);
+void spl_long_body_end(struct request *request);
+
 /* oversize.c: requests that libmicrohttpd would not answer are `abandoned`, answered past it. The first looks at the
  * target, still encoded; the second is for when the headers are there. */
 void spl_refuse_many_parameters(struct request *request, const char *uri);

@@ -1,6 +1,6 @@
 /* LAS 1.4, point format 7 (colour, GPS time): what mobile and airborne scans come in. Coordinates are whole tenths of a
  * millimetre around the scene's offset, which reaches 214 km. Colours are the 8 bit ones times 257, which is what the
- * format asks for. Classes are 0, "never classified", unless they were asked for; a point's source is its pass, counted from 1. Written for
+ * format asks for. The coordinate system is one of the scene's own, in metres. Classes are 0, "never classified", unless they were asked for; a point's source is its pass, counted from 1. Written for
  * little-endian and other machines alike. Pure functions; any thread. */
 #include "synth/format.h"
 
@@ -10,6 +10,8 @@
 #include <string.h>
 
 enum { header_bytes = 375, record_bytes = 36 };
+enum { record_header_bytes = 54, wkt_record = 2112, records_end = header_bytes + record_header_bytes };
+static const char wkt[] = "LOCAL_CS[\"splatd synth\",UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH]]"; /* with its NUL */
 static const double scale = 0.0001;
 static const double pulse_seconds = 1e-6;
 
@@ -45,18 +47,23 @@ static int32_t steps_of(double value)
 
 static size_t header(char *to, const struct spl_scan_file *file)
 {
-    memset(to, 0, header_bytes);
+    memset(to, 0, records_end);
     memcpy(to, "LASF", 4);
     to[24] = 1; /* version 1.4 */
     to[25] = 4;
     snprintf(to + 26, 32, "splatd synth %s", file->scene->name);
     snprintf(to + 58, 32, "splatd");
-    put16(to + 6,
-          17); /* standard GPS times; a coordinate system, if there were one, would be WKT: format 7 asks for it */
+    put16(to + 6, 17); /* standard GPS times; the coordinate system is WKT, as format 7 asks for */
     put16(to + 90, 1); /* day and year of creation: equal scans are equal files, whenever they were made */
     put16(to + 92, 2020);
     put16(to + 94, header_bytes);
-    put32(to + 96, header_bytes); /* the points follow at once */
+    put32(to + 96, records_end + sizeof wkt);
+    put32(to + 100, 1); /* record before them: */
+    char *about = to + header_bytes;
+    strcpy(about + 2, "LASF_Projection");
+    put16(about + 18, wkt_record);
+    put16(about + 20, sizeof wkt);
+    memcpy(to + records_end, wkt, sizeof wkt);
     to[104] = 7;
     put16(to + 105, record_bytes);
     for (int i = 0; i < 3; i++) {
@@ -71,7 +78,7 @@ static size_t header(char *to, const struct spl_scan_file *file)
     put64(to + 247, file->points);
     for (int i = 0; i < SPL_SCANNER_RETURNS_MAX; i++)
         put64(to + 255 + 8 * i, file->by_return[i]);
-    return header_bytes;
+    return records_end + sizeof wkt;
 }
 
 static size_t record(char *to, const struct spl_scan_file *file, const struct spl_return *r)

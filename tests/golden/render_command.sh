@@ -49,6 +49,9 @@ grep -q 'nothing is in view' messages && fail "the default view is not empty: $(
 "$splatd" render courtyard.spld --size 32 --eye 0,0,900 --target 0,0,990 --up 0,1,0 --format raw -o - 2>messages >/dev/null
 grep -Eq "nothing is in view; the dataset's bounds are -?[0-9.]+,-?[0-9.]+,-?[0-9.]+ to " messages ||
     fail "a view of nothing says: $(cat messages)"
+"$splatd" render courtyard.spld --size 32 --projection orthographic --view-height 9 --eye 0,0,-900 --target 0,0,-990 --up 0,1,0 \
+    --format raw -o - 2>messages >/dev/null
+grep -q ', all of it behind the eye' messages || fail "a plan from below the ground says: $(cat messages)"
 rm -f messages
 "$splatd" render --help | grep -q 'A first look' || fail "no help"
 "$splatd" render courtyard.spld --size 8x8 -o a.png 2>/dev/null

@@ -3,7 +3,9 @@ whichever frame; lists that are broken are refused by their place; long bodies a
 import io
 import json
 import math
+import select
 import struct
+import time
 import urllib.parse
 import zipfile
 
@@ -196,6 +198,7 @@ def test_long_lists_are_let_in():
         assert d.ask(f"{RAYS}?{QUERY}", "POST", npy(many[:3]), NPY).status == 200
         for sock in held:
             sock.close()
+        eventually(lambda: d.ask(f"{RAYS}?{QUERY}&resolution=57.3", "POST", npy(many), NPY).status == 200)
         unread = []  # who does not read a reply holds nobody's place
         for _ in range(9):
             sock = begin(d, len(npy(many)))
@@ -205,6 +208,36 @@ def test_long_lists_are_let_in():
         for sock in unread:
             sock.close()
         eventually(lambda: d.ask(f"{RAYS}?{QUERY}&resolution=57.3", "POST", npy(many), NPY).status == 200)
+
+
+def test_who_dawdles_keeps_no_place_of_long_lists():
+    """Seven clients that send two of three MiB and fall silent or send a byte now and then, and one that goes on."""
+    def send(piece):
+        for sock in silent[:3]:
+            sock.sendall(b"\0")
+        steady.sendall(piece)
+    with Daemon(REAL) as d:
+        one = npy(DIRECTIONS[:1])
+        body, ask = npy([DIRECTIONS[0]] * 120000, "d"), lambda: d.ask(f"{RAYS}?{QUERY}", "POST", one + bytes(2 << 20), NPY)
+        silent, steady = [begin(d, 3 << 20) for _ in range(7)], begin(d, len(body))
+        for sock in silent:
+            sock.sendall(bytes(2 << 20))
+        send(body[:1200000])
+        eventually(lambda: ask().status == 503)
+        for i in range(1200000, len(body), 100000):
+            send(body[i:i + 100000])
+            if ask().status == 400:  # let in, read and not liked
+                break
+            time.sleep(0.45)
+        else:
+            raise AssertionError("nobody's place was given up")
+        steady.sendall(body[i + 100000:])
+        assert b" 200 " in steady.recv(4096).split(b"\r\n")[0]
+        told = [sock for sock in silent if select.select([sock], [], [], 0)[0]]
+        assert len(told) == 1 and b" 408 " in told[0].recv(4096).split(b"\r\n")[0], told
+        for sock in silent:
+            sock.close()
+        assert d.status()["counters"]["slow_closed"] == 1
 
 
 run(globals())

@@ -67,6 +67,8 @@ for words, wanted in {
     "tour a.spld --require-gpu=no --path b -o c": "--require-gpu takes no argument",
     "render a.spld --soft-opacity 0.2 -o b.png": "--soft-opacity is of what is soft.*--soft 'class:3-5'",
     "render a.spld --of first -o b.png": "--of is of what is soft", "tour a.spld --path b --soft-cover 0 -o c": "--soft-cover is of",
+    "render a.spld --ramp turbo -o b.png": "--ramp is of values.*--color-by height",
+    "tour a.spld --path b --color-by flat:red --range 0..1 -o c": "--range is of values",
     "bench a.spld --soft-opacity 0.2": "--soft 'class:3-5'", "render a.spld --soft class=5 -o b.png": "write 'class:5'",
     "serve nosuch": r"nosuch: there is no such file or directory of datasets.*splatd pack",
     "sign /v1/datasets/a/view --key nosuch": "nosuch.*openssl rand -hex 32",

@@ -210,7 +210,7 @@ int spl_values_choose_view(struct values *values, const struct spl_camera_defaul
     int rc = own->names->find(own->names, view->word, own, err);
     *defaults = own;
     if (!rc)
-        spl_values_inherit_projection(values, own->view_height);
+        spl_camera_inherit_projection(values->v, own->view_height);
     return rc ? rc : spl_values_inherit_saved(values, own->settings, err);
 }
 

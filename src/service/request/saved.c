@@ -41,18 +41,6 @@ int spl_values_inherit_saved(struct values *values, const char *settings, struct
     return 0;
 }
 
-void spl_values_inherit_projection(struct values *values, double view_height)
-{
-    struct spl_value *projection = &values->v[SPL_CAMERA_projection], *height = &values->v[SPL_CAMERA_view_height];
-    bool own = projection->given && projection->n[0] != SPL_ORTHOGRAPHIC;
-    for (int i = SPL_CAMERA_model; i <= SPL_CAMERA_elevation; i++) /* what says another lens, or how high */
-        own = own || (values->v[i].given && i != SPL_CAMERA_projection && i != SPL_CAMERA_cx && i != SPL_CAMERA_cy);
-    if (own || !(view_height > 0))
-        return;
-    *projection = (struct spl_value){.given = true, .count = 1, .n = {SPL_ORTHOGRAPHIC}};
-    *height = (struct spl_value){.given = true, .count = 1, .n = {view_height}};
-}
-
 int spl_view_request_from_saved(const struct spl_saved_view *view, const struct spl_camera_defaults *defaults,
                                 const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err)

@@ -19,8 +19,22 @@ const struct param_info spl_params[PARAM_COUNT] = {
 #undef PARAM
 };
 
+/* What a place takes, for those that are no view's; NULL for a view's. */
+static const char *say_taken(enum spl_value_place place)
+{
+    return place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
+           : place == SPL_TILE ? "a tile's path says where it lies; it takes what is drawn (clip, class, soft), how (method, lod, color_by, "
+                                 "shade, supersample, …), background, quality, wait and v"
+           : place == SPL_THUMBNAIL ? "a thumbnail takes width, background, clip, class and v"
+           : place == SPL_SAVED     ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
+           : place == SPL_PLACE     ? "a dataset takes crs, a place crs and position or world"
+           : place == SPL_STATIONS  ? "a list of stations takes crs, first and count"
+                                    : NULL;
+}
+
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
 {
+    const char *taken = say_taken(place);
     for (int i = 0; i < PARAM_COUNT; i++) {
         const struct param_info *info = &spl_params[i];
         bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
@@ -35,11 +49,7 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
             return (enum param)i;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
-                       : place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
-                       : place == SPL_THUMBNAIL             ? "a thumbnail takes width, background, clip, class and v"
-                       : place == SPL_SAVED                 ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
-                       : place == SPL_PLACE                 ? "a dataset takes crs, a place crs and position or world"
-                       : place == SPL_STATIONS              ? "a list of stations takes crs, first and count"
+                       : taken                              ? taken
                        : info->places == SPL_STATIONS       ? "it is a parameter of a list of stations"
                        : info->places == SPL_PLACE          ? "it is a parameter of a place"
                        : info->places == SPL_PICK           ? "it is a parameter of a pick"
@@ -48,7 +58,8 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
-    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; /v1/openapi.json lists those of a view", name);
+    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s", name,
+                   taken ? taken : "/v1/openapi.json lists those of a view");
     return PARAM_COUNT;
 }
 

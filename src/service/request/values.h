@@ -117,9 +117,6 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
 /* saved.c: what a saved view's settings, a JSON object as text, say and `values` do not. SPL_E_INPUT. */
 int spl_values_inherit_saved(struct values *values, const char *settings, struct spl_error *err);
 
-/* The same of its being orthographic, `view_height` high (0: it is not), unless `values` say how high, or through which lens. */
-void spl_values_inherit_projection(struct values *values, double view_height);
-
 /* The parts of it that picks share: method, lod, margin, what method fill takes; the version. */
 void spl_values_resolve_splats(const struct values *values, struct spl_view *view);
 

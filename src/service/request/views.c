@@ -38,14 +38,9 @@ static int resolve_view(const struct values *common, json_t *json, const struct 
 /* Whether no view before it has its lens: each is traced once, on the loop, for up to two milliseconds. */
 static bool has_own_lens(const struct spl_views_request *views, const struct spl_view *view)
 {
-    const struct spl_camera *a = &view->camera;
-    for (size_t i = 0; i < views->count; i++) {
-        const struct spl_camera *b = &views->views[i].view.camera;
-        if (a->projection == b->projection && a->width == b->width && a->height == b->height && a->fx == b->fx &&
-            a->fy == b->fy && a->cx == b->cx && a->cy == b->cy && !memcmp(&a->lens, &b->lens, sizeof a->lens) &&
-            a->near == b->near && a->far == b->far && view->supersample == views->views[i].view.supersample)
+    for (size_t i = 0; i < views->count; i++)
+        if (spl_view_shares_lens(view, &views->views[i].view))
             return false;
-    }
     return true;
 }
 

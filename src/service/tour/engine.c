@@ -20,6 +20,7 @@
 #include "service/ops/counters.h"
 #include "service/state.h"
 #include "service/tour/fade.h"
+#include "service/tour/spec.h"
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
@@ -213,23 +214,16 @@ void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct sp
     }
 }
 
-/* False when the pipeline has no place, or the tour has ended. */
 /* A camera's faces differ from frame to frame, and tracing those of all would take too long where the tour is taken. */
 static int check_faces(const struct spl_service *service, const struct spl_view *view, struct spl_error *err)
 {
     if (!spl_camera_is_bent(&view->camera))
         return SPL_OK;
     const struct spl_camera_limits limits = spl_view_get_limits(service);
-    int rc = spl_view_check(view, err);
-    if (!rc && limits.samples && spl_view_get_samples(view) > limits.samples)
-        rc = spl_fail(err, SPL_E_LIMIT, "a frame of %llu samples; the limit is %llu",
-                      (unsigned long long)spl_view_get_samples(view), (unsigned long long)limits.samples);
-    if (!rc && limits.bytes && spl_view_get_frame_bytes(view) > limits.bytes)
-        rc = spl_fail(err, SPL_E_LIMIT, "a frame of %llu bytes; the limit is %llu",
-                      (unsigned long long)spl_view_get_frame_bytes(view), (unsigned long long)limits.bytes);
-    return rc;
+    return spl_tour_check_frame(view, &limits, err);
 }
 
+/* False when the pipeline has no place, or the tour has ended. */
 static bool submit(struct spl_tour *tour, size_t frame)
 {
     struct spl_tours *tours = tour->tours;

@@ -168,26 +168,34 @@ static int check_fades(const struct spl_camera_path *path, const struct spl_view
                           "{\"soft\": \"class:3-5\"}, or leave these out");
 }
 
+int spl_tour_check_frame(const struct spl_view *view, const struct spl_camera_limits *limits, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    if (spl_view_check(view, &why)) { /* what the path's cameras have no images of */
+        char field[sizeof why.field + 16];
+        snprintf(field, sizeof field, "settings.%s", why.field);
+        return spl_fail_field(err, why.code, field, "%s", why.message);
+    }
+    const uint64_t samples = spl_view_get_samples(view), bytes = spl_view_get_frame_bytes(view);
+    if (limits->samples && samples > limits->samples)
+        return spl_fail_field(err, SPL_E_LIMIT, "settings.supersample", "frames of %llu samples; the limit is %llu",
+                              (unsigned long long)samples, (unsigned long long)limits->samples);
+    if (limits->bytes && bytes > limits->bytes)
+        return spl_fail_field(err, SPL_E_LIMIT, "settings.layers", "frames of %llu bytes; the limit is %llu",
+                              (unsigned long long)bytes, (unsigned long long)limits->bytes);
+    return SPL_OK;
+}
+
 /* A path may bring its own size, so a frame is judged here as well. */
 static int check_limits(const struct spl_view *settings, const struct spl_camera_path *path,
                         const struct spl_tour_limits *limits, size_t frames, struct spl_error *err)
 {
     struct spl_view view = *settings;
     view.camera = path->cameras[0];
-    struct spl_error why = {0};
-    if (spl_view_check(&view, &why)) { /* what the path's cameras have no images of */
-        char field[sizeof why.field + 16];
-        snprintf(field, sizeof field, "settings.%s", why.field);
-        return spl_fail_field(err, why.code, field, "%s", why.message);
-    }
-    uint64_t samples = spl_view_get_samples(&view);
-    if (limits->image.samples && samples > limits->image.samples)
-        return spl_fail_field(err, SPL_E_LIMIT, "settings.supersample", "frames of %llu samples; the limit is %llu",
-                              (unsigned long long)samples, (unsigned long long)limits->image.samples);
-    if (limits->image.bytes && spl_view_get_frame_bytes(&view) > limits->image.bytes)
-        return spl_fail_field(err, SPL_E_LIMIT, "settings.layers", "frames of %llu bytes; the limit is %llu",
-                              (unsigned long long)spl_view_get_frame_bytes(&view),
-                              (unsigned long long)limits->image.bytes);
+    int rc = spl_tour_check_frame(&view, &limits->image, err);
+    if (rc)
+        return rc;
+    const uint64_t samples = spl_view_get_samples(&view);
     if (frames > limits->pixels / samples)
         return spl_fail_field(err, SPL_E_LIMIT, "frames",
                               "%zu frames of %llu samples; the limit of a tour is %llu", frames,

@@ -32,6 +32,9 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
 int spl_tour_spec_from_text(const char *body, size_t length, const struct spl_camera_defaults *defaults,
                             const struct spl_tour_limits *limits, struct spl_tour_spec *out, struct spl_error *err);
 
+/* Can a frame be drawn, and is it within the limits? Fields are those of the settings. */
+int spl_tour_check_frame(const struct spl_view *view, const struct spl_camera_limits *limits, struct spl_error *err);
+
 void spl_tour_spec_finish(struct spl_tour_spec *spec);
 
 #endif

@@ -102,8 +102,7 @@ static void let_go(struct request *request)
     request->rays = NULL;
     json_decref(request->rest);
     request->rest = NULL;
-    request->service->http->long_bodies -= request->is_long;
-    request->is_long = false;
+    spl_long_body_end(request);
 }
 
 static void answer(struct request *request, const struct spl_call *call)

@@ -565,6 +565,28 @@ static const struct {
     {raw_unknown_damaged, SPL_E_CORRUPT, "section NEWS fails its checksum"},
 };
 
+/* Of what a stranger's file says, only what can be shown comes to those who read it; lines of a description stay. */
+static void test_texts_that_cannot_be_shown(void **state)
+{
+    (void)state;
+    struct parts p = take_apart();
+    struct spl_dataset *dataset;
+    json_object_set_new(p.meta, "title", json_string("The \033[2J hall\xc2\x9b\xe2\x80\xae" "gpj"));
+    json_object_set_new(p.meta, "description", json_string("One\nt\tw\xc3\xb6\xe2\x81\xa6\a"));
+    json_object_set_new(p.meta, "sources", json_pack("[s, s]", "plain", "a\nb\xc2\x85"));
+    write_parts(&p);
+    assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    const json_t *sources = json_object_get(spl_dataset_get_meta(dataset), "sources");
+    assert_string_equal(info->title, "The ?[2J hall??gpj");
+    assert_string_equal(info->description, "One\nt\tw\xc3\xb6??");
+    assert_string_equal(json_string_value(json_array_get(sources, 0)), "plain");
+    assert_string_equal(json_string_value(json_array_get(sources, 1)), "a?b?");
+    spl_dataset_close(dataset);
+    unlink(path);
+    release(&p);
+}
+
 static void test_forged_layout(void **state)
 {
     (void)state;
@@ -610,6 +632,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_forged_content),
+        cmocka_unit_test(test_texts_that_cannot_be_shown),
         cmocka_unit_test(test_forged_layout),
         cmocka_unit_test(test_unknown_streams),
     };

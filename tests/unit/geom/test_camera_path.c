@@ -271,6 +271,8 @@ static void test_add_refuses(void **state)
     refused(&path, &camera, NAN, "time");
     refused(&path, &camera, INFINITY, "time");
     refused(&path, &camera, uneven[1], "time");
+    refused(&path, &camera, 1e21, "time"); /* differences would overflow, and name the eye between two keys */
+    refused(&path, &camera, nextafter(uneven[1], 1e9), "time");
     refused(&plain, &camera, 1, "time");
     struct spl_camera_path scans = {0}; /* whose rays nothing lies between */
     struct spl_camera scan = make_camera(0);
@@ -283,6 +285,16 @@ static void test_add_refuses(void **state)
         refused(&scans, &other, NAN, i < 2 ? "azimuth" : "elevation");
     }
     spl_camera_path_finish(&scans);
+    /* the farthest and the closest times that are taken, over the longest way */
+    static const double extremes[] = {-1e20, 0, 1e-12, 1e20};
+    struct spl_camera_path far = {0};
+    struct spl_camera frames[9];
+    for (int i = 0; i < 4; i++) {
+        camera.eye[0] = i % 2 ? 1e12 : -1e12;
+        assert_int_equal(spl_camera_path_add(&far, &camera, extremes[i], NULL), 0);
+    }
+    assert_int_equal(spl_camera_path_sample(&far, &(struct spl_path_motion){.positions = SPL_POSITIONS_LINEAR}, 9, frames, NULL), 0);
+    spl_camera_path_finish(&far);
     assert_int_equal(
         spl_camera_path_sample(&(struct spl_camera_path){0}, &(struct spl_path_motion){0}, 1, &camera, NULL),
         SPL_E_INPUT);
@@ -335,7 +347,7 @@ static void test_frames_are_counted(void **state)
         else
             assert_true(count == cases[i].count && fps == cases[i].rate);
     }
-    static const char *const fields[] = {"frames", "seconds", "seconds", "frames"};
+    static const char *const fields[] = {"frames", "seconds", "time", "frames"};
     for (int i = 0; i < 4; i++) { /* the caller's limit is the one that is named, whatever asks for the frames */
         struct spl_error err = {0};
         const struct spl_camera_path *path = i == 3 ? &whole : i == 2 ? &timed : &plain;

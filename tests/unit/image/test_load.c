@@ -118,6 +118,8 @@ static void broken_npy_is_refused_by_field(void **state)
          "'('"},
         {"{'descr': '<f4', 'shape': (1, 2), }", SPL_LAYER_DEPTH, SPL_E_INPUT, "fortran_order", ""},
         {"{'descr': '<f4', 'fortran_order': False}", SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", ""},
+        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'shape' : (2, 1), }", SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "twice"},
+        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'descr': '<f4'}", SPL_LAYER_DEPTH, SPL_E_INPUT, "descr", "twice"},
         {"", SPL_LAYER_DEPTH, SPL_E_INPUT, "version", ""},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

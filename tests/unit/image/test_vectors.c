@@ -86,6 +86,8 @@ static void others_are_refused(void **state)
         {"{'descr': '<f8', 'fortran_order': False, 'shape': (18446744073709551615, 3), }", "rows"},
         {"{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999, 3), }", "(count, 3)"},
         {"{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }", "need"},
+        {"{'descr': '<f8', 'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", "'descr' is there twice"},
+        {"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), 'fortran_order': True}", "'fortran_order' is there twice"},
         {"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", "need"},
     };
     for (size_t i = 0; i < sizeof headers / sizeof *headers; i++) {

@@ -57,6 +57,12 @@ static void a_tile_lies_among_others(void **state)
     struct spl_error err = {0};
     assert_int_equal(spl_tile_request_from_query("shade=edl", 9, &tile, &defaults, &limits, &r, &err), 0);
     assert_true(r.view.surrounded && r.view.camera.projection == SPL_ORTHOGRAPHIC && r.view.camera.width == 256);
+    assert_int_equal(spl_tile_request_from_query("station=1", 9, &tile, &defaults, &limits, &r, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "station"); /* and what a tile takes, known elsewhere or nowhere */
+    assert_non_null(strstr(err.message, "a tile's path says where it lies"));
+    err = (struct spl_error){0};
+    assert_int_equal(spl_tile_request_from_query("rotation=1", 10, &tile, &defaults, &limits, &r, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "unknown parameter 'rotation'; a tile's path"));
     assert_int_equal(spl_view_request_from_query("shade=edl", 9, &defaults, &limits, &r, &err), 0);
     assert_false(r.view.surrounded);
 }
