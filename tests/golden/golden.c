@@ -185,25 +185,40 @@ static struct spl_view make_view(const struct golden *golden)
     return view;
 }
 
-/* The PNG of one layer of a frame; false after a message. */
-static bool render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                   enum spl_layer layer, struct spl_encoded *png)
+static bool draw(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                 struct spl_frame *frame)
 {
-    struct spl_frame frame;
     struct spl_error err = {0};
-    if (spl_renderer_render(renderer, dataset, view, &frame, &err)) {
-        fprintf(stderr, "rendering failed: %s\n", err.message);
-        return false;
-    }
-    struct spl_image image = frame.images[layer];
+    if (!spl_renderer_render(renderer, dataset, view, frame, &err))
+        return true;
+    fprintf(stderr, "rendering failed: %s\n", err.message);
+    return false;
+}
+
+/* The PNG of one layer of a frame of `view`; false after a message. */
+static bool encode(const struct spl_frame *frame, const struct spl_view *view, enum spl_layer layer,
+                   struct spl_encoded *png)
+{
+    struct spl_error err = {0};
+    struct spl_image image = frame->images[layer];
     if (view->rays) { /* a pixel a ray, in their order */
         image.width = GOLDEN_WIDTH;
         image.height = GOLDEN_HEIGHT;
     }
-    bool good = !spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), png,
-                                  &err);
-    if (!good)
-        fprintf(stderr, "encoding failed: %s\n", err.message);
+    if (!spl_image_encode(&image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_PNG), png, &err))
+        return true;
+    fprintf(stderr, "encoding failed: %s\n", err.message);
+    return false;
+}
+
+/* Both. */
+static bool render(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
+                   enum spl_layer layer, struct spl_encoded *png)
+{
+    struct spl_frame frame;
+    if (!draw(renderer, dataset, view, &frame))
+        return false;
+    bool good = encode(&frame, view, layer, png);
     spl_frame_finish(&frame);
     return good;
 }
@@ -363,23 +378,33 @@ static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const
 {
     static const struct tolerance one_level = {1, 0.0001};
     bool good = true;
-    for (int i = 0; i < GOLDEN_COUNT; i++)
+    for (int i = 0; i < GOLDEN_COUNT; i++) {
+        struct spl_view view = make_view(&goldens[i]);
+        const struct spl_dataset *dataset = place_of(places, &goldens[i]);
+        struct spl_frame of_a, of_b;
+        view.layers = ((1u << SPL_LAYER_COUNT) - 1) & ~(1u << SPL_LAYER_ID);
+        if (goldens[i].around)
+            view.layers &= ~(1u << SPL_LAYER_DEPTH);
+        if (!draw(a, dataset, &view, &of_a))
+            return false;
+        if (!draw(b, dataset, &view, &of_b)) {
+            spl_frame_finish(&of_a);
+            return false;
+        }
         for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
-            if (layer == SPL_LAYER_ID || (layer == SPL_LAYER_DEPTH && goldens[i].around))
-                continue;
-            struct spl_view view = make_view(&goldens[i]);
-            struct spl_encoded left, right;
+            struct spl_encoded left = {0}, right = {0};
             char name[64];
-            view.layers = 1u << layer;
+            if (!(view.layers >> layer & 1))
+                continue;
             snprintf(name, sizeof name, "%s-%s", goldens[i].name, spl_layer_name((enum spl_layer)layer));
-            const struct spl_dataset *dataset = place_of(places, &goldens[i]);
-            if (!render(a, dataset, &view, (enum spl_layer)layer, &left) ||
-                !render(b, dataset, &view, (enum spl_layer)layer, &right))
-                return false;
-            good = judge(name, "backends", &right, &left, one_level) && good;
+            good = encode(&of_a, &view, (enum spl_layer)layer, &left) &&
+                   encode(&of_b, &view, (enum spl_layer)layer, &right) && judge(name, "backends", &right, &left, one_level) && good;
             spl_encoded_finish(&left);
             spl_encoded_finish(&right);
         }
+        spl_frame_finish(&of_a);
+        spl_frame_finish(&of_b);
+    }
     return good;
 }
 

@@ -107,7 +107,8 @@ static int run_conditions(struct suite *suite, struct conditions *conditions)
     snprintf(path, sizeof path, "%s/tests/stability/table.json", root ? root : ".");
     if (!open_renderer("vulkan", &suite->renderer))
         return SKIPPED;
-    open_renderer("egl", &suite->other);
+    if (suite->whole) /* else OpenGL's frames are held against Vulkan's, by `drivers` */
+        open_renderer("egl", &suite->other);
     conditions->suite = suite;
     conditions->table = table_open(path);
     conditions_of_scans(conditions);
