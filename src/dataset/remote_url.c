@@ -13,7 +13,6 @@
 
 enum { url_bytes_max = 4096 };
 
-static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
 static const char unreserved[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/";
 
 static const char *get_variable(const char *name, const char *other)
@@ -36,11 +35,9 @@ struct spl_s3_account spl_s3_account_of_environment(void)
 /* Bytes of the scheme and its "://"; 0 = it is no URL. */
 static size_t scheme_length(const char *path)
 {
-    size_t length = strspn(path, letters);
-    if (length < 2) // one letter is a drive
-        return 0;
-    length += strspn(path + length, "0123456789+-.ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz");
-    return !strncmp(path + length, "://", 3) ? length + 3 : 0;
+    size_t length = strspn(path, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+-.");
+    bool begins = *path && strchr("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz", *path);
+    return begins && length > 1 && !strncmp(path + length, "://", 3) ? length + 3 : 0; // one letter is a drive
 }
 
 bool spl_remote_is_url(const char *path)
@@ -136,7 +133,7 @@ static int check_form(const char *text, const char *shown, struct spl_error *err
                             "ASCII; write it as %%XX", shown);
     if (http && strchr(text, '#'))
         return spl_fail(err, SPL_E_USAGE, "%.300s: a dataset's URL has no '#'", shown);
-    if (http && strspn(text + scheme, "/?@:"))
+    if (http && !strcspn(text + scheme, "/?@:"))
         return spl_fail(err, SPL_E_USAGE, "%.300s names no host", shown);
     return SPL_OK;
 }
