@@ -37,6 +37,8 @@ struct exchange {
     struct spl_remote_reply *reply;
     bool begun, refused; /* the head of a 206 was found right; what comes is not wanted */
     size_t swallowed;
+    uint64_t moved_ns; /* when something last came: curl's own measure of speed forgets too slowly */
+    bool stalled;
     char refusal[refusal_bytes + 1]; /* the beginning of what an error says of itself */
     size_t refusal_used;
 };
@@ -100,6 +102,7 @@ static size_t on_body(char *data, size_t one, size_t bytes, void *context)
 {
     struct exchange *e = context;
     (void)one;
+    e->moved_ns = spl_now_ns();
     if (e->reply->status == 206) {
         if (!e->begun && !e->refused)
             e->begun = !(e->refused = !e->ask->begin(e->ask->context));
@@ -114,10 +117,13 @@ static size_t on_body(char *data, size_t one, size_t bytes, void *context)
     return e->refused ? 0 : bytes;
 }
 
+/* Called once a second at least. */
 static int on_progress(void *context, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
 {
+    struct exchange *e = context;
     (void)a, (void)b, (void)c, (void)d;
-    return spl_is_cancelled(((struct exchange *)context)->ask->cancelled);
+    e->stalled = spl_now_ns() - e->moved_ns > e->ask->stall_ms * SPL_NS_PER_MS;
+    return e->stalled || spl_is_cancelled(e->ask->cancelled);
 }
 
 /* <Code>AccessDenied</Code> of an S3 error: a word, or nothing. */
@@ -197,10 +203,7 @@ static bool set_up(const struct server *server, CURL *handle, struct exchange *e
     SET(CURLOPT_HTTPHEADER, *headers);
     SET(CURLOPT_CONNECTTIMEOUT_MS, (long)ask->connect_ms);
     SET(CURLOPT_TIMEOUT_MS, left_ms < 86400000 ? (long)left_ms : 86400000L);
-    SET(CURLOPT_LOW_SPEED_LIMIT, 1024L);
-    SET(CURLOPT_LOW_SPEED_TIME, (long)(ask->stall_ms / 1000 ? ask->stall_ms / 1000 : 1));
-    SET(CURLOPT_BUFFERSIZE, 256L << 10);
-    SET(CURLOPT_TCP_KEEPALIVE, 1L);
+    curl->curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 256L << 10); // refused where a handle still has its buffer
     SET(CURLOPT_HEADERFUNCTION, on_header);
     SET(CURLOPT_HEADERDATA, e);
     SET(CURLOPT_WRITEFUNCTION, on_body);
@@ -242,7 +245,7 @@ static void give_handle(struct server *server, CURL *handle)
 static void ask(void *context, const struct spl_remote_ask *what, struct spl_remote_reply *reply)
 {
     struct server *server = context;
-    struct exchange e = {.ask = what, .reply = reply};
+    struct exchange e = {.ask = what, .reply = reply, .moved_ns = spl_now_ns()};
     struct curl_slist *headers = NULL;
     *reply = (struct spl_remote_reply){0};
     CURL *handle = take_handle(server);
@@ -257,8 +260,8 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
         read_code(&e);
         if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
             bool partly = reply->status == 206;
-            reply->may_pass = may_pass(code);
-            snprintf(reply->why, sizeof reply->why, "%s", server->curl->curl_easy_strerror(code));
+            reply->may_pass = may_pass(code) || e.stalled;
+            snprintf(reply->why, sizeof reply->why, "%s", e.stalled ? "nothing came any more" : server->curl->curl_easy_strerror(code));
             if (!partly || !reply->may_pass)
                 reply->status = 0;
         }

@@ -115,7 +115,7 @@ static int give_up(const struct spl_remote_origin *origin, const struct spl_remo
 
 uint64_t spl_remote_get_patience_ns(const struct spl_remote_origin *origin, uint64_t bytes)
 {
-    return origin->deadline_ms * SPL_NS_PER_MS + (bytes >> 20) * per_mib_ns;
+    return origin->deadline_ms * SPL_NS_PER_MS + ((bytes + (1 << 20) - 1) >> 20) * per_mib_ns;
 }
 
 /* False where who waits does so no longer. */

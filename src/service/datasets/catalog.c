@@ -215,6 +215,11 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
             if (rc)
                 return rc;
             spl_remote_url_finish(&url);
+            size_t length;
+            char shown[300];
+            if (!spl_catalog_id_of(paths[i], &length))
+                return spl_fail(err, SPL_E_USAGE, "%s: its name cannot be a dataset's id, which has at most "
+                                SPL_CATALOG_ID_RULE, spl_remote_show(paths[i], shown, sizeof shown));
         } else if (stat(paths[i], &status))
             return errno == ENOENT ? spl_fail(err, SPL_E_USAGE,
                                               "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
