@@ -154,6 +154,7 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     dataset->cancelled = how->cancelled;
     dataset->source = *source;
     dataset->remote = source->far;
+    dataset->lazily = source->far && !(how->verify && how->verify_remote);
     dataset->tables_limit = how->tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);

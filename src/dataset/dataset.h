@@ -30,10 +30,11 @@ struct spl_dataset_opening {
     const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
     struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
     uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */
+    bool verify_remote;                /* with `verify`: also of a server all is read at first */
 };
 
-/* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, and each part is
- * held against its checksum when it is read, whatever `verify` says. */
+/* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless
+ * `verify_remote`, and each part is held against its checksum when it is read, whatever `verify` says. */
 
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
                         struct spl_error *err);

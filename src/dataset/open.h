@@ -35,7 +35,8 @@ struct spl_dataset {
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
     bool verified;                /* every page had its checksum when the dataset was opened, or has it when it is read */
-    bool remote;                  /* the latter; what is wrong may have come so, and is asked for once more */
+    bool remote;                  /* what is wrong may have come so, and is asked for once more */
+    bool lazily;                  /* it is remote, and what is large is held against checksums when it is read alone */
     bool opened;                  /* all is checked; what is read from here on is read while in use */
     struct spl_section *sections;
     uint32_t section_count;

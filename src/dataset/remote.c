@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/queue.h>
+#include <time.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -265,10 +266,20 @@ static int fetch_window(struct remote *remote, uint64_t offset, char *out, size_
     return rc;
 }
 
+static atomic_uint fetching; /* reads under way in this process */
+
+bool spl_remote_wait_idle(uint64_t deadline_ns)
+{
+    while (atomic_load(&fetching) && spl_remaining_ns(deadline_ns))
+        nanosleep(&(struct timespec){.tv_nsec = 5 * SPL_NS_PER_MS}, NULL);
+    return !atomic_load(&fetching);
+}
+
 static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
 {
     struct remote *remote = context;
     int rc = SPL_OK;
+    atomic_fetch_add(&fetching, 1);
     for (char *to = out; bytes && !rc;) {
         uint64_t end = (offset / BLOCK + window) * BLOCK;
         size_t some = end - offset < bytes ? (size_t)(end - offset) : bytes;
@@ -277,6 +288,7 @@ static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct
         offset += some;
         bytes -= some;
     }
+    atomic_fetch_sub(&fetching, 1);
     return rc;
 }
 

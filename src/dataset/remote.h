@@ -21,6 +21,10 @@ struct spl_remote_how {
 int spl_remote_open(const char *url, const struct spl_remote_how *how, struct spl_dataset_source *out,
                     struct spl_error *err);
 
+/* Waits until no read from a server is under way in this process; false where one still was at the deadline. For who has
+ * cancelled them all and is about to free the flag. */
+bool spl_remote_wait_idle(uint64_t deadline_ns);
+
 /* The same through any link, which is taken on success. */
 int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, const struct spl_remote_how *how,
                          struct spl_dataset_source *out, struct spl_error *err);

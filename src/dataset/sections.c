@@ -347,7 +347,9 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
     if (rc)
         return rc;
     dataset->verified = verify || dataset->remote;
-    verify = verify && !dataset->remote;
+    verify = verify && !dataset->lazily;
+    if (verify && dataset->section_count)
+        spl_dataset_expect(dataset, &dataset->sections[0], &dataset->sections[dataset->section_count - 1]);
     struct hashing hashing = {.dataset = dataset, .verify = verify, .failed = UINT32_MAX};
     spl_parallel_for(verify ? 0 : 1, dataset->section_count, 1, hash_sections, &hashing);
     char name[40];

@@ -287,7 +287,7 @@ int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
     if (whole && dataset->info.pages)
         spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0], dataset->found[SPL_KIND_HEADS].at[dataset->info.pages - 1]);
-    if (!rc && (whole || (dataset->verified && !dataset->remote)))
+    if (!rc && (whole || (dataset->verified && !dataset->lazily)))
         rc = read_all(dataset, err);
     return rc || !whole ? rc : spl_dataset_check_children(dataset, err);
 }

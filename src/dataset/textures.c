@@ -104,7 +104,7 @@ int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index,
         return rc;
     if (!sound)
         return spl_dataset_fail_checksum(dataset, "the section with textures of page", index, err);
-    return dataset->verified && !dataset->remote ? SPL_OK : judge_page(dataset, index, out, err);
+    return dataset->verified && !dataset->lazily ? SPL_OK : judge_page(dataset, index, out, err);
 }
 
 /* Calls `visit` with the textures of one page after another. */
@@ -137,7 +137,7 @@ static int judge(const struct spl_dataset *dataset, uint32_t index, const uint32
 
 int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *err)
 {
-    return dataset->verified && !dataset->remote ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
+    return dataset->verified && !dataset->lazily ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
 }
 
 static int count_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,

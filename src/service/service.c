@@ -20,6 +20,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/access/access.h"
+#include "dataset/remote.h"
 #include "service/datasets/library.h"
 #include "service/exchange.h"
 #include "service/http.h"
@@ -312,7 +313,10 @@ done:
         close(service->http->listen_fd);
     finish_loop(service);
     spl_tours_close(service->tours);
+    bool idle = spl_remote_wait_idle(spl_now_ns() + 1500 * SPL_NS_PER_MS); // they have been cancelled, and look at the library's flag
     end_in(service, 0);
+    if (!idle)
+        return rc; // with what they look at: the process is about to end
 free_house:
     free(house);
     return rc;
