@@ -56,21 +56,31 @@ static struct spl_io_read *find_being_read(struct spl_io *io, const void *source
     return NULL;
 }
 
-/* Are as many under way of its source as may be? */
-static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
-{
-    unsigned count = 0;
-    struct spl_io_read *read;
-    TAILQ_FOREACH(read, &io->being_read, link)
-    count += read->what.source == what->source;
-    return count >= (what->at_once ? what->at_once : 1);
-}
-
 /* When something of it was last seen. */
 static uint64_t get_sign_ns(const struct spl_io_read *read)
 {
     uint64_t moved_ns = read->what.get_moved_ns ? read->what.get_moved_ns(read->what.source) : 0;
     return moved_ns > read->began_ns ? moved_ns : read->began_ns;
+}
+
+static bool hangs(const struct spl_io_read *read)
+{
+    uint64_t sign_ns = get_sign_ns(read), now_ns = spl_now_ns();
+    return now_ns > sign_ns && now_ns - sign_ns >= hangs_ns;
+}
+
+/* Are as many under way of its source as may be? One where something hangs is no place for more threads. */
+static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
+{
+    unsigned count = 0;
+    bool any_hangs = false;
+    struct spl_io_read *read;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    {
+        count += read->what.source == what->source;
+        any_hangs |= read->what.source == what->source && hangs(read);
+    }
+    return any_hangs || count >= (what->at_once ? what->at_once : 1);
 }
 
 /* The best that waits for a thread only, if there is room for it. */
@@ -386,12 +396,6 @@ uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source)
     uint64_t moved_ns = own ? get_sign_ns(own) : io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
     return moved_ns;
-}
-
-static bool hangs(const struct spl_io_read *read)
-{
-    uint64_t sign_ns = get_sign_ns(read), now_ns = spl_now_ns();
-    return now_ns > sign_ns && now_ns - sign_ns >= hangs_ns;
 }
 
 bool spl_io_hangs(struct spl_io *io, const void *source)

@@ -20,7 +20,7 @@
 
 enum {
     SPL_IO_READS = 256, /* of a source that may be under way, with ended ones not yet given back; 4 times of all */
-    SPL_IO_THREADS = 16
+    SPL_IO_THREADS = 64
 };
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
 
