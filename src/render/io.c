@@ -138,6 +138,8 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
 {
     struct spl_io_what what = read->what;
     struct spl_error err = {0};
+    if (what.hold)
+        what.hold(what.source); // before its owner can end the read and close it
     TAILQ_REMOVE(&io->waiting, read, link);
     TAILQ_INSERT_TAIL(&io->being_read, read, link);
     read->state = BEING_READ;
@@ -148,8 +150,6 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     io->staged += what.bytes;
     io->moved_ns = read->began_ns;
     see_to_waiting(io);
-    if (what.hold)
-        what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
     if (!data)
         data = spl_alloc_raw(what.bytes, 1, &err);

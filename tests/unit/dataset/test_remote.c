@@ -32,7 +32,7 @@ struct server {
     int failing, cutting, flipping;
     uint64_t retry_after_s;
     bool lies_about_range, packs, ignores_conditions, ignores_range, trickles;
-    unsigned delay_ms;
+    uint64_t until_joined; /* it answers once so many blocks were joined in all */
     int asks, closed, at_once, at_once_most;
     struct {
         uint64_t first;
@@ -83,9 +83,10 @@ static void ask(void *context, const struct spl_remote_ask *ask, struct spl_remo
     size_t bytes = answer(s, ask, reply), sent = 0;
     bool cut = bytes > 1 && s->cutting && s->cutting--, flip = bytes && s->flipping && s->flipping--;
     s->at_once_most = ++s->at_once > s->at_once_most ? s->at_once : s->at_once_most;
-    unsigned delay_ms = s->delay_ms;
+    uint64_t until_joined = s->until_joined;
     pthread_mutex_unlock(&s->mutex);
-    usleep(1000 * delay_ms);
+    while (atomic_load(&spl_remote_counts.joined) < until_joined)
+        usleep(1000);
     char *copy = malloc(bytes + 1);
     memcpy(copy, s->bytes + (bytes ? ask->first : 0), bytes);
     if (flip)
@@ -346,6 +347,14 @@ static void test_a_file_that_changes(void **state)
     }
 }
 
+static int get_asks(struct server *s)
+{
+    pthread_mutex_lock(&s->mutex);
+    int asks = s->asks;
+    pthread_mutex_unlock(&s->mutex);
+    return asks;
+}
+
 struct reader {
     pthread_t thread;
     struct spl_dataset_source *source;
@@ -371,21 +380,21 @@ static void test_equal_requests_are_joined(void **state)
         start(&s, SIZE);
         struct spl_dataset_source source = open_with(&s, &patient);
         struct reader all[readers];
-        s.delay_ms = 100;
+        s.until_joined = atomic_load(&spl_remote_counts.joined) + readers - 1;
         s.failing = fails;
         s.status = 403;
         for (int i = 0; i < readers; i++) { // the first has all that the others want
             all[i] = (struct reader){.source = &source, .s = &s, .offset = (i ? 10 + i % 4 : 10) * BLOCK, .bytes = i ? 5 : 4 * BLOCK};
             pthread_create(&all[i].thread, NULL, read_on_thread, &all[i]);
-            if (!i)
-                usleep(30000);
+            while (!i && get_asks(&s) < 2)
+                usleep(1000);
         }
         for (int i = 0; i < readers; i++) {
             pthread_join(all[i].thread, NULL);
             assert_int_equal(all[i].rc, fails ? SPL_E_IO : SPL_OK);
         }
         assert_int_equal(s.asks, 2);
-        s.delay_ms = 0;
+        s.until_joined = 0;
         expect_range(&source, &s, 10 * BLOCK, 4 * BLOCK);
         spl_dataset_source_close(&source);
         stop(&s);
