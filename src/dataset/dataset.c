@@ -92,7 +92,7 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
         return spl_fail(err, rc, "%s", why.message);
     spl_remote_show(url, shown, sizeof shown);
     rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
-    if (rc == SPL_E_CORRUPT && !source.far->has_changed(source.context)) {
+    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) && !source.far->has_changed(source.context)) {
         why = (struct spl_error){0};
         source.far->forget(source.context, 0, source.size);
         rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
