@@ -52,7 +52,7 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "info",
     .before =
-        "usage: splatd info [--json] [--no-verify] [--dictionary PNG] [--columns LIST] NAME.spld|SCAN…\n\n"
+        "usage: splatd info [--json] [--no-verify] [--dictionary PNG] [--columns LIST] NAME.spld|URL|SCAN…\n\n"
         "Says what packed datasets hold: splats by level of detail, bounds, bytes a splat by attribute, and the\n"
         "histogram of bits that the scene needed. Every section's checksum is verified first.\n"
         "Of scans (also folders of them and @LISTs, as pack takes them): format, points, attributes, coordinates,\n"
@@ -378,7 +378,9 @@ int spl_cmd_info(int argc, char **argv)
         struct spl_dataset *dataset = NULL;
         struct spl_error err = {0};
         struct spl_info_report report;
-        int rc = spl_dataset_open(argv[i], !a.no_verify, &dataset, &err);
+        const struct spl_dataset_opening how = {
+            .verify = !a.no_verify, .tables_bytes = SPL_TABLES_BYTES, .verify_remote = true};
+        int rc = spl_dataset_open_as(argv[i], &how, &dataset, &err);
         if (!rc)
             rc = spl_info_gather(&report, dataset, &err);
         if (!rc && a.json)

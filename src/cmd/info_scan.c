@@ -22,6 +22,7 @@
 #include "cmd/info_panoramas.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
+#include "dataset/remote_url.h"
 #include "geom/unit.h"
 #include "pack/look.h"
 #include "pack/system.h"
@@ -40,7 +41,7 @@ bool spl_info_is_scan(const char *path)
     struct stat status;
     if (path[0] == '@' || (!stat(path, &status) && S_ISDIR(status.st_mode)))
         return true;
-    if (!strcasecmp(spl_cmd_ending(path), "spld"))
+    if (spl_remote_is_url(path) || !strcasecmp(spl_cmd_ending(path), "spld")) // scans are read from files alone
         return false;
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     ssize_t got = fd < 0 ? -1 : read(fd, first, sizeof first);

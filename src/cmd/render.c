@@ -116,7 +116,7 @@ static const struct spl_cmd_option options[] = {
 static const struct spl_cmd_table table = {
     .command = "render",
     .before =
-        "usage: splatd render NAME.spld [OPTION…] -o OUT.{jpg,png,npy}\n\n"
+        "usage: splatd render NAME.spld|URL [OPTION…] -o OUT.{jpg,png,npy}\n\n"
         "Renders one view of a packed dataset. Without a camera it is the dataset's default view.\n\n"
         "A first look:\n"
         "  splatd render courtyard.spld -o view.jpg\n"

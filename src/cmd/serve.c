@@ -14,9 +14,9 @@
 static void usage(FILE *out)
 {
     fprintf(out,
-            "usage: splatd serve [OPTION…] NAME.spld…|DIR\n\n"
+            "usage: splatd serve [OPTION…] NAME.spld…|DIR|URL\n\n"
             "Answers HTTP requests for views of datasets. A dataset's id is its file's stem; a directory stands for\n"
-            "the .spld files in it.\n\n"
+            "the .spld files in it. A dataset may lie on a server, https://, http:// or s3://BUCKET/KEY.\n\n"
             "Serve one dataset, look at it, fetch a metric depth image:\n"
             "  splatd serve courtyard.spld\n"
             "  url=http://127.0.0.1:8080/v1/datasets/courtyard/view\n"
@@ -28,6 +28,8 @@ static void usage(FILE *out)
             "  curl -o view.jpg --json '{\"camera\":{\"q\":[1,0,0,0],\"t\":[0,0,5],\"fov\":60},\"width\":640}' $url\n"
             "Every dataset of a directory, on any address for those with a token, on a real GPU or not at all:\n"
             "  splatd serve --listen 0.0.0.0:8080 --tokens /etc/splatd/tokens --require-gpu /srv/scans\n"
+            "A dataset on a server, read as views need it; what was read is kept on this disk:\n"
+            "  splatd serve --page-cache /var/cache/splatd/pages https://scans.example/halls/hall.spld\n"
             "A free port for a test; stderr says which:\n"
             "  splatd serve --listen 127.0.0.1:0 courtyard.spld\n"
             "With parameters from a file, `name = value` a line; flags win over it:\n"

@@ -18,6 +18,7 @@
 #include "base/memory.h"
 #include "base/sized.h"
 #include "dataset/open.h"
+#include "dataset/remote.h"
 #include "geom/fit.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
@@ -27,9 +28,8 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is read as i
 /* The id is the file's name without folder and extension; it becomes part of URLs, so it is kept plain. */
 static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 {
-    const char *slash = strrchr(dataset->name, '/'), *stem = slash ? slash + 1 : dataset->name;
-    const char *dot = strrchr(stem, '.');
-    size_t length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
+    size_t length;
+    const char *stem = spl_remote_get_stem(dataset->name, &length);
     static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
     if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, allowed) < length)
         return spl_fail(err, SPL_E_INPUT,
@@ -79,11 +79,36 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     return spl_dataset_open_source_as(&source, path, &how, out, err);
 }
 
+/* What describes a dataset may have been spoilt on its way, or been so before it was kept: then it is asked for anew. */
+static int open_remote(const char *url, const struct spl_dataset_opening *how, struct spl_dataset **out,
+                       struct spl_error *err)
+{
+    char shown[1024];
+    struct spl_dataset_source source;
+    struct spl_error why = {0};
+    const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled};
+    int rc = spl_remote_open(url, &remote, &source, &why);
+    if (rc)
+        return spl_fail(err, rc, "%s", why.message);
+    spl_remote_show(url, shown, sizeof shown);
+    rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
+    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) && !source.far->has_changed(source.context)) {
+        why = (struct spl_error){0};
+        source.far->forget(source.context, 0, source.size);
+        rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
+    }
+    if (rc)
+        spl_dataset_source_close(&source);
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
                         struct spl_error *err)
 {
     struct spl_dataset_source source;
     *out = NULL;
+    if (spl_remote_is_url(path))
+        return open_remote(path, how, out, err);
     int rc = spl_dataset_source_open_file(path, &source, err);
     if (!rc && (rc = spl_dataset_open_source_as(&source, path, how, out, err)))
         spl_dataset_source_close(&source);
@@ -93,19 +118,24 @@ int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how,
 int spl_dataset_open_until(const char *path, bool verify, const atomic_bool *cancelled, struct spl_dataset **out,
                            struct spl_error *err)
 {
-    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    const struct spl_dataset_opening how = {.verify = verify, .tables_bytes = SPL_TABLES_BYTES, .cancelled = cancelled};
     return spl_dataset_open_as(path, &how, out, err);
 }
 
 int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err)
 {
-    return spl_dataset_open_as(path, &(struct spl_dataset_opening){verify, UINT64_MAX, NULL}, out, err);
+    char shown[300];
+    *out = NULL;
+    if (spl_remote_is_url(path))
+        return spl_fail(err, SPL_E_USAGE, "%s: this goes through all of a dataset, and needs it in a file: fetch it first",
+                        spl_remote_show(path, shown, sizeof shown));
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){.verify = verify, .tables_bytes = UINT64_MAX}, out, err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
                             const atomic_bool *cancelled, struct spl_dataset **out, struct spl_error *err)
 {
-    const struct spl_dataset_opening how = {verify, SPL_TABLES_BYTES, cancelled};
+    const struct spl_dataset_opening how = {.verify = verify, .tables_bytes = SPL_TABLES_BYTES, .cancelled = cancelled};
     return spl_dataset_open_source_as(source, name, &how, out, err);
 }
 
@@ -123,6 +153,8 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     atomic_init(&dataset->references, 1);
     dataset->cancelled = how->cancelled;
     dataset->source = *source;
+    dataset->remote = source->far;
+    dataset->lazily = source->far && !(how->verify && how->verify_remote);
     dataset->tables_limit = how->tables_bytes;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
@@ -231,6 +263,55 @@ int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *o
     return spl_dataset_source_read(&dataset->source, spl_dataset_get_name(dataset), offset, out, bytes, err);
 }
 
+bool spl_dataset_is_remote(const struct spl_dataset *dataset)
+{
+    return dataset->remote;
+}
+
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset)
+{
+    return dataset->remote ? dataset->source.far->get_moved_ns(dataset->source.context) : 0;
+}
+
+bool spl_dataset_has_changed(const struct spl_dataset *dataset)
+{
+    return dataset->remote && dataset->source.far->has_changed(dataset->source.context);
+}
+
+bool spl_dataset_forget(const struct spl_dataset *dataset, const struct spl_section *section)
+{
+    if (dataset->remote)
+        dataset->source.far->forget(dataset->source.context, section->offset, section->bytes);
+    return dataset->remote;
+}
+
+void spl_dataset_expect(const struct spl_dataset *dataset, const struct spl_section *first, const struct spl_section *last)
+{
+    if (dataset->remote)
+        dataset->source.far->expect(dataset->source.context, first->offset, last->offset + last->bytes - first->offset);
+}
+
+int spl_dataset_read_section(const struct spl_dataset *dataset, const struct spl_section *section, void *out, bool *sound,
+                             struct spl_error *err)
+{
+    int rc = SPL_OK;
+    *sound = false;
+    for (int attempt = 0; !rc && !*sound && (!attempt || (attempt == 1 && spl_dataset_forget(dataset, section))); attempt++)
+        if (!(rc = spl_dataset_read(dataset, section->offset, out, section->bytes, err)))
+            *sound = !dataset->verified || XXH3_64bits(out, section->bytes) == section->hash;
+    return rc;
+}
+
+int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *what, uint32_t index, struct spl_error *err)
+{
+    return spl_fail(err, SPL_E_CORRUPT,
+                    dataset->remote ? "%s: %s %u fails its checksum, fetched twice: it is damaged at its server; upload the "
+                                      "dataset again under another name"
+                                    : "%s: %s %u was overwritten while in use; put the dataset back under another name "
+                                      "and rename it",
+                    spl_dataset_get_name(dataset), what, index);
+}
+
 int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_error *err)
 {
     return spl_is_cancelled(dataset->cancelled)
@@ -267,11 +348,10 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
 {
     spl_assert(index < dataset->info.pages);
     const struct spl_section *page = dataset->pages[index];
-    int rc = spl_dataset_read(dataset, page->offset, out, page->bytes, err);
-    if (!rc && dataset->verified && XXH3_64bits(out, page->bytes) != page->hash)
-        rc = spl_fail(err, SPL_E_CORRUPT,
-                      "%s: page %u was overwritten while in use; put the dataset back under another name and rename it",
-                      spl_dataset_get_name(dataset), index);
+    bool sound;
+    int rc = spl_dataset_read_section(dataset, page, out, &sound, err);
+    if (!rc && !sound)
+        rc = spl_dataset_fail_checksum(dataset, "page", index, err);
     return rc;
 }
 

@@ -11,6 +11,7 @@
 
 #include "dataset/format.h"
 #include "dataset/map.h"
+#include "dataset/page_cache.h"
 #include "dataset/source.h"
 #include "dataset/streams.h"
 #include "dataset/tables.h"
@@ -27,7 +28,13 @@ struct spl_dataset_opening {
     bool verify;                  /* as of spl_dataset_open() */
     uint64_t tables_bytes;        /* all tables stay where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
     const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
+    struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
+    uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */
+    bool verify_remote;                /* with `verify`: also of a server all is read at first */
 };
+
+/* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless
+ * `verify_remote`, and each part is held against its checksum when it is read, whatever `verify` says. */
 
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
                         struct spl_error *err);
@@ -47,6 +54,14 @@ int spl_dataset_open_source(const struct spl_dataset_source *source, const char 
 
 int spl_dataset_open_source_as(const struct spl_dataset_source *source, const char *name,
                                const struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err);
+
+/* Does it lie elsewhere, so that reading takes long and is paid for? */
+bool spl_dataset_is_remote(const struct spl_dataset *dataset);
+
+/* Of one that does: when a read of it last came on (0 = it lies here), and whether it has been found to be another one by
+ * now. Any thread. */
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset);
+bool spl_dataset_has_changed(const struct spl_dataset *dataset);
 
 /* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
  * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;

@@ -5,8 +5,6 @@
 
 #include <string.h>
 
-#include <xxhash.h>
-
 #include "base/memory.h"
 #include "dataset/open.h"
 
@@ -68,12 +66,10 @@ int spl_dataset_read_map(const struct spl_dataset *dataset, uint32_t index, uint
 {
     spl_assert(index < dataset->info.maps);
     const struct spl_section *map = dataset->maps[index];
-    int rc = spl_dataset_read(dataset, map->offset, out, map->bytes, err);
-    if (!rc && dataset->verified && XXH3_64bits(out, map->bytes) != map->hash)
-        rc = spl_fail(err, SPL_E_CORRUPT,
-                      "%s: the map of station %u was overwritten while in use; put the dataset back under another name "
-                      "and rename it",
-                      spl_dataset_get_name(dataset), index);
+    bool sound;
+    int rc = spl_dataset_read_section(dataset, map, out, &sound, err);
+    if (!rc && !sound)
+        rc = spl_dataset_fail_checksum(dataset, "the map of station", index, err);
     return rc;
 }
 

@@ -346,6 +346,10 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
         rc = copy_small_sections(dataset, err);
     if (rc)
         return rc;
+    dataset->verified = verify || dataset->remote;
+    verify = verify && !dataset->lazily;
+    if (verify && dataset->section_count)
+        spl_dataset_expect(dataset, &dataset->sections[0], &dataset->sections[dataset->section_count - 1]);
     struct hashing hashing = {.dataset = dataset, .verify = verify, .failed = UINT32_MAX};
     spl_parallel_for(verify ? 0 : 1, dataset->section_count, 1, hash_sections, &hashing);
     char name[40];
@@ -356,7 +360,6 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
                         spl_code_get_info(hashing.code)->name);
     if (hashing.failed != UINT32_MAX)
         return corrupt(dataset, err, section_name(&dataset->sections[hashing.failed], name), "fails its checksum");
-    dataset->verified = verify;
     return SPL_OK;
 }
 

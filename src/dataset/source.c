@@ -96,6 +96,8 @@ int spl_dataset_source_read(const struct spl_dataset_source *source, const char 
                             size_t bytes, struct spl_error *err)
 {
     spl_assert(offset <= source->size && bytes <= source->size - offset);
+    if (source->far)
+        return bytes ? source->far->fetch(source->context, offset, out, bytes, err) : SPL_OK;
     for (char *to = out; bytes;) {
         int64_t got = source->read(source->context, offset, to, bytes);
         if (got < 0)

@@ -8,6 +8,21 @@
 
 #include "base/error.h"
 
+/* What a source from afar can beside reading: a read takes long, and may bring what was spoilt on its way. From any
+ * thread, from several at once. */
+struct spl_source_far {
+    /* read() of all of `bytes`, which says why not. */
+    int (*fetch)(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err);
+    /* These bytes will be wanted soon, all of them: a hint. */
+    void (*expect)(void *context, uint64_t offset, uint64_t bytes);
+    /* These were not what they should be: the next read asks their origin. */
+    void (*forget)(void *context, uint64_t offset, uint64_t bytes);
+    /* When a read last came on; spl_now_ns(). */
+    uint64_t (*get_moved_ns)(void *context);
+    /* Has it been found to be another file than was opened, so that only what was read before can be read? */
+    bool (*has_changed)(void *context);
+};
+
 struct spl_dataset_source {
     uint64_t size; /* bytes; what is read always lies within */
     /* Puts up to `bytes` (> 0) bytes from `offset` on into `out`. Returns how many, at least one; 0 where the source
@@ -15,6 +30,7 @@ struct spl_dataset_source {
     int64_t (*read)(void *context, uint64_t offset, void *out, size_t bytes);
     void (*close)(void *context); // may be NULL
     void *context;
+    const struct spl_source_far *far; // NULL: its bytes are at hand
     const void *map; /* all bytes at once, for tools; may be NULL, so that nobody who serves looks through it */
     bool owned;      /* nothing of it is the caller's, who need not know when it is closed */
 };

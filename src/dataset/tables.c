@@ -145,7 +145,13 @@ int spl_dataset_read_tables(const struct spl_dataset *dataset, uint32_t page, vo
     spl_assert(page < dataset->info.pages);
     *tables = describe(dataset, page);
     lay_out(tables, dataset->textures, dataset->maps, tables + 1);
-    return read_head(dataset, tables, err);
+    struct spl_error why = {0};
+    int rc = read_head(dataset, tables, &why);
+    if (rc == SPL_E_CORRUPT && spl_dataset_forget(dataset, dataset->found[SPL_KIND_HEADS].at[page])) {
+        why = (struct spl_error){0};
+        rc = read_head(dataset, tables, &why);
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
 const struct spl_tables *spl_dataset_get_tables(const struct spl_dataset *dataset, uint32_t page)
@@ -279,7 +285,9 @@ int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
 {
     bool whole = spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
-    if (!rc && (whole || dataset->verified))
+    if (whole && dataset->info.pages)
+        spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0], dataset->found[SPL_KIND_HEADS].at[dataset->info.pages - 1]);
+    if (!rc && (whole || (dataset->verified && !dataset->lazily)))
         rc = read_all(dataset, err);
     return rc || !whole ? rc : spl_dataset_check_children(dataset, err);
 }

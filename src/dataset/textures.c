@@ -5,8 +5,6 @@
 
 #include <stdlib.h>
 
-#include <xxhash.h>
-
 #include "base/memory.h"
 #include "dataset/atoms.h"
 #include "dataset/dictionary.h"
@@ -100,18 +98,13 @@ size_t spl_dataset_get_texture_bytes(const struct spl_dataset *dataset, uint32_t
 int spl_dataset_read_textures(const struct spl_dataset *dataset, uint32_t index, uint32_t *out, struct spl_error *err)
 {
     const struct spl_section *section = dataset->textures ? dataset->textures[index] : NULL;
-    int rc = section ? spl_dataset_read(dataset, section->offset, out, section->bytes, err) : SPL_OK;
+    bool sound;
+    int rc = section ? spl_dataset_read_section(dataset, section, out, &sound, err) : SPL_OK;
     if (rc || !section)
         return rc;
-    if (!dataset->verified)
-        return judge_page(dataset, index, out, err);
-    return XXH3_64bits(out, section->bytes) == section->hash
-               ? SPL_OK
-               : spl_fail(
-                     err, SPL_E_CORRUPT,
-                     "%s: the textures of page %u were overwritten while in use; put the dataset back under another "
-                     "name and rename it",
-                     dataset->info.id, index);
+    if (!sound)
+        return spl_dataset_fail_checksum(dataset, "the section with textures of page", index, err);
+    return dataset->verified && !dataset->lazily ? SPL_OK : judge_page(dataset, index, out, err);
 }
 
 /* Calls `visit` with the textures of one page after another. */
@@ -144,7 +137,7 @@ static int judge(const struct spl_dataset *dataset, uint32_t index, const uint32
 
 int spl_dataset_check_textures(struct spl_dataset *dataset, struct spl_error *err)
 {
-    return dataset->verified ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
+    return dataset->verified && !dataset->lazily ? for_each_page(dataset, judge, NULL, err) : SPL_OK;
 }
 
 static int count_page(const struct spl_dataset *dataset, uint32_t index, const uint32_t *words, void *context,

@@ -3,7 +3,7 @@
  * Invariants: `staged` counts the bytes of reads under way and of those ended that were not given back, and is raised
  * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is
  * more to read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one
- * list at a time, but for those taken, which are in none. Of a source one read is under way; a thread is begun where
+ * list at a time, but for those taken, which are in none. Of a source as many reads are under way as it says; a thread is begun where
  * one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them,
  * waits for those that are not in the middle of a read, and leaves the others behind: then `io` is theirs, and the last
  * one frees it. */
@@ -46,7 +46,7 @@ static bool goes_before(const struct spl_io_read *a, const struct spl_io_read *b
     return a->number < b->number;
 }
 
-/* The read under way of a source; NULL = none. */
+/* The read of a source that is longest under way; NULL = none. */
 static struct spl_io_read *find_being_read(struct spl_io *io, const void *source)
 {
     struct spl_io_read *read;
@@ -56,12 +56,39 @@ static struct spl_io_read *find_being_read(struct spl_io *io, const void *source
     return NULL;
 }
 
+/* When something of it was last seen. */
+static uint64_t get_sign_ns(const struct spl_io_read *read)
+{
+    uint64_t moved_ns = read->what.get_moved_ns ? read->what.get_moved_ns(read->what.source) : 0;
+    return moved_ns > read->began_ns ? moved_ns : read->began_ns;
+}
+
+static bool hangs(const struct spl_io_read *read)
+{
+    uint64_t sign_ns = get_sign_ns(read), now_ns = spl_now_ns();
+    return now_ns > sign_ns && now_ns - sign_ns >= hangs_ns;
+}
+
+/* Are as many under way of its source as may be? One where something hangs is no place for more threads. */
+static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
+{
+    unsigned count = 0;
+    bool any_hangs = false;
+    struct spl_io_read *read;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    {
+        count += read->what.source == what->source;
+        any_hangs |= read->what.source == what->source && hangs(read);
+    }
+    return any_hangs || count >= (what->at_once ? what->at_once : 1);
+}
+
 /* The best that waits for a thread only, if there is room for it. */
 static struct spl_io_read *choose(struct spl_io *io)
 {
     struct spl_io_read *best = NULL, *read;
     TAILQ_FOREACH(read, &io->waiting, link)
-    if ((!best || goes_before(read, best)) && !find_being_read(io, read->what.source))
+    if ((!best || goes_before(read, best)) && !is_busy(io, &read->what))
         best = read;
     return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
 }
@@ -111,6 +138,8 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
 {
     struct spl_io_what what = read->what;
     struct spl_error err = {0};
+    if (what.hold)
+        what.hold(what.source); // before its owner can end the read and close it
     TAILQ_REMOVE(&io->waiting, read, link);
     TAILQ_INSERT_TAIL(&io->being_read, read, link);
     read->state = BEING_READ;
@@ -121,14 +150,17 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     io->staged += what.bytes;
     io->moved_ns = read->began_ns;
     see_to_waiting(io);
-    if (what.hold)
-        what.hold(what.source); // before its owner can end the read and close it
     pthread_mutex_unlock(&io->mutex);
     if (!data)
         data = spl_alloc_raw(what.bytes, 1, &err);
     if (data && what.read(what.source, what.index, data, &err)) {
         free(data);
         data = NULL;
+    }
+    if (what.get_moved_ns) { // the source may be gone when it was let go of
+        pthread_mutex_lock(&io->mutex);
+        read->what.get_moved_ns = NULL;
+        pthread_mutex_unlock(&io->mutex);
     }
     if (what.let_go)
         what.let_go(what.source);
@@ -272,7 +304,7 @@ struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what
         *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .state = WAITS};
         TAILQ_INSERT_TAIL(&io->waiting, read, link);
         io->under_way++;
-        if (!find_being_read(io, what->source)) // a thread turns to it
+        if (!is_busy(io, what)) // a thread turns to it
             io->moved_ns = spl_now_ns();
         see_to_waiting(io);
     }
@@ -361,14 +393,9 @@ uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source)
 {
     pthread_mutex_lock(&io->mutex);
     const struct spl_io_read *own = find_being_read(io, source);
-    uint64_t moved_ns = own ? own->began_ns : io->moved_ns;
+    uint64_t moved_ns = own ? get_sign_ns(own) : io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
     return moved_ns;
-}
-
-static bool hangs(const struct spl_io_read *read)
-{
-    return spl_now_ns() - read->began_ns >= hangs_ns;
 }
 
 bool spl_io_hangs(struct spl_io *io, const void *source)

@@ -1,6 +1,6 @@
 /* Reads on threads of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
- * memory that is counted before it is taken. Each file is read by one thread at a time, and files side by side: one
- * whose disk does not answer holds up nobody else.
+ * memory that is counted before it is taken. Each file is read by one thread at a time (one from afar by some, as most of
+ * a read is waiting), and files side by side: one whose disk does not answer holds up nobody else.
  *
  * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that
  * waits is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that
@@ -20,7 +20,7 @@
 
 enum {
     SPL_IO_READS = 256, /* of a source that may be under way, with ended ones not yet given back; 4 times of all */
-    SPL_IO_THREADS = 16
+    SPL_IO_THREADS = 64
 };
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
 
@@ -31,6 +31,8 @@ struct spl_io_what {
     uint32_t index;
     size_t bytes; /* that `read` writes, at least 1 */
     void *owner;  /* of the read; not looked at */
+    uint64_t (*get_moved_ns)(const void *source); // may be NULL; when a read of it last came on, though it has not ended
+    unsigned at_once; /* reads of the source under way together; 0 = 1 */
 };
 
 /* What goes first: what a frame waits for, in the order that it was asked for; then what the latest walk asked for. */
@@ -79,11 +81,11 @@ void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* When the read of the source that is under way was begun; where none is, when one of any source was last begun, has
+/* When the read of the source that is longest under way was begun, or has last come on; where none is, when one of any source was last begun, has
  * ended or was given back: what tells a disk that is slow from one that hangs. */
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source);
 
-/* Has it been reading of the source for a second, and how many sources are there of which it has? */
+/* Has a read of the source been under way for a second in which nothing came, and how many are there that have? */
 bool spl_io_hangs(struct spl_io *io, const void *source);
 size_t spl_io_count_hanging(struct spl_io *io);
 

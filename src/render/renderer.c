@@ -110,7 +110,7 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
     for (; next < resident->device_slots && next < *page + preload_ahead; next++) {
         bool first = next == SPL_FIRST_SLOT;
         struct spl_error why = {0};
-        if (!first && !spl_residency_has_room(residency, resident, next))
+        if (!first && (spl_dataset_is_remote(dataset) || !spl_residency_has_room(residency, resident, next)))
             break; // the rest comes as views need it
         rc = spl_residency_ask(residency, resident, next, false, &why);
         if (!first && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM || rc == SPL_SLOT_CROWDED))

@@ -15,6 +15,7 @@
 static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
 enum {
+    remote_reads = 4, /* of a dataset from afar at once */
     failures_max = 16, // that are remembered where nobody waits: each takes a read's place
     uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
 };
@@ -140,13 +141,16 @@ uint64_t spl_residency_get_bytes(const struct spl_resident_dataset *resident)
 bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_dataset *dataset,
                               struct spl_resident_page *page, uint32_t slot, struct spl_io_rank rank)
 {
+    const bool remote = spl_dataset_is_remote(dataset);
     struct spl_io_what what = {.read = spl_slot_read,
                                .hold = spl_slot_hold,
                                .let_go = spl_slot_let_go,
                                .source = dataset,
                                .index = slot,
                                .bytes = spl_slot_get_bytes(dataset, slot),
-                               .owner = page};
+                               .owner = page,
+                               .get_moved_ns = remote ? spl_slot_get_moved_ns : NULL,
+                               .at_once = remote ? remote_reads : 1};
     if (page->read)
         spl_io_raise(residency->io, page->read, rank);
     else

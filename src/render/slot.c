@@ -74,3 +74,8 @@ void spl_slot_let_go(const void *source)
 {
     spl_dataset_let_go(source);
 }
+
+uint64_t spl_slot_get_moved_ns(const void *source)
+{
+    return spl_dataset_get_moved_ns(source);
+}

@@ -34,5 +34,6 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
 /* spl_dataset_hold() and spl_dataset_let_go(), for spl_io_what. */
 void spl_slot_hold(const void *source);
 void spl_slot_let_go(const void *source);
+uint64_t spl_slot_get_moved_ns(const void *source); /* spl_dataset_get_moved_ns() */
 
 #endif

@@ -20,6 +20,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/access/access.h"
+#include "dataset/remote.h"
 #include "service/datasets/library.h"
 #include "service/exchange.h"
 #include "service/http.h"
@@ -304,6 +305,7 @@ done:
     spl_ops_stop(service);
     spl_tours_stop(service->tours);
     spl_library_stop(service);
+    spl_page_cache_let_go(service->library->page_cache);
     spl_catalog_finish(&service->library->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_views_finish(service);
     spl_access_finish(service);
@@ -311,7 +313,10 @@ done:
         close(service->http->listen_fd);
     finish_loop(service);
     spl_tours_close(service->tours);
+    bool idle = spl_remote_wait_idle(spl_now_ns() + 1500 * SPL_NS_PER_MS); // they have been cancelled, and look at the library's flag
     end_in(service, 0);
+    if (!idle)
+        return rc; // with what they look at: the process is about to end
 free_house:
     free(house);
     return rc;

@@ -18,7 +18,7 @@ from harness import REAL, TEXTURED, Daemon, run
 COMMANDS = "serve pack render tour info synth bench compare devices sign".split()
 SERVICE = "http://127.0.0.1:8080"
 # What an example of a reader's own site needs, which no test has.
-ELSEWHERE = re.compile(r"https://|\$TOKEN|docker |kubectl ")
+ELSEWHERE = re.compile(r"https://|s3://|\$TOKEN|docker |kubectl ")
 # (command, what its example has, what is put behind it so that it does not take long)
 SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--size 16x12"),
            ("synth", "--panoramas", "--panoramas 256 --samples 1"), ("synth", "--photos", "--photos 2 --panoramas 256 --photo-size 16x12"), ("tour", "", "--size 32"), ("tour", "roof-tour", "--frames 5"),

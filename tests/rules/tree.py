@@ -14,7 +14,7 @@ FLOOR = {"base": 0, "geom": 1, "cloud": 2, "sparse": 2, "dataset": 3, "gpu": 3, 
          "measure": 5, "pack": 5, "synth": 5, "service": 6, "cmd": 7, "main.c": 8}
 # The only room that sees these outside headers.
 OUTSIDE = [(re.compile(r"^(vulkan|GL|GLES\d?|EGL|KHR)/"), "gpu"), (re.compile(r"^(microhttpd|uv)\.h$"), "service"),
-           (re.compile(r"^(libav\w+|libswscale)/"), "image"), (re.compile(r"^cblas\.h$"), "sparse")]
+           (re.compile(r"^(libav\w+|libswscale)/"), "image"), (re.compile(r"^cblas\.h$"), "sparse"), (re.compile(r"^curl/"), "dataset")]
 # A public header includes public headers and these.
 PLAIN_C = {"stdbool.h", "stddef.h", "stdint.h", "stdio.h", "math.h"}
 LONGEST = 800

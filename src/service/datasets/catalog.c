@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "dataset/remote_url.h"
 
 bool spl_file_mark_is_equal(const struct spl_file_mark *a, const struct spl_file_mark *b)
 {
@@ -32,8 +33,7 @@ struct spl_file_mark spl_file_mark_of(const struct stat *status)
 
 const char *spl_catalog_id_of(const char *path, size_t *length)
 {
-    const char *slash = strrchr(path, '/'), *stem = slash ? slash + 1 : path, *dot = strrchr(stem, '.');
-    *length = dot && dot != stem ? (size_t)(dot - stem) : strlen(stem);
+    const char *stem = spl_remote_get_stem(path, length);
     return spl_catalog_id_is_valid(stem, *length) ? stem : NULL;
 }
 
@@ -110,11 +110,14 @@ void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, co
 
 void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
 {
-    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, slot->path);
+    char shown[1024]; // as messages name a URL
+    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, spl_remote_show(slot->path, shown, sizeof shown));
 }
 
-bool spl_catalog_may_pass(const struct spl_error *why)
+bool spl_catalog_may_pass(const char *path, const struct spl_error *why)
 {
+    if (why->code && spl_remote_is_url(path)) // nobody sees a server's file change before it is asked for
+        return true;
     return why->code == SPL_E_IO || why->code == SPL_E_NOMEM || why->code == SPL_E_NOT_FOUND;
 }
 
@@ -170,14 +173,16 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     size_t length;
     const char *stem = spl_catalog_id_of(file->path, &length);
-    if (why->code && (!file->in_directory || !stem))
+    const bool far = spl_remote_is_url(file->path) && why->code != SPL_E_USAGE && why->code != SPL_E_UNSUPPORTED;
+    if (why->code && (!(file->in_directory || far) || !stem)) // a server may come back
         return spl_fail(err, why->code, "%s", why->message);
     snprintf(id, sizeof id, "%.*s", (int)length, stem);
     struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, id);
     if (slot) {
         struct spl_error twice = {0};
+        char one[200], other[200];
         spl_fail(&twice, SPL_E_USAGE, "two datasets are called '%.100s': '%.150s' and '%.150s'; rename one", id,
-                 slot->path, file->path);
+                 spl_remote_show(slot->path, one, sizeof one), spl_remote_show(file->path, other, sizeof other));
         if (!file->in_directory)
             return spl_fail(err, twice.code, "%s", twice.message);
         spl_log_warn("%s; the second is not served", twice.message);
@@ -187,7 +192,7 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
         return SPL_E_NOMEM;
     slot->in_directory = file->in_directory;
     slot->seen = file->mark;
-    if (!spl_catalog_may_pass(why))
+    if (!spl_catalog_may_pass(file->path, why))
         slot->opened = file->mark;
     slot->current = *entry;
     *entry = NULL;
@@ -203,7 +208,19 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
 {
     for (size_t i = 0; i < path_count; i++) {
         struct stat status;
-        if (stat(paths[i], &status))
+        if (spl_remote_is_url(paths[i])) {
+            const struct spl_s3_account account = spl_s3_account_of_environment();
+            struct spl_remote_url url;
+            int rc = spl_remote_url_parse(paths[i], &account, &url, err);
+            if (rc)
+                return rc;
+            spl_remote_url_finish(&url);
+            size_t length;
+            char shown[300];
+            if (!spl_catalog_id_of(paths[i], &length))
+                return spl_fail(err, SPL_E_USAGE, "%s: its name cannot be a dataset's id, which has at most "
+                                SPL_CATALOG_ID_RULE, spl_remote_show(paths[i], shown, sizeof shown));
+        } else if (stat(paths[i], &status))
             return errno == ENOENT ? spl_fail(err, SPL_E_USAGE,
                                               "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
                                               "-o NAME.spld' makes one from a scan",

@@ -71,12 +71,12 @@ const char *spl_catalog_first_directory(char *const *paths, size_t path_count);
 
 /* Opens everything at start, one dataset a core, until *how->cancelled (may be NULL) is set. A path that is not there,
  * a broken file that was named itself, two of these with one id are refused; a broken file of a directory gets a slot
- * with the reason. On failure *catalog is empty. */
+ * with the reason, as does a URL whose server does not give it. On failure *catalog is empty. */
 int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count,
                      const struct spl_dataset_opening *how, struct spl_error *err);
 
 /* May the file open the next time though it has not changed? */
-bool spl_catalog_may_pass(const struct spl_error *why);
+bool spl_catalog_may_pass(const char *path, const struct spl_error *why);
 
 /* Notes how many files a listing has left out; logs it when that is news. */
 void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, const struct spl_catalog_files *files);

@@ -10,6 +10,7 @@
 
 #include "base/memory.h"
 #include "dataset/dataset.h"
+#include "dataset/remote_url.h"
 
 static void encode_uri(char *out, size_t capacity, const char *id)
 {
@@ -24,6 +25,7 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
 {
     struct spl_catalog_entry *entry = *out = NULL;
     struct spl_camera camera = {0};
+    char shown[1024];
     int rc = SPL_E_NOMEM;
     if (!(entry = spl_alloc(1, sizeof *entry, err)))
         return rc;
@@ -41,6 +43,8 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     memcpy(entry->defaults.target, info->default_target, sizeof entry->defaults.target);
     memcpy(entry->defaults.up, info->default_up, sizeof entry->defaults.up);
     memcpy(entry->defaults.fit, info->default_fit, sizeof entry->defaults.fit);
+    if (spl_remote_is_url(place)) // nothing lies beside it, and its secrets are in no message
+        place = spl_remote_show(place, shown, sizeof shown);
     if ((rc = spl_saved_create(place, info, &entry->saved, err)))
         goto done;
     entry->defaults.names = spl_saved_get_names(entry->saved);

@@ -13,10 +13,11 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "dataset/remote_url.h"
 #include "service/state.h"
 #include "service/view/views.h"
 
-enum { looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
+enum { far_openings_most = 2, looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
 
 /* One listing of the served paths; belongs to the pool while it runs. */
 struct look {
@@ -77,8 +78,9 @@ static void after_opening(uv_work_t *work, int status)
     struct spl_service *service = opening->service;
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, opening->id);
     service->library->tasks--;
+    service->library->far_openings -= spl_remote_is_url(opening->path);
     if (slot && opening->err.code && !service->library->stopped) {
-        if (spl_catalog_may_pass(&opening->err))
+        if (spl_catalog_may_pass(opening->path, &opening->err))
             rest(slot);
         else
             slot->opened = opening->mark;
@@ -97,11 +99,16 @@ struct spl_dataset_opening spl_library_get_opening(struct spl_service *service)
 {
     return (struct spl_dataset_opening){.verify = service->options->verify,
                                         .tables_bytes = service->options->tables_bytes,
-                                        .cancelled = &service->library->cancelled};
+                                        .cancelled = &service->library->cancelled,
+                                        .page_cache = service->library->page_cache,
+                                        .remote_deadline_ms = service->options->remote_deadline_ms};
 }
 
 static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot)
 {
+    const bool far = spl_remote_is_url(slot->path);
+    if (far && service->library->far_openings == far_openings_most) // the pool has threads for others
+        return;
     struct opening *opening = spl_alloc(1, sizeof *opening, NULL);
     if (!opening || !(opening->path = strdup(slot->path))) {
         free(opening);
@@ -118,6 +125,7 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
     }
     slot->busy = true;
     service->library->tasks++;
+    service->library->far_openings += far;
 }
 
 static void run_closing(uv_work_t *work)
@@ -235,6 +243,10 @@ static bool meet(struct spl_service *service, const struct spl_catalog_file *fil
     slot->missed = 0;
     slot->met = service->library->looks;
     bool settled = spl_file_mark_is_equal(&slot->seen, &file->mark);
+    if (!slot->busy && slot->opened.inode && slot->current && spl_dataset_has_changed(slot->current->dataset)) {
+        slot->opened = (struct spl_file_mark){0};
+        spl_catalog_set_reason(slot, "it changed while it was served; it is being opened anew");
+    }
     slot->seen = file->mark;
     if (!settled)
         slot->failures = slot->rest = 0;

@@ -21,6 +21,8 @@ struct spl_library {
     const char *directory;       // may be NULL; where clients' datasets go: the first directory served
     uv_timer_t timer;            /* of looks at the served paths, which bring the catalog up to date */
     size_t tasks;                /* in the thread pool */
+    struct spl_page_cache *page_cache; // may be NULL; of datasets from servers, each of which holds it
+    size_t far_openings;         /* of them read from servers */
     size_t places;               /* of them are coordinate systems being looked up */
     bool looking;                /* one of them is a look */
     bool stopped;                /* nothing new is begun, what comes back is thrown away */

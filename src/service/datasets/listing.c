@@ -13,6 +13,7 @@
 
 #include "base/array.h"
 #include "base/memory.h"
+#include "dataset/remote_url.h"
 #include "service/datasets/catalog.h"
 
 static bool is_dataset_name(const char *name)
@@ -89,10 +90,15 @@ static int add_directory(struct spl_catalog_files *files, const char *directory,
     return rc;
 }
 
-/* What lies at the path now. False when nothing does. */
+/* What lies at the path now. False when nothing does. A URL is not asked: whether what it names has changed is seen by
+ * who reads from it. */
 static bool look(struct spl_catalog_file *file)
 {
     struct stat status = {0};
+    if (spl_remote_is_url(file->path)) {
+        file->mark = (struct spl_file_mark){.inode = 1};
+        return true;
+    }
     if (stat(file->path, &status) && lstat(file->path, &status)) {
         if (errno == ENOENT || errno == ENOTDIR)
             return false;
@@ -110,7 +116,8 @@ int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_f
     for (size_t i = 0; i < path_count; i++) {
         struct stat status;
         struct spl_error why = {0};
-        bool there = !stat(paths[i], &status), directory = there && S_ISDIR(status.st_mode);
+        bool url = spl_remote_is_url(paths[i]);
+        bool there = url || !stat(paths[i], &status), directory = !url && there && S_ISDIR(status.st_mode);
         if (!there && !is_dataset_name(paths[i]))
             spl_fail_errno(&why, errno, "cannot list '%s'", paths[i]);
         else if (directory)

@@ -29,6 +29,9 @@ static void run(uv_work_t *work)
     loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
     if (loading->directory)
         spl_store_sweep(loading->directory);
+    if (*options->page_cache && spl_page_cache_open(options->page_cache, options->page_cache_bytes,
+                                                    &loading->service->library->page_cache, &loading->err))
+        return;
     const struct spl_dataset_opening how = spl_library_get_opening(loading->service);
     if (!spl_catalog_open(&loading->catalog, options->datasets.items, options->datasets.count, &how,
                           &loading->err) &&

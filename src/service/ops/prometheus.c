@@ -29,6 +29,7 @@ static void gauge(FILE *out, const char *name, const char *help, double value)
 
 static void print_counters(FILE *out, struct spl_counters *counters)
 {
+    spl_counters_collect(counters);
 #define COUNTER(name, help) print(out, "splatd_" #name "_total", "counter", help, (double)atomic_load(&counters->name));
 #include "service/ops/counters.def"
 #undef COUNTER

@@ -41,6 +41,7 @@ static json_t *describe_device(const struct spl_device_info *device)
 static json_t *describe_counters(struct spl_counters *counters)
 {
     json_t *json = json_object();
+    spl_counters_collect(counters);
 #define COUNTER(name, help) set(json, #name, count(atomic_load(&counters->name)));
 #include "service/ops/counters.def"
 #undef COUNTER

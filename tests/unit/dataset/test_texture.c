@@ -507,7 +507,7 @@ static void test_bad_files(void **state)
     spoil_store(&f, path, false);
     err = (struct spl_error){0};
     assert_int_equal(spl_dataset_read_textures(dataset, 0, words, &err), SPL_E_CORRUPT);
-    assert_non_null(strstr(err.message, "the textures of page 0 were overwritten"));
+    assert_non_null(strstr(err.message, "textures of page 0 was overwritten"));
     spl_dataset_close(dataset);
     free(words);
     free(f.bytes);

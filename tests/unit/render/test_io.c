@@ -366,6 +366,50 @@ static void a_file_that_hangs_holds_up_no_other(void **state)
     spl_io_destroy(io);
 }
 
+static _Atomic uint64_t sign_ns;
+
+static uint64_t get_sign_ns(const void *source)
+{
+    assert_true(get_holds((struct file *)source) > 0); // it is asked of what may be there no longer else
+    return atomic_load(&sign_ns);
+}
+
+/* What comes from afar is read by some threads, and hangs where nothing comes, not where it takes long. */
+static void a_file_from_afar_is_read_by_several(void **state)
+{
+    (void)state;
+    enum { at_once = 3, count = 8 };
+    struct spl_io *io = start();
+    struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .source = &files[0], .bytes = 8, .owner = &files[0],
+                               .get_moved_ns = get_sign_ns, .at_once = at_once};
+    atomic_store(&sign_ns, spl_now_ns());
+    for (what.index = 0; what.index < count; what.index++)
+        assert_non_null(spl_io_try_begin(io, &what, (struct spl_io_rank){.awaited = true, .walk = 1}));
+    await_asked(&files[0], at_once);
+    for (int i = 0; i < 12; i++) { // for longer than what hangs
+        usleep(100000);
+        atomic_store(&sign_ns, spl_now_ns());
+        assert_false(spl_io_hangs(io, &files[0]) || spl_io_count_hanging(io));
+    }
+    assert_int_equal(get_asked(&files[0]), at_once);
+    assert_true(spl_now_ns() - spl_io_get_moved_ns(io, &files[0]) < SPL_NS_PER_S);
+    let_pass(&files[0], 1, false);
+    await_asked(&files[0], at_once + 1);
+    while (!spl_io_hangs(io, &files[0]))
+        usleep(10000);
+    let_pass(&files[0], 1, false);
+    spl_io_end(io, take(io));
+    spl_io_end(io, take(io));
+    usleep(50000);
+    assert_int_equal(get_asked(&files[0]), at_once + 1); // where something hangs no more threads go
+    atomic_store(&sign_ns, spl_now_ns());
+    let_pass(&files[0], 0, true);
+    for (uint32_t i = 2; i < count; i++)
+        spl_io_end(io, take(io));
+    assert_int_equal(get_asked(&files[0]), count);
+    spl_io_destroy(io);
+}
+
 /* Each is left with its thread, in any order. */
 static void reads_that_hang_are_left_behind_together(void **state)
 {
@@ -401,6 +445,7 @@ int main(void)
         cmocka_unit_test(memory_serves_the_next_read),
         cmocka_unit_test(it_says_when_anything_moved),
         cmocka_unit_test(a_file_that_hangs_holds_up_no_other),
+        cmocka_unit_test(a_file_from_afar_is_read_by_several),
         cmocka_unit_test(reads_that_hang_are_left_behind_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

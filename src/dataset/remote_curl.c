@@ -1,0 +1,327 @@
+/* Requests over HTTP/1.1 and 2, through libcurl. Handles are lent to one request at a time and kept with their connections,
+ * so that neighbours in time need no new one.
+ *
+ * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http. Bytes
+ * of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password, query, keys)
+ * is in no message: those are made here, of curl's words for a code, never of its own texts. S3's signature covers each
+ * request anew, so it follows no redirect. */
+#include "dataset/remote_link.h"
+
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+#include "base/work.h"
+#include "dataset/remote_curl.h"
+
+enum { handles_kept = 8, redirects_most = 5, refusal_bytes = 1024, swallowed_most = 64 << 10 };
+
+struct server {
+    const struct spl_curl *curl;
+    char *url;
+    bool tls, s3, sign;
+    char *key_id, *secret, *token_header, *provider; // NULL where nothing is signed
+    pthread_mutex_t mutex;
+    CURL *kept[handles_kept]; // guarded by: mutex
+    unsigned kept_count;      // guarded by: mutex
+};
+
+/* One request under way. */
+struct exchange {
+    const struct spl_remote_ask *ask;
+    struct spl_remote_reply *reply;
+    bool begun, refused; /* the head of a 206 was found right; what comes is not wanted */
+    size_t swallowed;
+    uint64_t moved_ns; /* when something last came: curl's own measure of speed forgets too slowly */
+    bool stalled;
+    char refusal[refusal_bytes + 1]; /* the beginning of what an error says of itself */
+    size_t refusal_used;
+};
+
+/* The value of header `name` on a line, without blanks; NULL where it is another header. */
+static const char *value_of(const char *line, size_t length, const char *name, size_t *bytes)
+{
+    size_t known = strlen(name);
+    if (length <= known || strncasecmp(line, name, known) || line[known] != ':')
+        return NULL;
+    const char *value = line + known + 1, *end = line + length;
+    while (value < end && (*value == ' ' || *value == '\t'))
+        value++;
+    while (end > value && (unsigned char)end[-1] <= ' ')
+        end--;
+    *bytes = (size_t)(end - value);
+    return value;
+}
+
+/* What is too long to be held to is as if it were not there. */
+static void copy(char *out, size_t size, const char *value, size_t bytes)
+{
+    if (bytes < size)
+        snprintf(out, size, "%.*s", (int)bytes, value);
+}
+
+static void read_range(struct spl_remote_reply *reply, const char *value, size_t bytes)
+{
+    char text[100];
+    int end = 0;
+    snprintf(text, sizeof text, "%.*s", bytes < sizeof text ? (int)bytes : 0, value);
+    reply->ranged = sscanf(text, "bytes %" SCNu64 "-%" SCNu64 "/%" SCNu64 "%n", &reply->first, &reply->last,
+                           &reply->total, &end) == 3 && end > 0 && !text[end] && !strchr(text, '+') && !strstr(text, "--");
+}
+
+static size_t on_header(char *line, size_t one, size_t length, void *context)
+{
+    struct spl_remote_reply *reply = ((struct exchange *)context)->reply;
+    const char *value;
+    size_t bytes;
+    (void)one;
+    if (length > 5 && !strncmp(line, "HTTP/", 5)) { // of each answer on the way, redirects too
+        *reply = (struct spl_remote_reply){0};
+        const char *blank = memchr(line, ' ', length);
+        for (const char *c = blank ? blank + 1 : line + length; c < line + length && *c >= '0' && *c <= '9' && reply->status < 100; c++)
+            reply->status = 10 * reply->status + (*c - '0');
+    } else if ((value = value_of(line, length, "content-range", &bytes))) {
+        read_range(reply, value, bytes);
+    } else if ((value = value_of(line, length, "etag", &bytes))) {
+        copy(reply->etag, sizeof reply->etag, value, bytes);
+    } else if ((value = value_of(line, length, "last-modified", &bytes))) {
+        copy(reply->modified, sizeof reply->modified, value, bytes);
+    } else if ((value = value_of(line, length, "content-encoding", &bytes))) {
+        copy(reply->encoding, sizeof reply->encoding, bytes < sizeof reply->encoding ? value : "unknown",
+             bytes < sizeof reply->encoding ? bytes : 7);
+    }
+    return length;
+}
+
+static size_t on_body(char *data, size_t one, size_t bytes, void *context)
+{
+    struct exchange *e = context;
+    (void)one;
+    e->moved_ns = spl_now_ns();
+    if (e->reply->status == 206) {
+        if (!e->begun && !e->refused)
+            e->begun = !(e->refused = !e->ask->begin(e->ask->context));
+        e->refused = e->refused || !e->ask->take(e->ask->context, data, bytes);
+        return e->refused ? 0 : bytes;
+    }
+    size_t room = refusal_bytes - e->refusal_used, some = bytes < room ? bytes : room;
+    memcpy(e->refusal + e->refusal_used, data, some);
+    e->refusal_used += some;
+    e->swallowed += bytes; // a short refusal is read to its end, so that the connection can be used again
+    e->refused = e->reply->status < 300 || e->swallowed > swallowed_most;
+    return e->refused ? 0 : bytes;
+}
+
+/* Called once a second at least. */
+static int on_progress(void *context, curl_off_t a, curl_off_t b, curl_off_t c, curl_off_t d)
+{
+    struct exchange *e = context;
+    (void)a, (void)b, (void)c, (void)d;
+    e->stalled = spl_now_ns() - e->moved_ns > e->ask->stall_ms * SPL_NS_PER_MS;
+    return e->stalled || spl_is_cancelled(e->ask->cancelled);
+}
+
+/* <Code>AccessDenied</Code> of an S3 error: a word, or nothing. */
+static void read_code(struct exchange *e)
+{
+    const char *begin = strstr(e->refusal, "<Code>");
+    size_t length = begin ? strspn(begin + 6, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.") : 0;
+    if (length && begin[6 + length] == '<')
+        copy(e->reply->code, sizeof e->reply->code, begin + 6, length);
+}
+
+static bool may_pass(CURLcode code)
+{
+    switch (code) {
+    case CURLE_COULDNT_RESOLVE_PROXY:
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_CONNECT:
+    case CURLE_WEIRD_SERVER_REPLY:
+    case CURLE_PARTIAL_FILE:
+    case CURLE_OPERATION_TIMEDOUT:
+    case CURLE_SSL_CONNECT_ERROR:
+    case CURLE_GOT_NOTHING:
+    case CURLE_SEND_ERROR:
+    case CURLE_RECV_ERROR:
+    case CURLE_HTTP2:
+    case CURLE_HTTP2_STREAM:
+    case CURLE_OUT_OF_MEMORY:
+    case CURLE_AGAIN:
+        return true;
+    default:
+        return false;
+    }
+}
+
+static struct curl_slist *add_header(const struct server *server, struct curl_slist *list, const char *name,
+                                     const char *value, bool *refused)
+{
+    char line[512];
+    struct curl_slist *longer = NULL;
+    if (!*value)
+        return list;
+    int length = snprintf(line, sizeof line, "%s: %s", name, value);
+    if (length > 0 && (size_t)length < sizeof line)
+        longer = server->curl->curl_slist_append(list, line);
+    *refused |= !longer;
+    return longer ? longer : list;
+}
+
+/* All that one request is, on a handle that knows nothing but its connection. */
+static bool set_up(const struct server *server, CURL *handle, struct exchange *e, struct curl_slist **headers)
+{
+    const struct spl_curl *curl = server->curl;
+    const struct spl_remote_ask *ask = e->ask;
+    const char *authorities = getenv("CURL_CA_BUNDLE");
+    const uint64_t left_ms = spl_remaining_ns(ask->deadline_ns) / SPL_NS_PER_MS + 1;
+    char range[64];
+    bool refused = false;
+    snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, ask->first, ask->first + ask->bytes - 1);
+    *headers = add_header(server, *headers, "If-Match", ask->if_match, &refused);
+    *headers = add_header(server, *headers, "If-Unmodified-Since", ask->if_unmodified, &refused);
+    *headers = add_header(server, *headers, "Accept-Encoding", "identity", &refused);
+    if (server->token_header) {
+        struct curl_slist *longer = curl->curl_slist_append(*headers, server->token_header);
+        refused |= !longer;
+        *headers = longer ? longer : *headers;
+    }
+#define SET(option, value) (refused |= curl->curl_easy_setopt(handle, option, value) != CURLE_OK)
+    SET(CURLOPT_URL, server->url);
+    SET(CURLOPT_PROTOCOLS_STR, "http,https");
+    SET(CURLOPT_REDIR_PROTOCOLS_STR, server->tls ? "https" : "http,https");
+    SET(CURLOPT_FOLLOWLOCATION, server->s3 ? 0L : 1L);
+    SET(CURLOPT_MAXREDIRS, (long)redirects_most);
+    SET(CURLOPT_PATH_AS_IS, server->s3 ? 1L : 0L);
+    SET(CURLOPT_USERAGENT, "splatd/" SPLATD_VERSION);
+    SET(CURLOPT_NOSIGNAL, 1L);
+    SET(CURLOPT_RANGE, range);
+    SET(CURLOPT_HTTPHEADER, *headers);
+    SET(CURLOPT_CONNECTTIMEOUT_MS, (long)ask->connect_ms);
+    SET(CURLOPT_TIMEOUT_MS, left_ms < 86400000 ? (long)left_ms : 86400000L);
+    curl->curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 256L << 10); // refused where a handle still has its buffer
+    SET(CURLOPT_HEADERFUNCTION, on_header);
+    SET(CURLOPT_HEADERDATA, e);
+    SET(CURLOPT_WRITEFUNCTION, on_body);
+    SET(CURLOPT_WRITEDATA, e);
+    SET(CURLOPT_NOPROGRESS, 0L);
+    SET(CURLOPT_XFERINFOFUNCTION, on_progress);
+    SET(CURLOPT_XFERINFODATA, e);
+    if (authorities && *authorities)
+        SET(CURLOPT_CAINFO, authorities);
+    if (server->sign) {
+        SET(CURLOPT_AWS_SIGV4, server->provider);
+        SET(CURLOPT_USERNAME, server->key_id);
+        SET(CURLOPT_PASSWORD, server->secret);
+    }
+#undef SET
+    return !refused;
+}
+
+static CURL *take_handle(struct server *server)
+{
+    pthread_mutex_lock(&server->mutex);
+    CURL *handle = server->kept_count ? server->kept[--server->kept_count] : NULL;
+    pthread_mutex_unlock(&server->mutex);
+    return handle ? handle : server->curl->curl_easy_init();
+}
+
+static void give_handle(struct server *server, CURL *handle)
+{
+    server->curl->curl_easy_reset(handle);
+    pthread_mutex_lock(&server->mutex);
+    bool room = server->kept_count < handles_kept;
+    if (room)
+        server->kept[server->kept_count++] = handle;
+    pthread_mutex_unlock(&server->mutex);
+    if (!room)
+        server->curl->curl_easy_cleanup(handle);
+}
+
+static void ask(void *context, const struct spl_remote_ask *what, struct spl_remote_reply *reply)
+{
+    struct server *server = context;
+    struct exchange e = {.ask = what, .reply = reply, .moved_ns = spl_now_ns()};
+    struct curl_slist *headers = NULL;
+    *reply = (struct spl_remote_reply){0};
+    CURL *handle = take_handle(server);
+    if (!handle || !set_up(server, handle, &e, &headers)) {
+        reply->may_pass = true;
+        snprintf(reply->why, sizeof reply->why, "out of memory for a request");
+    } else {
+        CURLcode code = server->curl->curl_easy_perform(handle);
+        curl_off_t seconds = 0;
+        if (!server->curl->curl_easy_getinfo(handle, CURLINFO_RETRY_AFTER, &seconds) && seconds > 0)
+            reply->retry_after_s = (uint64_t)seconds;
+        read_code(&e);
+        if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
+            bool partly = reply->status == 206;
+            reply->may_pass = may_pass(code) || e.stalled;
+            snprintf(reply->why, sizeof reply->why, "%s", e.stalled ? "nothing came any more" : server->curl->curl_easy_strerror(code));
+            if (!partly || !reply->may_pass)
+                reply->status = 0;
+        }
+    }
+    if (handle)
+        give_handle(server, handle);
+    server->curl->curl_slist_free_all(headers);
+}
+
+static void close_server(void *context)
+{
+    struct server *server = context;
+    for (unsigned i = 0; i < server->kept_count; i++)
+        server->curl->curl_easy_cleanup(server->kept[i]);
+    pthread_mutex_destroy(&server->mutex);
+    if (server->secret)
+        explicit_bzero(server->secret, strlen(server->secret));
+    free(server->url);
+    free(server->key_id);
+    free(server->secret);
+    free(server->token_header);
+    free(server->provider);
+    free(server);
+}
+
+static char *join(const char *a, const char *b)
+{
+    char *text = NULL;
+    return asprintf(&text, "%s%s", a, b) < 0 ? NULL : text;
+}
+
+int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_account *account,
+                         struct spl_remote_link *out, struct spl_error *err)
+{
+    *out = (struct spl_remote_link){0};
+    const struct spl_curl *curl = spl_curl_open(err);
+    if (!curl)
+        return SPL_E_UNSUPPORTED;
+    struct server *server = spl_alloc(1, sizeof *server, err);
+    if (!server)
+        return SPL_E_NOMEM;
+    pthread_mutex_init(&server->mutex, NULL);
+    server->curl = curl;
+    server->tls = url->tls;
+    server->s3 = url->s3;
+    server->sign = url->s3 && account->key_id && *account->key_id;
+    bool refused = !(server->url = strdup(url->get));
+    if (server->sign) {
+        const char *region = account->region && *account->region ? account->region : "us-east-1";
+        char provider[128];
+        snprintf(provider, sizeof provider, "aws:amz:%.64s:s3", region);
+        refused |= !(server->key_id = strdup(account->key_id)) || !(server->secret = strdup(account->secret)) ||
+                   !(server->provider = strdup(provider));
+        if (account->token && *account->token)
+            refused |= !(server->token_header = join("x-amz-security-token: ", account->token));
+    }
+    if (refused) {
+        close_server(server);
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
+    }
+    *out = (struct spl_remote_link){.ask = ask, .close = close_server, .context = server};
+    return SPL_OK;
+}
