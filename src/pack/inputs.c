@@ -352,6 +352,21 @@ int spl_inputs_find(struct spl_inputs *inputs, const char *const *given, size_t 
     return rc;
 }
 
+static int by_last_part(const void *a, const void *b)
+{
+    const char *one = *(char *const *)a, *other = *(char *const *)b;
+    int order = strcmp(spl_input_name(one), spl_input_name(other));
+    return order ? order : strcmp(one, other);
+}
+
+void spl_inputs_sort(struct spl_inputs *inputs)
+{
+    if (inputs->count)
+        qsort(inputs->paths, inputs->count, sizeof *inputs->paths, by_last_part);
+    if (inputs->left_out_count)
+        qsort(inputs->left_out, inputs->left_out_count, sizeof *inputs->left_out, by_last_part);
+}
+
 void spl_inputs_finish(struct spl_inputs *inputs)
 {
     for (size_t i = 0; i < inputs->count; i++)

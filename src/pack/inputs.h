@@ -33,6 +33,10 @@ struct spl_inputs {
 int spl_inputs_find(struct spl_inputs *inputs, const char *const *given, size_t count,
                     const struct spl_inputs_listener *listener, struct spl_error *err);
 
+/* Orders them by their names, of equal ones by their paths: what is made of them does not depend on the order in which
+ * they were named. What is left out later is in the order of its being found. */
+void spl_inputs_sort(struct spl_inputs *inputs);
+
 /* `rc` and `why` of a failure over `path`: left out, and 0, where that is wanted and the failure is the file's own,
  * else `rc` with *err filled. */
 int spl_inputs_leave_out(struct spl_inputs *inputs, const char *path, int rc, const struct spl_error *why,

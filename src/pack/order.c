@@ -1,4 +1,5 @@
-/* Morton order over the cubic bounds, and exact duplicates out.
+/* Morton order over the cubic bounds, and exact duplicates out: of equal coordinates the point stays that has a station,
+ * a normal, the greater class and colour, and so on. The order is that of the points, not that in which they were read.
  *
  * A stable parallel radix sort of (key, index) pairs: each pass counts per piece, one prefix sum, each piece scatters,
  * so the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
@@ -139,12 +140,36 @@ struct pair {
     uint32_t index;
 };
 
+static int compare_whole(uint32_t a, uint32_t b)
+{
+    return (a > b) - (a < b);
+}
+
+static int compare_reals(double a, double b)
+{
+    return (a > b) - (a < b);
+}
+
 static int compare_pairs(const void *a, const void *b)
 {
     const struct pair *p = a, *q = b;
     if (p->key != q->key)
         return p->key < q->key ? -1 : 1;
     return p->index < q->index ? -1 : p->index > q->index;
+}
+
+/* Which of two points at one place comes first: by what they have beside it. 0 where that is the same too. */
+static int compare_points(const struct spl_points *p, uint32_t a, uint32_t b)
+{
+    int order = p->station ? compare_whole(p->station[a], p->station[b]) : 0; /* SPL_NO_STATION is the greatest */
+    for (int c = 0; p->normal && !order && c < 3; c++)
+        order = compare_reals((double)p->normal[b][c], (double)p->normal[a][c]);
+    if (!order)
+        order = compare_whole(p->color_class[b], p->color_class[a]);
+    for (int s = 0; !order && s < SPL_POINT_SCALARS; s++)
+        if (p->scalar[s].values)
+            order = compare_whole(spl_scalar_number(&p->scalar[s], a), spl_scalar_number(&p->scalar[s], b));
+    return order;
 }
 
 /* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and
@@ -163,8 +188,10 @@ static void order_run(struct order *o, uint32_t *index, size_t n)
         size = fmax(size, high - low[c]);
     }
     if (size == 0) {
-        for (size_t i = 1; i < n; i++)
+        for (size_t i = 1; i < n; i++) {
+            index[0] = compare_points(p, index[i], index[0]) < 0 ? index[i] : index[0];
             index[i] = dropped;
+        }
         return;
     }
     struct pair few[short_run], *many = n <= short_run ? NULL : spl_alloc_raw(n, sizeof *many, NULL);

@@ -133,6 +133,7 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     rc = spl_inputs_find(&inputs, options->inputs, options->input_count, &listener, err);
     if (rc)
         return rc;
+    spl_inputs_sort(&inputs);
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
     struct spl_passes p = {.options = &found, .stage = &stage};

@@ -50,7 +50,8 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
 /* Fills `list` with the indices of the scalars that the points have, in order; returns how many. */
 unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS]);
 
-/* Sorts all arrays in Morton order and drops points with equal coordinates, keeping the first read. */
+/* Sorts all arrays in Morton order and drops points with equal coordinates. Which of them stays depends on what they
+ * have alone, so that the result is the same in whatever order points were read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
 
 /* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX), with `clip_lines`

@@ -12,7 +12,7 @@
 #include "dataset/streams.h"
 #include "pack/points.h"
 
-enum { decimals_max = 6, halvings_max = 20, sample_max = 65536, bits_of_floats = 16, bits_of_doubles = 24 };
+enum { decimals_max = 6, halvings_max = 20, digit_bits = 16, digits = 1 << digit_bits, bits_of_floats = 16, bits_of_doubles = 24 };
 static const double most_steps = 4294967290.0; /* below SPL_STREAM_NONE, with room for rounding */
 static const double most_whole = 0x1p52;       /* where steps are counted exactly */
 static const double largest = 0x1p900;         /* of a value, so that those that come back are finite */
@@ -159,30 +159,74 @@ bool spl_scalar_is_constant(const struct spl_scalar_values *scalar)
     return scalar->min > scalar->max || (scalar->min == scalar->max && !scalar->missing);
 }
 
-static int ascending(const void *a, const void *b)
+/* Whole numbers in the order of the values. */
+static uint64_t rank_of(double v)
 {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    uint64_t bits;
+    v = v == 0 ? 0 : v; /* no -0 */
+    memcpy(&bits, &v, sizeof bits);
+    return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
+}
+
+static double value_of(uint64_t rank)
+{
+    uint64_t bits = rank >> 63 ? rank & ~(UINT64_C(1) << 63) : ~rank;
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+/* The value that `place` others come before, digit by digit: the same in whatever order points were read. `counts` is
+ * scratch of `digits`. */
+static double find_place(const struct spl_scalar_values *s, size_t count, size_t place, uint32_t *counts)
+{
+    uint64_t found = 0;
+    for (int shift = 64 - digit_bits; shift >= 0; shift -= digit_bits) {
+        uint64_t above = shift + digit_bits < 64 ? ~UINT64_C(0) << (shift + digit_bits) : 0;
+        uint32_t digit = 0;
+        memset(counts, 0, digits * sizeof *counts);
+        for (size_t i = 0; i < count; i++) {
+            double v = get(s->values, s->storage, i);
+            uint64_t rank = rank_of(v);
+            counts[rank >> shift & (digits - 1)] += !isnan(v) && !((rank ^ found) & above);
+        }
+        while (place >= counts[digit])
+            place -= counts[digit++];
+        found |= (uint64_t)digit << shift;
+    }
+    return value_of(found);
 }
 
 /* From the 1st to the 99th hundredth, so that a stray value does not coarsen all others. */
 static int find_range(const struct spl_scalar_values *s, size_t count, double *range, struct spl_error *err)
 {
-    size_t sample = count < sample_max ? count : sample_max, used = 0;
-    double *values = spl_alloc_raw(sample, sizeof *values, err);
-    if (!values)
+    size_t used = 0;
+    uint32_t *counts = spl_alloc_raw(digits, sizeof *counts, err);
+    if (!counts)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < sample; i++) {
-        double v = get(s->values, s->storage, (size_t)((double)i * (double)count / (double)sample));
-        if (!isnan(v))
-            values[used++] = v;
-    }
-    qsort(values, used, sizeof *values, ascending);
-    *range = used ? values[used - 1 - used / 100] / 2 - values[used / 100] / 2 : 0;
+    for (size_t i = 0; i < count; i++)
+        used += !isnan(get(s->values, s->storage, i));
+    *range = used ? find_place(s, count, used - 1 - used / 100, counts) / 2 -
+                        find_place(s, count, used / 100, counts) / 2
+                  : 0;
     *range = *range > 0 ? *range : s->max / 2 - s->min / 2;
     *range = *range > 0 ? *range : fabs(s->max) / 2; /* one value alone, which is no decimal */
-    free(values);
+    free(counts);
     return SPL_OK;
+}
+
+/* Decimals as they are of all values together. While they came, those that lie far from 0 were not known to the first
+ * of them, whose rounding was held against too small a size: more decimals than there are, never less. */
+static void settle_decimals(struct spl_scalar_values *s, size_t count)
+{
+    double size = fmax(fabs(s->min), fabs(s->max));
+    unsigned before = s->decimals;
+    s->decimals = 0;
+    for (size_t i = 0; i < count && s->decimals < before; i++) {
+        double v = get(s->values, s->storage, i);
+        while (!isnan(v) && s->decimals < before && !is_multiple(v, powers[s->decimals], size))
+            s->decimals++;
+    }
 }
 
 /* The power of two at or below v. */
@@ -204,6 +248,7 @@ int spl_scalar_settle(struct spl_scalar_values *scalar, size_t count, struct spl
     scalar->steps_a_unit = 1;
     if (scalar->min > scalar->max)
         return SPL_OK;
+    settle_decimals(scalar, count);
     if (scalar->decimals <= decimals_max) {
         steps = powers[scalar->decimals];
         if (!fits(scalar, steps))

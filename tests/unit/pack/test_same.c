@@ -1,0 +1,224 @@
+/* A dataset depends on what is in the scans alone: not on threads, on the order of files and of the points in them, nor
+ * on how many files they lie in. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <splatd/pack.h>
+
+#include "clouds.h"
+#include "dataset/format.h"
+#include "support/folder.h"
+
+enum { floor_points = 50000, wall_points = 30000, ball_points = 20000, wire_points = 4000, bush_points = 6000 };
+enum { again = 4000, total = floor_points + wall_points + ball_points + wire_points + bush_points + again };
+
+struct point {
+    float x, y, z;
+    uint8_t red, green, blue, classification;
+    float amplitude;
+    double time;
+};
+
+static struct point *points;
+
+/* A hall's floor and wall, a ball, a wire, a bush; some places twice, with other colours. */
+static void make_points(void)
+{
+    uint64_t random = 11;
+    points = calloc(total, sizeof *points);
+    assert_non_null(points);
+    for (int i = 0; i < total - again; i++) {
+        double u = uniform(&random), v = uniform(&random), w = uniform(&random), noise = 0.002 * (w - 0.5);
+        int at = i;
+        double x = 12 * u, y = 8 * v, z = noise;
+        if ((at -= floor_points) >= 0)
+            y = noise, z = 4 * v;
+        if ((at -= wall_points) >= 0) {
+            double flat = sqrt(1 - (2 * v - 1) * (2 * v - 1)), angle = 2 * M_PI * u, r = 0.7 + noise;
+            x = 6 + r * flat * cos(angle), y = 4 + r * flat * sin(angle), z = 1.5 + r * (2 * v - 1);
+        }
+        if ((at -= ball_points) >= 0)
+            x = 12 * u, y = 6 + noise, z = 3 + 0.01 * (x - 6) * (x - 6);
+        if ((at -= wire_points) >= 0)
+            x = 2 + u, y = 2 + v, z = 0.5 + w;
+        points[i] = (struct point){(float)x, (float)y, (float)z, (uint8_t)(200 * u), (uint8_t)(i % 200), 90,
+                                   (uint8_t)(i % 5), (float)(w * w), 1e8 + 0.001 * i};
+    }
+    for (int i = total - again; i < total; i++) {
+        points[i] = points[17 * (i - (total - again))];
+        points[i].red ^= (uint8_t)(i | 1);
+        points[i].time += 1;
+    }
+}
+
+/* Every `step`-th from `first` on, or backwards from it; `side` 0 both halves, else one by x. */
+static void write_scan(const char *path, int first, int step, int side)
+{
+    static const char head[] =
+        "ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
+        "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+        "property uchar classification\nproperty float amplitude\nproperty double time\nend_header\n";
+    FILE *f = fopen(path, "wb");
+    int count = 0;
+    assert_non_null(f);
+    for (int i = first; i >= 0 && i < total; i += step)
+        count += !side || (points[i].x < 5) == (side < 0);
+    fprintf(f, head, count);
+    for (int i = first; i >= 0 && i < total; i += step)
+        if (!side || (points[i].x < 5) == (side < 0)) {
+            const struct point *p = &points[i];
+            fwrite(p, 16, 1, f);
+            fwrite(&p->amplitude, 4, 1, f);
+            fwrite(&p->time, 8, 1, f);
+        }
+    assert_int_equal(fclose(f), 0);
+}
+
+struct file {
+    uint8_t *bytes;
+    size_t length;
+};
+
+static struct file read_file(const char *path)
+{
+    struct file file = {0};
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    fseek(f, 0, SEEK_END);
+    file.length = (size_t)ftell(f);
+    rewind(f);
+    file.bytes = malloc(file.length);
+    assert_int_equal(fread(file.bytes, 1, file.length, f), file.length);
+    fclose(f);
+    return file;
+}
+
+static struct spl_pack_options get_options(const char *const *inputs, size_t count, unsigned threads)
+{
+    return (struct spl_pack_options){.size = sizeof(struct spl_pack_options),
+                                     .inputs = inputs,
+                                     .input_count = count,
+                                     .threads = threads,
+                                     .keep = "none,amplitude,time",
+                                     .primitives = SPL_PRIMITIVES_ALL};
+}
+
+static struct file pack(struct spl_pack_options options)
+{
+    struct spl_error err = {0};
+    struct spl_pack_report report = {0};
+    options.output = in_folder("same.spld");
+    if (spl_pack(&options, &report, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(report.duplicates, again);
+    assert_true(report.panels > 0 && report.meshes > 0 && report.pieces > 0);
+    return read_file(options.output);
+}
+
+static void assert_same(const char *what, struct file one, struct file other)
+{
+    if (one.length != other.length || memcmp(one.bytes, other.bytes, one.length))
+        fail_msg("%s: another dataset", what);
+}
+
+static const struct spl_section *find_section(struct file file, uint32_t type, uint32_t index, uint32_t *count)
+{
+    const struct spl_file_header *header = (const void *)file.bytes;
+    const struct spl_section *table = (const void *)(file.bytes + header->table_offset);
+    *count = header->section_count;
+    for (uint32_t s = 0; s < header->section_count; s++)
+        if (table[s].type == type && table[s].index == index)
+            return &table[s];
+    return NULL;
+}
+
+/* The sections of `one` but META, which names the files, are those of `other`. */
+static void assert_same_content(const char *what, struct file one, struct file other)
+{
+    uint32_t count, others;
+    const struct spl_section *all = find_section(one, SPL_SECTION_META, 0, &count);
+    assert_non_null(all);
+    all = (const void *)(one.bytes + ((const struct spl_file_header *)one.bytes)->table_offset);
+    for (uint32_t s = 0; s < count; s++) {
+        const struct spl_section *same = find_section(other, all[s].type, all[s].index, &others);
+        assert_non_null(same);
+        assert_int_equal(count, others);
+        if (all[s].type != SPL_SECTION_META &&
+            (same->bytes != all[s].bytes ||
+             memcmp(one.bytes + all[s].offset, other.bytes + same->offset, same->bytes)))
+            fail_msg("%s: section %.4s %u differs", what, (const char *)&all[s].type, all[s].index);
+    }
+}
+
+static struct file whole;
+static char scan[300];
+
+static int setup(void **state)
+{
+    int rc = folder_make(state);
+    const char *path = scan;
+    snprintf(scan, sizeof scan, "%s", in_folder("scan.ply"));
+    make_points();
+    write_scan(scan, 0, 1, 0);
+    whole = pack(get_options(&path, 1, 1));
+    return rc;
+}
+
+static int teardown(void **state)
+{
+    free(whole.bytes);
+    free(points);
+    return folder_remove(state);
+}
+
+static void of_any_number_of_threads(void **state)
+{
+    const char *path = scan;
+    (void)state;
+    for (unsigned threads = 2; threads <= 3; threads++) {
+        struct file other = pack(get_options(&path, 1, threads));
+        assert_same("threads", whole, other);
+        free(other.bytes);
+    }
+}
+
+/* A name is in META, so that the points that lie the other way round lie in a file of the same one. */
+static void of_any_order_of_points(void **state)
+{
+    const char *path = scan;
+    (void)state;
+    write_scan(scan, total - 1, -1, 0);
+    struct file other = pack(get_options(&path, 1, 2));
+    write_scan(scan, 0, 1, 0);
+    assert_same("order of points", whole, other);
+    free(other.bytes);
+}
+
+static void of_tiles_in_any_order(void **state)
+{
+    char east[300], west[300];
+    (void)state;
+    snprintf(east, sizeof east, "%s", in_folder("b-tile.ply"));
+    snprintf(west, sizeof west, "%s", in_folder("a-tile.ply"));
+    write_scan(east, 0, 1, 1);
+    write_scan(west, total - 1, -1, -1);
+    struct file one = pack(get_options((const char *const[]){west, east}, 2, 2));
+    struct file other = pack(get_options((const char *const[]){east, west}, 2, 2));
+    assert_same("order of files", one, other);
+    assert_same_content("tiles", whole, one);
+    free(one.bytes);
+    free(other.bytes);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(of_any_number_of_threads),
+                                       cmocka_unit_test(of_any_order_of_points),
+                                       cmocka_unit_test(of_tiles_in_any_order)};
+    return cmocka_run_group_tests_name("a dataset depends on its scans alone", tests, setup, teardown);
+}
