@@ -162,7 +162,12 @@ struct spl_pack_options {
     const struct spl_saved_view *default_view;
     const struct spl_saved_view *views; /* by their names, of any order */
     size_t view_count;                  /* at most SPL_SAVED_VIEWS_MAX */
+    /* Bytes that the process may take while scans become a dataset; what is beyond lies in files without a name in the
+     * output's folder. At least SPL_PACK_MEMORY_MIN; 0 = as much as there is need. The dataset is the same. */
+    uint64_t memory_bytes;
 };
+
+#define SPL_PACK_MEMORY_MIN (64ull << 20)
 
 static inline void spl_pack_options_init(struct spl_pack_options *options)
 {
@@ -200,8 +205,8 @@ struct spl_pack_report {
  * rename: a crash leaves the old file or none). With photographs or maps the dataset is first written beside `output`,
  * removed as soon as it is open again, and then written with their colours, with maps once more. Blocks; uses
  * options->threads threads and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for
- * each point on a wire, a pole or a cable; photographs take photos->memory_bytes beside them. `report` may be NULL. Any
- * thread. */
+ * each point on a wire, a pole or a cable, or memory_bytes and one thread more; photographs take photos->memory_bytes
+ * beside them. `report` may be NULL. Any thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 SPL_END_DECLARATIONS

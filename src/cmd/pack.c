@@ -273,8 +273,10 @@ static const struct spl_cmd_option options[] = {
      "planes, meshes and lines besides, as polygons with their areas and inclinations, triangles, and polylines with "
      "their sag: a name that ends in .ply, .obj or .dxf, with --primitives all",
      SPL_CMD_TEXT(struct arguments, pack.export_primitives)},
-    {"memory", "MIB", "of the photographs' pass, or 4G and such", .otherwise = "2048",
-     SPL_CMD_MIB(struct arguments, photos.memory_bytes, 64, 1 << 20)},
+    {"memory", "MIB",
+     "that the pack may take, or 4G and such: what is beyond lies on disk beside the output meanwhile; the file does not "
+     "depend on it. Of photographs their pass's alone, where it is 2048 unless it is said",
+     .otherwise = "as much as there is need", SPL_CMD_MIB(struct arguments, pack.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
      SPL_CMD_TEXT(struct arguments, photos.device)},
     {"skip-broken", NULL, "scans that cannot be read are named and left out",
@@ -291,10 +293,10 @@ static const struct spl_cmd_table table = {
         "usage: splatd pack IN... -o NAME.spld [--skip-broken] [--columns LIST] [--intensity] [--keep LIST]\n"
         "                   [--unit U] [--crs WHICH] [--up AXIS] [--neighbours K] [--position-error X]\n"
         "                   [--normal-error DEG] [--points-only] [--no-linear] [--no-clip-lines]\n"
-        "                   [--max-points N] [--threads N]\n"
+        "                   [--max-points N] [--threads N] [--memory MIB]\n"
         "                   [--title TEXT] [--description TEXT] [--default-view VIEW] [--view NAME=VIEW]...\n"
         "                   [--cameras MODEL [--images DIR] [--textures HOW] [--texture-quality Q] [--keep-going]\n"
-        "                                    [--keep-textures FILE] [--memory MIB] [--device D]]\n"
+        "                                    [--keep-textures FILE] [--device D]]\n"
         "                   [--panoramas PATH [--images DIR] [--keep-going] | --no-panoramas] [--prune N]\n"
         "                   [--export-maps DIR] [--maps DIR]\n"
         "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n\n"
@@ -335,7 +337,7 @@ static const struct spl_cmd_table table = {
         "  splatd pack hall.ply --primitives all --export-primitives hall.dxf -o hall.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
-    .after = "\nAbout 80 bytes of memory a point, 180 on a wire. Progress and the summary go to stderr.\n",
+    .after = "\nAbout 80 bytes of memory a point, 180 on a wire, or --memory. Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };
@@ -348,8 +350,7 @@ static const char *find_contradiction(const struct arguments *a)
     bool poses = photos->cameras || (a->wants_maps && a->maps.panoramas);
     if (!poses && (photos->images || a->keep_going))
         return "photographs need their poses: --cameras MODEL, or --panoramas PATH";
-    if (!photos->cameras && (photos->memory_bytes || photos->device ||
-                             photos->keep_textures || a->quality || a->textures >= 0))
+    if (!photos->cameras && (photos->device || photos->keep_textures || a->quality || a->textures >= 0))
         return "photographs need their poses: --cameras MODEL";
     if (photos->keep_textures && a->textures == SPL_TEXTURES_NONE)
         return "--keep-textures with --textures none keeps nothing: leave one of them out";
@@ -420,6 +421,7 @@ int spl_cmd_pack(int argc, char **argv)
     a.pack.left_out = a.skip_broken ? spl_cmd_pack_say_left_out : NULL;
     a.photos.refused = a.keep_going ? spl_cmd_pack_name_refused : NULL;
     a.photos.textures = a.textures < 0 ? SPL_TEXTURES_ADAPTIVE : (enum spl_texture_coding)a.textures;
+    a.photos.memory_bytes = a.pack.memory_bytes;
     a.pack.photos = a.photos.cameras ? &a.photos : NULL;
     a.maps.refused = a.keep_going ? spl_cmd_pack_name_refused : NULL;
     a.maps.context = &listener;

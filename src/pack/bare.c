@@ -73,10 +73,10 @@ int spl_bare_points(struct spl_points *points, struct spl_stage *stage, struct s
 {
     struct bare b = {.points = points};
     spl_stage_begin(stage, "spacing", "points", points->count);
-    free(points->normal);
-    points->normal = spl_alloc(points->count + SPL_POINTS_PAD, sizeof *points->normal, err);
-    points->radius = spl_alloc(points->count, sizeof *points->radius, err);
-    points->uncertainty = spl_alloc(points->count, sizeof *points->uncertainty, err);
+    spl_spill_free(points->spill, points->normal);
+    points->normal = spl_spill_alloc(points->spill, points->count + SPL_POINTS_PAD, sizeof *points->normal, err);
+    points->radius = spl_spill_alloc(points->spill, points->count, sizeof *points->radius, err);
+    points->uncertainty = spl_spill_alloc(points->spill, points->count, sizeof *points->uncertainty, err);
     int rc = points->normal && points->radius && points->uncertainty ? 0 : SPL_E_NOMEM;
     if (!rc)
         rc = size_points(&b, stage->threads, err);

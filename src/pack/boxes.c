@@ -18,6 +18,7 @@ static void bound_points(void *context, size_t begin, size_t end, unsigned worke
     const struct leaves *leaves = context;
     const struct spl_points *p = leaves->points;
     (void)worker;
+    spl_spill_keep_bound(p->spill);
     for (size_t box = begin; box < end; box++) {
         size_t first = box * SPL_BOXES_LEAF,
                last = first + SPL_BOXES_LEAF < p->count ? first + SPL_BOXES_LEAF : p->count;
@@ -52,14 +53,14 @@ static void bound_groups(const struct spl_box_group *below, size_t count, struct
 int spl_boxes_init(struct spl_boxes *boxes, const struct spl_points *points, unsigned threads, struct spl_error *err)
 {
     size_t count[SPL_BOXES_LEVELS], total = 0;
-    *boxes = (struct spl_boxes){0};
+    *boxes = (struct spl_boxes){.spill = points->spill};
     for (size_t left = (points->count + SPL_BOXES_LEAF - 1) / SPL_BOXES_LEAF; !boxes->levels || left > 1;
          left = (left + SPL_BOXES_FAN - 1) / SPL_BOXES_FAN) {
         boxes->first[boxes->levels] = total;
         count[boxes->levels++] = left;
         total += (left + SPL_BOXES_FAN - 1) / SPL_BOXES_FAN;
     }
-    if (!(boxes->groups = spl_alloc_raw(total, sizeof *boxes->groups, err)))
+    if (!(boxes->groups = spl_spill_alloc_raw(points->spill, total, sizeof *boxes->groups, err)))
         return SPL_E_NOMEM;
     for (unsigned l = 0; l < boxes->levels; l++) {
         struct spl_box_group *groups = boxes->groups + boxes->first[l];
@@ -78,6 +79,6 @@ int spl_boxes_init(struct spl_boxes *boxes, const struct spl_points *points, uns
 
 void spl_boxes_finish(struct spl_boxes *boxes)
 {
-    free(boxes->groups);
+    spl_spill_free(boxes->spill, boxes->groups);
     *boxes = (struct spl_boxes){0};
 }

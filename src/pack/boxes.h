@@ -15,6 +15,7 @@ struct spl_box_group {
 /* Box b of a level is entry b % SPL_BOXES_FAN of that level's group b / SPL_BOXES_FAN, and bounds group b of the level
  * below; on level 0 it bounds the points from b * SPL_BOXES_LEAF on. */
 struct spl_boxes {
+    struct spl_spill *spill; /* the points' */
     struct spl_box_group *groups;   // owned; all levels, leaves' first
     size_t first[SPL_BOXES_LEVELS]; /* of each level in groups */
     unsigned levels;                /* the last has one group */

@@ -6,11 +6,14 @@
  * plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes
  * 60 more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until
  * the end. Stations have seen points, not panels: where there are both, the scan is written once more without panels.
+ * All that grows with the points, but for tables of a byte a point, is in arrays that may lie on disk (spill.h): where
+ * memory is bounded these are what is beyond. The same work is done on them, so that nothing depends on the bound.
  * The output's temporary file is made first, so that an unwritable place is known before hours of work, and is gone
  * unless the last rename succeeded. Runs on the caller's thread; parallel loops end before it goes on. */
 #include "pack/build.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,6 +29,9 @@
 #include "pack/said.h"
 #include "pack/texture/pass.h"
 #include "pack/up.h"
+
+/* Bytes a point in large arrays, at most: see above. */
+static const double bytes_bare = 54, bytes_surface = 70, bytes_planes = 100, bytes_normal = 12, bytes_scalar = 8;
 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
@@ -99,6 +105,33 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
                         (uint64_t)(1.33 * (double)points), 0);
     if (later && p->options->maps) /* scans say with their points how many stations they have */
         spl_maps_plan(p->stage, &later->pictures, 1, points);
+}
+
+/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough. Says how much it will be. */
+static int begin_spill(struct spl_build *p, struct spl_error *err)
+{
+    const struct spl_pack_options *o = p->options;
+    double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
+    double points = 0, normals = 0, scalars = 0;
+    char text[200];
+    for (size_t i = 0; i < p->scans.count; i++) {
+        const struct spl_scan *scan = &p->scans.list[i];
+        points += (double)(scan->max_points ? scan->max_points : scan->points_expected);
+        normals = scan->attributes & SPL_CLOUD_NORMAL ? bytes_normal : normals;
+        scalars = fmax(scalars, bytes_scalar * __builtin_popcount(scan->scalars));
+    }
+    uint64_t share = spl_spill_get_share(o->memory_bytes);
+    double beyond = points * (bytes + normals + scalars) - (double)share;
+    if (beyond <= 0)
+        return SPL_OK;
+    if (o->warn) {
+        snprintf(text, sizeof text,
+                 "%.0f points take up to %.1f GB while they are packed, which is beyond --memory: %.1f GB of it lie on "
+                 "disk beside %.60s meanwhile",
+                 points, points * (bytes + normals + scalars) / 1e9, beyond / 1e9, spl_input_name(o->output));
+        o->warn(o->progress_context, text);
+    }
+    return spl_spill_check_disk(o->output, (uint64_t)beyond, err);
 }
 
 static struct spl_bound get_bound(const struct spl_build *p)
@@ -224,6 +257,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_export_check(options->export_primitives, (const char *const *)inputs->paths, inputs->count, err);
     if (!rc)
         rc = spl_kept_read(&p.keep, options->keep, err);
+    if (!rc && options->memory_bytes)
+        rc = spl_spill_create(options->output, options->memory_bytes, &stage->spill, err);
     if (!rc)
         rc = spl_dataset_writer_create(out->dataset, &p.writer, err);
     if (!rc)
@@ -239,6 +274,9 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_system_find(&p.system, &p.scans, &said, err);
     if (!rc) {
         plan(&p, later);
+        rc = stage->spill ? begin_spill(&p, err) : SPL_OK;
+    }
+    if (!rc) {
         rc = gather(&p, &said, err);
     }
     if (!rc && later && options->maps)
@@ -292,5 +330,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     spl_points_finish(&p.points);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
+    spl_spill_destroy(stage->spill);
+    stage->spill = NULL;
     return rc;
 }

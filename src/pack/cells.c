@@ -88,6 +88,7 @@ static void key_points(void *context, size_t begin, size_t end, unsigned worker)
 {
     const struct build *b = context;
     (void)worker;
+    spl_spill_keep_bound(b->points->spill);
     for (size_t i = begin; i < end; i++)
         b->key[i] = spl_points_key(b->points, i, b->points->bounds_min, b->points->cube_size);
 }
@@ -97,6 +98,7 @@ static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
     const struct build *b = context;
     const struct spl_points *p = b->points;
     (void)worker;
+    spl_spill_keep_bound(p->spill);
     for (size_t k = begin; k < end; k++) {
         struct spl_cell *cell = &b->cells->cells[k];
         int64_t at[3];
@@ -145,7 +147,7 @@ static int make_table(struct spl_cells *cells, struct spl_error *err)
     size_t size = 16;
     while (size < 2 * (size_t)cells->count)
         size *= 2;
-    cells->table = spl_alloc(size, sizeof *cells->table, err);
+    cells->table = spl_spill_alloc(cells->spill, size, sizeof *cells->table, err);
     if (!cells->table)
         return SPL_E_NOMEM;
     cells->table_mask = (uint32_t)(size - 1);
@@ -178,16 +180,16 @@ int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, dou
                    struct spl_error *err)
 {
     struct build b = {.points = points, .cells = cells};
-    *cells = (struct spl_cells){0};
-    b.key = spl_alloc_raw(points->count, sizeof *b.key, err);
+    *cells = (struct spl_cells){.spill = points->spill};
+    b.key = spl_spill_alloc_raw(points->spill, points->count, sizeof *b.key, err);
     if (!b.key)
         return SPL_E_NOMEM;
     spl_parallel_for(threads, points->count, grain, key_points, &b);
     cells->shift = shift_for(b.key, points->count, wanted, &cells->count);
     cells->edge = ldexp(points->cube_size, (int)cells->shift - SPL_MORTON_BITS);
-    cells->cells = spl_alloc((size_t)cells->count + 1, sizeof *cells->cells, err);
+    cells->cells = spl_spill_alloc(cells->spill, (size_t)cells->count + 1, sizeof *cells->cells, err);
     if (!cells->cells) {
-        free(b.key);
+        spl_spill_free(points->spill, b.key);
         return SPL_E_NOMEM;
     }
     uint32_t k = 0;
@@ -198,7 +200,7 @@ int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, dou
     }
     spl_assert(k == cells->count);
     cells->cells[k].begin = (uint32_t)points->count;
-    free(b.key);
+    spl_spill_free(points->spill, b.key);
     spl_parallel_for(threads, cells->count, grain, sum_points, &b);
     return make_table(cells, err);
 }
@@ -210,8 +212,8 @@ int spl_cells_init_above(struct spl_cells *cells, const struct spl_cells *below,
     uint32_t count = 0;
     for (uint32_t k = 0; k < below->count; k++)
         count += k == 0 || below->cells[k].key >> 3 != below->cells[k - 1].key >> 3;
-    *cells = (struct spl_cells){.count = count, .shift = below->shift + 1, .edge = 2 * below->edge};
-    cells->cells = spl_alloc((size_t)count + 1, sizeof *cells->cells, err);
+    *cells = (struct spl_cells){.spill = below->spill, .count = count, .shift = below->shift + 1, .edge = 2 * below->edge};
+    cells->cells = spl_spill_alloc(cells->spill, (size_t)count + 1, sizeof *cells->cells, err);
     if (!cells->cells)
         return SPL_E_NOMEM;
     for (uint32_t k = 0, n = 0; k < below->count; k++)
@@ -226,7 +228,7 @@ int spl_cells_init_above(struct spl_cells *cells, const struct spl_cells *below,
 
 void spl_cells_finish(struct spl_cells *cells)
 {
-    free(cells->cells);
-    free(cells->table);
+    spl_spill_free(cells->spill, cells->cells);
+    spl_spill_free(cells->spill, cells->table);
     *cells = (struct spl_cells){0};
 }

@@ -16,6 +16,7 @@ struct spl_cell {
 };
 
 struct spl_cells {
+    struct spl_spill *spill; /* the points' */
     struct spl_cell *cells; /* in Morton order, and one behind the last whose `begin` is the number of points */
     uint32_t count;
     unsigned shift;  /* edge = 2^shift of the 2^21 cells that keys are counted in */

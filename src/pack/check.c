@@ -61,6 +61,9 @@ int spl_pack_check(const struct spl_pack_options *o, unsigned *neighbours, struc
     if (!(normal >= 0.01 && normal <= 30))
         return spl_fail_field(err, SPL_E_USAGE, "normal-error", "%g; the mean error is an angle of 0.01 to 30 degrees",
                               normal);
+    if (o->memory_bytes && o->memory_bytes < SPL_PACK_MEMORY_MIN)
+        return spl_fail_field(err, SPL_E_USAGE, "memory", "%llu bytes; a pack takes %llu MiB at least",
+                              (unsigned long long)o->memory_bytes, SPL_PACK_MEMORY_MIN >> 20);
     if (!(isfinite(o->up[0]) && isfinite(o->up[1]) && isfinite(o->up[2])))
         return spl_fail_field(err, SPL_E_USAGE, "up", "%g, %g, %g; up is a direction of three finite numbers", o->up[0],
                               o->up[1], o->up[2]);

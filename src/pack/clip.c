@@ -112,7 +112,7 @@ int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neigh
     struct lines lines = {
         .points = points, .neighbours = neighbours, .candidate = candidate, .stage = stage, .wide = wide};
     spl_clip_turns_init(&lines.turns);
-    points->clip = spl_alloc(points->count, sizeof *points->clip, err);
+    points->clip = spl_spill_alloc(points->spill, points->count, sizeof *points->clip, err);
     if (!points->clip)
         return SPL_E_NOMEM;
     spl_stage_begin(stage, "clip lines", "points", points->count);

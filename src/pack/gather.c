@@ -20,9 +20,9 @@ enum { batch_points = 65536 };
 static const double nothing = 1e-15;
 static const uint32_t grey = 0xb0b0b0; /* of points without any colour or intensity */
 
-static int grow(void **array, size_t capacity, size_t size, struct spl_error *err)
+static int grow(struct spl_spill *spill, void **array, size_t capacity, size_t size, struct spl_error *err)
 {
-    void *bigger = spl_realloc(*array, capacity + SPL_POINTS_PAD, size, err);
+    void *bigger = spl_spill_realloc(spill, *array, capacity + SPL_POINTS_PAD, size, err);
     if (!bigger)
         return SPL_E_NOMEM;
     *array = bigger;
@@ -41,17 +41,17 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
     bool had_station = p->station, had_normal = p->normal;
     if (capacity > p->capacity) {
         for (int c = 0; c < 3 && !rc; c++)
-            rc = grow((void **)&p->axis[c], capacity, sizeof(double), err);
+            rc = grow(p->spill, (void **)&p->axis[c], capacity, sizeof(double), err);
         if (!rc)
-            rc = grow((void **)&p->color_class, capacity, sizeof *p->color_class, err);
+            rc = grow(p->spill, (void **)&p->color_class, capacity, sizeof *p->color_class, err);
     }
     for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
         if (p->scalar[s].values && capacity > p->capacity)
-            rc = grow(&p->scalar[s].values, capacity, spl_scalar_bytes(&p->scalar[s]), err);
+            rc = grow(p->spill, &p->scalar[s].values, capacity, spl_scalar_bytes(&p->scalar[s]), err);
     if (!rc && (had_station ? capacity > p->capacity : wants_station))
-        rc = grow((void **)&p->station, capacity, sizeof *p->station, err);
+        rc = grow(p->spill, (void **)&p->station, capacity, sizeof *p->station, err);
     if (!rc && (had_normal ? capacity > p->capacity : wants_normal))
-        rc = grow((void **)&p->normal, capacity, sizeof *p->normal, err);
+        rc = grow(p->spill, (void **)&p->normal, capacity, sizeof *p->normal, err);
     if (rc)
         return rc;
     if (!had_station && wants_station)
@@ -197,6 +197,9 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
 {
     int rc = SPL_OK;
     points->keep = scans->how.keep;
+    points->spill = stage->spill;
+    for (int s = 0; s < SPL_POINT_SCALARS; s++)
+        points->scalar[s].spill = stage->spill;
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_scan *scan = &scans->list[i];
         struct spl_error why = {0};
@@ -223,7 +226,7 @@ static int settle_scalars(struct spl_points *p, struct spl_error *err)
         if (!spl_scalar_is_constant(scalar) || spl_kept_is_named(p->keep, s)) {
             rc = spl_scalar_settle(scalar, p->count, err);
         } else {
-            free(scalar->values);
+            spl_spill_free(p->spill, scalar->values);
             *scalar = (struct spl_scalar_values){0};
         }
     }
@@ -278,17 +281,17 @@ unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_P
 void spl_points_finish(struct spl_points *points)
 {
     for (int c = 0; c < 3; c++)
-        free(points->axis[c]);
-    free(points->color_class);
-    free(points->station);
-    free(points->normal);
+        spl_spill_free(points->spill, points->axis[c]);
+    spl_spill_free(points->spill, points->color_class);
+    spl_spill_free(points->spill, points->station);
+    spl_spill_free(points->spill, points->normal);
     for (int s = 0; s < SPL_POINT_SCALARS; s++)
-        free(points->scalar[s].values);
-    free(points->radius);
-    free(points->uncertainty);
-    free(points->linear);
-    free(points->clip);
-    free(points->plane);
+        spl_spill_free(points->spill, points->scalar[s].values);
+    spl_spill_free(points->spill, points->radius);
+    spl_spill_free(points->spill, points->uncertainty);
+    spl_spill_free(points->spill, points->linear);
+    spl_spill_free(points->spill, points->clip);
+    spl_spill_free(points->spill, points->plane);
     free(points->stations);
     free(points->eyes);
     *points = (struct spl_points){0};

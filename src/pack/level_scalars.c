@@ -49,7 +49,7 @@ bool spl_scalars_mix(struct spl_scalar_mixer *mixer, const struct spl_points *po
         mixer->mixes = spl_alloc_raw(splats, sizeof *mixer->mixes, NULL);
         mixer->capacity = mixer->mixes ? splats : 0;
     }
-    *out = spl_alloc_raw(splats * scalar_count, sizeof **out, NULL);
+    *out = spl_spill_take(points->spill, splats * scalar_count, sizeof **out, NULL);
     if (!mixer->mixes || !*out)
         return false;
     for (unsigned s = 0; s < scalar_count; s++) {

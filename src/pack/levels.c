@@ -54,6 +54,7 @@ struct cluster {
 };
 
 struct scratch { /* of one worker */
+    struct spl_spill *spill; /* where the arrays up to `numbers` lie: the points' */
     struct spl_inner_splat *input;
     struct cluster *clusters;
     uint32_t *table; /* cell -> cluster + 1 */
@@ -275,27 +276,28 @@ static void finish_cluster(const struct cluster *k, double cell, double farthest
 /* Room for `count` inputs and their clusters, of which there may be `clusters`. */
 static bool reserve(struct scratch *w, size_t count, size_t clusters, size_t scalars)
 {
+    struct spl_spill *spill = w->spill;
     if (count > w->input_capacity) {
         size_t table = 256;
         while (table < count)
             table *= 2;
-        free(w->input);
-        free(w->table);
-        free(w->of);
-        free(w->numbers);
+        spl_spill_free(spill, w->input);
+        spl_spill_free(spill, w->table);
+        spl_spill_free(spill, w->of);
+        spl_spill_free(spill, w->numbers);
         w->input_capacity = 0;
-        w->input = spl_alloc_raw(count, sizeof *w->input, NULL);
-        w->table = spl_alloc_raw(table, sizeof *w->table, NULL);
-        w->of = spl_alloc_raw(count, sizeof *w->of, NULL);
-        w->numbers = spl_alloc_raw(count * scalars + 1, sizeof *w->numbers, NULL);
+        w->input = spl_spill_alloc_raw(spill, count, sizeof *w->input, NULL);
+        w->table = spl_spill_alloc_raw(spill, table, sizeof *w->table, NULL);
+        w->of = spl_spill_alloc_raw(spill, count, sizeof *w->of, NULL);
+        w->numbers = spl_spill_alloc_raw(spill, count * scalars + 1, sizeof *w->numbers, NULL);
         if (!w->input || !w->table || !w->of || !w->numbers)
             return false;
         w->input_capacity = count;
         w->table_size = table;
     }
     if (clusters > w->cluster_capacity) {
-        free(w->clusters);
-        w->clusters = spl_alloc_raw(clusters, sizeof *w->clusters, NULL);
+        spl_spill_free(spill, w->clusters);
+        w->clusters = spl_spill_alloc_raw(spill, clusters, sizeof *w->clusters, NULL);
         w->cluster_capacity = w->clusters ? clusters : 0;
     }
     return w->cluster_capacity >= clusters;
@@ -306,7 +308,7 @@ static bool make_left(struct levels *l, struct scratch *w, const struct spl_tree
 {
     const struct spl_panel_left *left = &w->left;
     free(w->left_splats);
-    free(w->left_numbers);
+    spl_spill_give(l->points->spill, w->left_numbers);
     w->left_splats = NULL;
     w->left_numbers = NULL;
     w->left_count = 0;
@@ -383,7 +385,7 @@ static bool build_node(struct levels *l, unsigned worker, struct spl_tree_node *
             break;
         }
     }
-    node->splats = spl_alloc_raw(clusters, sizeof *node->splats, NULL);
+    node->splats = spl_spill_take(l->points->spill, clusters, sizeof *node->splats, NULL);
     if (!node->splats)
         return false;
     for (size_t k = 0; k < clusters; k++)
@@ -418,6 +420,8 @@ int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, str
         goto done;
     }
     l.order = order;
+    for (unsigned t = 0; t < stage->threads; t++)
+        l.scratch[t].spill = points->spill;
     int scalars[SPL_POINT_SCALARS];
     l.scalars = spl_points_list_scalars(points, scalars);
     for (uint32_t i = 0; i < tree->count; i++)
@@ -440,14 +444,14 @@ int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, str
     spl_stage_end(stage);
 done:
     for (unsigned t = 0; l.scratch && t < stage->threads; t++) {
-        free(l.scratch[t].input);
-        free(l.scratch[t].clusters);
-        free(l.scratch[t].table);
-        free(l.scratch[t].of);
-        free(l.scratch[t].numbers);
+        spl_spill_free(points->spill, l.scratch[t].input);
+        spl_spill_free(points->spill, l.scratch[t].clusters);
+        spl_spill_free(points->spill, l.scratch[t].table);
+        spl_spill_free(points->spill, l.scratch[t].of);
+        spl_spill_free(points->spill, l.scratch[t].numbers);
         free(l.scratch[t].left.points);
         free(l.scratch[t].left_splats);
-        free(l.scratch[t].left_numbers);
+        spl_spill_give(points->spill, l.scratch[t].left_numbers);
         spl_scalar_mixer_finish(&l.scratch[t].mixer);
     }
     free(l.scratch);

@@ -22,11 +22,12 @@ static const double widest = 0.5;           /* sigma across, of the finest cells
 
 static void finish_level(struct spl_linear_level *l)
 {
+    struct spl_spill *spill = l->cells.spill;
     spl_cells_finish(&l->cells);
-    free(l->is_line);
-    free(l->lines);
-    free(l->bucket);
-    free(l->owner);
+    spl_spill_free(spill, l->is_line);
+    spl_spill_free(spill, l->lines);
+    spl_spill_free(spill, l->bucket);
+    spl_spill_free(spill, l->owner);
     *l = (struct spl_linear_level){0};
 }
 
@@ -36,7 +37,7 @@ static int search_level(struct spl_points *points, struct spl_linear_level *l, u
     if (rc || !l->line_count)
         return rc;
     spl_linear_drop_surfaces(l);
-    l->owner = spl_alloc(l->cells.count, sizeof *l->owner, err);
+    l->owner = spl_spill_alloc(l->cells.spill, l->cells.count, sizeof *l->owner, err);
     if (!l->owner)
         return SPL_E_NOMEM;
     spl_linear_connect(points, l);
@@ -50,7 +51,7 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
     uint64_t marked = 0;
     double finest = 0;
     spl_stage_begin(stage, "wires, poles and cables", NULL, levels_max);
-    points->linear = spl_alloc(points->count, 1, err);
+    points->linear = spl_spill_alloc(points->spill, points->count, 1, err);
     int rc = points->linear ? spl_cells_init(&l.cells, points, cell_points, stage->threads, err) : SPL_E_NOMEM;
     for (unsigned k = 0; !rc && k < levels_max; k++) {
         if (k == 0)
@@ -71,7 +72,7 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
     }
     finish_level(&l);
     if (rc || !marked) {
-        free(points->linear);
+        spl_spill_free(points->spill, points->linear);
         points->linear = NULL;
     }
     spl_stage_finish(stage);

@@ -74,14 +74,14 @@ int spl_linear_find_lines(struct spl_linear_level *l, struct spl_error *err)
 {
     uint32_t count = 0;
     unsigned threads = l->stage->threads;
-    l->is_line = spl_alloc(l->cells.count, 1, err);
+    l->is_line = spl_spill_alloc(l->cells.spill, l->cells.count, 1, err);
     if (!l->is_line)
         return SPL_E_NOMEM;
     spl_parallel_for(threads, l->cells.count, grain, judge_cells, l);
     for (uint32_t k = 0; k < l->cells.count; k++)
         count += l->is_line[k];
-    l->lines = spl_alloc(count, sizeof *l->lines, err);
-    l->bucket = spl_alloc((size_t)count + 1, sizeof *l->bucket, err);
+    l->lines = spl_spill_alloc(l->cells.spill, count, sizeof *l->lines, err);
+    l->bucket = spl_spill_alloc(l->cells.spill, (size_t)count + 1, sizeof *l->bucket, err);
     if (!l->lines || !l->bucket)
         return SPL_E_NOMEM;
     for (uint32_t k = 0; k < l->cells.count; k++)

@@ -101,6 +101,8 @@ static void scatter_piece(void *context, size_t begin, size_t end, unsigned work
     uint32_t *at = o->histogram[begin / o->piece];
     (void)worker;
     for (size_t i = begin; i < end; i++) {
+        if (i % grain == 0)
+            spl_spill_keep_bound(o->points->spill);
         uint32_t to = at[o->key[i] >> o->shift & (digits - 1)]++;
         o->key_to[to] = o->key[i];
         o->index_to[to] = o->index[i];
@@ -231,6 +233,7 @@ static void runs_piece(void *context, size_t begin, size_t end, unsigned worker)
 }
 
 struct permutation {
+    struct spl_spill *spill;
     const uint32_t *index;
     const char *from;
     char *to;
@@ -241,6 +244,7 @@ static void permute_piece(void *context, size_t begin, size_t end, unsigned work
 {
     struct permutation *p = context;
     (void)worker;
+    spl_spill_keep_bound(p->spill);
     if (p->size == 8) {
         for (size_t i = begin; i < end; i++)
             ((uint64_t *)p->to)[i] = ((const uint64_t *)p->from)[p->index[i]];
@@ -254,13 +258,13 @@ static int permute(struct order *o, void **array, size_t size, struct spl_error 
 {
     if (!*array)
         return 0;
-    struct permutation p = {.index = o->index, .from = *array, .size = size};
-    p.to = spl_alloc_raw(o->count + SPL_POINTS_PAD, size, err);
+    struct permutation p = {.spill = o->points->spill, .index = o->index, .from = *array, .size = size};
+    p.to = spl_spill_alloc_raw(o->points->spill, o->count + SPL_POINTS_PAD, size, err);
     if (!p.to)
         return SPL_E_NOMEM;
     spl_parallel_for(o->stage->threads, o->count, grain, permute_piece, &p);
     memset(p.to + o->count * size, 0, SPL_POINTS_PAD * size);
-    free(*array);
+    spl_spill_free(o->points->spill, *array);
     *array = p.to;
     spl_stage_add(o->stage, o->count / 32, 0);
     return 0;
@@ -283,10 +287,10 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     o.piece = (o.count + stage->threads - 1) / stage->threads;
     o.pieces = (unsigned)((o.count + o.piece - 1) / o.piece); // fewer than threads, where there are few points
     spl_stage_begin(stage, "ordering", "points", o.count);
-    o.key = spl_alloc_raw(o.count, sizeof *o.key, err);
-    o.key_to = spl_alloc_raw(o.count, sizeof *o.key, err);
-    o.index = spl_alloc_raw(o.count, sizeof *o.index, err);
-    o.index_to = spl_alloc_raw(o.count, sizeof *o.index, err);
+    o.key = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
+    o.key_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
+    o.index = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
+    o.index_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
     o.histogram = spl_alloc_raw(o.pieces, sizeof *o.histogram, err);
     if (!o.key || !o.key_to || !o.index || !o.index_to || !o.histogram)
         goto done;
@@ -299,9 +303,9 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
         goto done;
     }
     drop_duplicates(&o);
-    free(o.key);
-    free(o.key_to);
-    free(o.index_to);
+    spl_spill_free(points->spill, o.key);
+    spl_spill_free(points->spill, o.key_to);
+    spl_spill_free(points->spill, o.index_to);
     o.key = o.key_to = NULL;
     o.index_to = NULL;
     rc = 0;
@@ -318,10 +322,10 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     spl_stage_finish(stage);
     points->count = points->capacity = o.count;
 done:
-    free(o.key);
-    free(o.key_to);
-    free(o.index);
-    free(o.index_to);
+    spl_spill_free(points->spill, o.key);
+    spl_spill_free(points->spill, o.key_to);
+    spl_spill_free(points->spill, o.index);
+    spl_spill_free(points->spill, o.index_to);
     free(o.histogram);
     return rc;
 }

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "pack/scalars.h"
 #include "pack/scans.h"
+#include "pack/spill.h"
 
 #define SPL_NO_STATION UINT16_MAX
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
@@ -20,6 +21,7 @@ struct spl_point_clip {
 };
 
 struct spl_points {
+    struct spl_spill *spill;     /* where the arrays lie, borrowed; NULL: in memory */
     size_t count, capacity;      /* arrays have room for capacity + SPL_POINTS_PAD elements */
     double *axis[3];             /* x, y, z; sorted in Morton order by spl_points_order() */
     uint32_t *color_class;       /* r | g << 8 | b << 16 | class << 24 */

@@ -121,7 +121,7 @@ static uint8_t find_storage(const struct spl_scalar_values *s)
 static int widen(struct spl_scalar_values *s, uint8_t storage, size_t capacity, size_t used, struct spl_error *err)
 {
     struct spl_scalar_values wide = {.storage = storage};
-    void *values = spl_realloc(s->values, capacity + SPL_POINTS_PAD, spl_scalar_bytes(&wide), err);
+    void *values = spl_spill_realloc(s->spill, s->values, capacity + SPL_POINTS_PAD, spl_scalar_bytes(&wide), err);
     if (!values)
         return SPL_E_NOMEM;
     s->values = values;
@@ -137,7 +137,8 @@ int spl_scalar_add(struct spl_scalar_values *scalar, size_t capacity, size_t use
     struct spl_scalar_values s = *scalar;
     bool fresh = !s.values;
     if (fresh)
-        s = (struct spl_scalar_values){.floats = true, .min = INFINITY, .max = -INFINITY, .missing = used > 0};
+        s = (struct spl_scalar_values){
+            .spill = s.spill, .floats = true, .min = INFINITY, .max = -INFINITY, .missing = used > 0};
     s.missing |= !values && count > 0;
     for (size_t i = 0; values && i < count; i++)
         look(&s, values[i]);

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "cloud/cloud.h"
+#include "pack/spill.h"
 
 /* Those of a cloud (enum spl_scalar), and the scan's number. */
 enum { SPL_SCALAR_SCAN = SPL_SCALAR_COUNT, SPL_POINT_SCALARS };
@@ -17,6 +18,7 @@ enum { SPL_SCALAR_SCAN = SPL_SCALAR_COUNT, SPL_POINT_SCALARS };
 enum spl_storage { SPL_STORE_U8, SPL_STORE_U16, SPL_STORE_I32, SPL_STORE_F32, SPL_STORE_F64 };
 
 struct spl_scalar_values {
+    struct spl_spill *spill; // where values lie, borrowed; NULL: in memory
     void *values;     // owned; NULL = no point has any
     uint8_t storage;  // enum spl_storage
     bool missing;     /* some points have none: NaN */

@@ -41,11 +41,12 @@ static bool waits(const struct spl_settle_block *block, const uint32_t *list)
 int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_block *block)
 {
     size_t points = block->end - block->begin, k = block->k, count = 0;
+    unsettled->spill = block->points->spill;
     limit_runs(block);
     for (size_t i = 0; i < points; i++)
         count += waits(block, block->neighbours + i * k);
-    unsettled->points = spl_alloc_raw(count, sizeof *unsettled->points, NULL);
-    unsettled->neighbours = spl_alloc_raw(count, k * sizeof *unsettled->neighbours, NULL);
+    unsettled->points = spl_spill_take(block->points->spill, count, sizeof *unsettled->points, NULL);
+    unsettled->neighbours = spl_spill_take(block->points->spill, count, k * sizeof *unsettled->neighbours, NULL);
     if (!unsettled->points || !unsettled->neighbours)
         return SPL_E_NOMEM;
     for (size_t i = 0; i < points; i++) {
@@ -61,8 +62,8 @@ int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_
 
 void spl_unsettled_finish(struct spl_unsettled *unsettled)
 {
-    free(unsettled->points);
-    free(unsettled->neighbours);
+    spl_spill_give(unsettled->spill, unsettled->points);
+    spl_spill_give(unsettled->spill, unsettled->neighbours);
     *unsettled = (struct spl_unsettled){0};
 }
 

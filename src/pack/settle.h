@@ -15,6 +15,7 @@ struct spl_settle_block {
 
 /* Those that have a neighbour outside their block: they wait until all blocks have radii and signs. */
 struct spl_unsettled {
+    struct spl_spill *spill; /* the points' */
     struct spl_unsettled_point {
         uint32_t index;
         float limit; /* of its radius */

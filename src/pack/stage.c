@@ -99,6 +99,7 @@ void spl_stage_begin(struct spl_stage *stage, const char *name, const char *unit
 void spl_stage_add(struct spl_stage *stage, uint64_t items, unsigned worker)
 {
     atomic_fetch_add_explicit(&stage->done, items, memory_order_relaxed);
+    spl_spill_keep_bound(stage->spill);
     if (worker != 0)
         return;
     uint64_t now = spl_now_ns();

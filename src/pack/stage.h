@@ -10,6 +10,7 @@
 #include <splatd/pack.h>
 
 #include "base/work.h"
+#include "pack/spill.h"
 
 enum { SPL_STAGE_PARTS_MAX = 24 };
 
@@ -26,6 +27,7 @@ struct spl_stage {
     void *context;
     unsigned threads; /* of all parallel loops of this run, >= 1 */
     const atomic_bool *cancelled; // may be NULL
+    struct spl_spill *spill;      // where large arrays of this run lie; NULL: in memory
     const char *name, *unit;
     uint64_t total, begin_ns, reported_ns;
     atomic_uint_fast64_t done;

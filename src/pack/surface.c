@@ -197,10 +197,10 @@ static bool all_sides_known(const struct spl_points *p)
 static int allocate(struct surface *s, struct spl_error *err)
 {
     struct spl_points *p = s->points;
-    p->radius = spl_alloc_raw(p->count, sizeof *p->radius, err);
-    p->uncertainty = spl_alloc_raw(p->count, sizeof *p->uncertainty, err);
+    p->radius = spl_spill_alloc_raw(p->spill, p->count, sizeof *p->radius, err);
+    p->uncertainty = spl_spill_alloc_raw(p->spill, p->count, sizeof *p->uncertainty, err);
     if (!p->normal)
-        p->normal = spl_alloc(p->count + SPL_POINTS_PAD, sizeof *p->normal, err);
+        p->normal = spl_spill_alloc(p->spill, p->count + SPL_POINTS_PAD, sizeof *p->normal, err);
     if (!p->radius || !p->uncertainty || !p->normal)
         return SPL_E_NOMEM;
     s->block_count = (p->count + block_points - 1) / block_points;
@@ -218,7 +218,7 @@ static int allocate(struct surface *s, struct spl_error *err)
             return SPL_E_NOMEM;
     }
     if (!all_sides_known(p)) {
-        s->label = spl_alloc_raw(p->count, sizeof *s->label, err);
+        s->label = spl_spill_alloc_raw(p->spill, p->count, sizeof *s->label, err);
         if (!s->label)
             return SPL_E_NOMEM;
     }
@@ -240,8 +240,8 @@ static void finish(struct surface *s)
     }
     free(s->blocks);
     free(s->scratch);
-    free(s->label);
-    free(s->edge);
+    spl_spill_free(s->points->spill, s->label);
+    spl_spill_free(s->points->spill, s->edge);
     free(s->components);
     spl_neighbours_destroy(s->neighbours);
 }
@@ -262,7 +262,7 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
     spl_stage_begin(stage, "normals and radii", "points", points->count);
     int rc = allocate(&s, err);
-    if (!rc && clip_lines && points->count > 1 && !(s.edge = spl_alloc_raw(points->count, 1, err)))
+    if (!rc && clip_lines && points->count > 1 && !(s.edge = spl_spill_alloc_raw(points->spill, points->count, 1, err)))
         rc = SPL_E_NOMEM;
     if (rc)
         goto done;

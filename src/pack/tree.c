@@ -109,6 +109,7 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
     struct spl_tree_node root = {.end = points->count, .frame_size = points->cube_size};
     for (int c = 0; c < 3; c++)
         root.frame_low[c] = points->bounds_min[c];
+    tree->spill = points->spill;
     int rc = add_node(tree, &capacity, &root, err);
     for (uint32_t i = 0; !rc && i < tree->count; i++) {
         struct spl_tree_node node = tree->nodes[i];
@@ -138,8 +139,8 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
 void spl_tree_finish(struct spl_tree *tree)
 {
     for (uint32_t i = 0; i < tree->count; i++) {
-        free(tree->nodes[i].splats);
-        free(tree->nodes[i].numbers);
+        spl_spill_give(tree->spill, tree->nodes[i].splats);
+        spl_spill_give(tree->spill, tree->nodes[i].numbers);
         if (tree->nodes[i].panels)
             spl_node_panels_finish(tree->nodes[i].panels);
         free(tree->nodes[i].panels);

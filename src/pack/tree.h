@@ -31,6 +31,7 @@ struct spl_tree_node {
 };
 
 struct spl_tree {
+    struct spl_spill *spill;     /* where splats and numbers lie: the points' */
     struct spl_tree_node *nodes; /* breadth first, siblings consecutive */
     uint32_t count, levels;
     size_t pruned_to; /* said before it is built: about so many splats are to be left of it, and inner nodes are drawn

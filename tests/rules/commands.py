@@ -89,7 +89,7 @@ with tempfile.TemporaryDirectory() as folder:
         if "a.spld" not in (said := check(words.split(), 2, "stderr")):
             wrong.append(f"splatd {words}: {said!r}")
     for words in ("--memory 4G", "--memory 4096"):
-        if "--cameras" not in (said := check(["pack", "a.xyz", "-o", "b.spld", *words.split()], 2, "stderr")):
+        if "a.xyz" not in (said := check(["pack", "a.xyz", "-o", "b.spld", *words.split()], 2, "stderr")):
             wrong.append(f"splatd pack {words}: {said!r}")
     # A folder's name may hold dots where it exists, where a slash says so, or where a number follows.
     for name in (folder + "/..", folder + "/run.v2/", folder + "/lod-1.5"):

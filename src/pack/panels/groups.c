@@ -21,11 +21,12 @@ bool spl_panel_groups_find(struct spl_panel_groups *g, const struct spl_panel_ma
     if (!g->counts && !(g->counts = spl_alloc(maker->planes->count, sizeof *g->counts, NULL)))
         return false;
     if (end - begin > g->member_capacity) {
-        free(g->members);
-        free(g->level_members);
+        g->spill = maker->points->spill;
+        spl_spill_free(g->spill, g->members);
+        spl_spill_free(g->spill, g->level_members);
         g->member_capacity = 0;
-        g->members = spl_alloc_raw(end - begin, sizeof *g->members, NULL);
-        g->level_members = spl_alloc_raw(end - begin, sizeof *g->level_members, NULL);
+        g->members = spl_spill_alloc_raw(g->spill, end - begin, sizeof *g->members, NULL);
+        g->level_members = spl_spill_alloc_raw(g->spill, end - begin, sizeof *g->level_members, NULL);
         if (!g->members || !g->level_members)
             return false;
         g->member_capacity = end - begin;
@@ -67,8 +68,8 @@ size_t spl_panel_groups_select(struct spl_panel_groups *g, const struct spl_pane
 
 void spl_panel_groups_finish(struct spl_panel_groups *g)
 {
-    free(g->members);
-    free(g->level_members);
+    spl_spill_free(g->spill, g->members);
+    spl_spill_free(g->spill, g->level_members);
     free(g->runs);
     free(g->counts);
     *g = (struct spl_panel_groups){0};

@@ -11,6 +11,7 @@ struct spl_panel_run {
 
 /* The room of a worker. Zeroed before first use. */
 struct spl_panel_groups {
+    struct spl_spill *spill; /* where members lie; NULL: on the heap */
     uint32_t *members; /* point = first + member; plane by plane, rising in each */
     size_t member_capacity;
     struct spl_panel_run *runs; /* by plane */

@@ -69,12 +69,12 @@ int spl_panel_maker_init(struct spl_panel_maker *m, struct spl_points *points, c
     m->points = points;
     m->planes = planes;
     m->workers = threads;
-    m->level = spl_alloc(points->count, sizeof *m->level, err);
+    m->level = spl_spill_alloc(points->spill, points->count, sizeof *m->level, err);
     m->scratch = spl_alloc(threads, sizeof *m->scratch, err);
     spl_clip_turns_init(&m->turns);
     if (points->clip) {
         m->neighbours = spl_neighbours_create(points, threads, err);
-        m->crease = m->neighbours ? spl_alloc_raw(points->count, sizeof *m->crease, err) : NULL;
+        m->crease = m->neighbours ? spl_spill_alloc_raw(points->spill, points->count, sizeof *m->crease, err) : NULL;
         if (!m->crease)
             return SPL_E_NOMEM;
         for (size_t i = 0; i < points->count; i++)
@@ -85,6 +85,7 @@ int spl_panel_maker_init(struct spl_panel_maker *m, struct spl_points *points, c
 
 void spl_panel_maker_finish(struct spl_panel_maker *m)
 {
+    struct spl_spill *spill = m->points ? m->points->spill : NULL;
     for (unsigned t = 0; m->scratch && t < m->workers; t++) {
         spl_panel_groups_finish(&m->scratch[t].groups);
         spl_panel_borders_finish(&m->scratch[t].borders);
@@ -92,10 +93,10 @@ void spl_panel_maker_finish(struct spl_panel_maker *m)
         free(m->scratch[t].weights);
     }
     spl_neighbours_destroy(m->neighbours);
-    free(m->crease);
+    spl_spill_free(spill, m->crease);
     free(m->scratch);
     free(m->base);
-    free(m->level);
+    spl_spill_free(spill, m->level);
     *m = (struct spl_panel_maker){0};
 }
 
@@ -220,7 +221,7 @@ static bool make_runs(struct spl_panel_maker *m, struct spl_panel_scratch *w, st
         return true;
     }
     node->panels = spl_alloc(1, sizeof *node->panels, NULL);
-    if (!node->panels) {
+    if (!node->panels || !spl_node_panels_settle(&made, m->points->spill)) {
         spl_node_panels_finish(&made);
         return false;
     }

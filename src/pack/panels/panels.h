@@ -22,6 +22,7 @@ struct spl_panel_values {
 
 /* What a node has of panels. */
 struct spl_node_panels {
+    struct spl_spill *spill;  /* where the arrays lie once all are made; NULL: on the heap */
     struct spl_chunk *chunks; /* geometry_word: from `words` on */
     uint32_t *cells;          /* of each chunk: how many it has */
     uint32_t *words;
@@ -34,6 +35,9 @@ struct spl_node_panels {
 };
 
 void spl_node_panels_finish(struct spl_node_panels *panels);
+
+/* Puts the arrays where they can leave memory: nothing is added to them afterwards. `spill` may be NULL: they stay. */
+bool spl_node_panels_settle(struct spl_node_panels *panels, struct spl_spill *spill);
 
 struct spl_panel_scratch; /* of one worker */
 

@@ -25,12 +25,41 @@ struct distances {
 
 void spl_node_panels_finish(struct spl_node_panels *panels)
 {
-    free(panels->chunks);
-    free(panels->cells);
-    free(panels->words);
-    free(panels->values);
-    free(panels->numbers);
+    spl_spill_give(panels->spill, panels->chunks);
+    spl_spill_give(panels->spill, panels->cells);
+    spl_spill_give(panels->spill, panels->words);
+    spl_spill_give(panels->spill, panels->values);
+    spl_spill_give(panels->spill, panels->numbers);
     *panels = (struct spl_node_panels){0};
+}
+
+static void *settle(struct spl_spill *spill, const void *array, size_t count, size_t size, bool *all)
+{
+    void *settled = array ? spl_spill_take(spill, count, size, NULL) : NULL;
+    if (settled)
+        memcpy(settled, array, count * size);
+    *all &= settled || !array;
+    return settled;
+}
+
+bool spl_node_panels_settle(struct spl_node_panels *panels, struct spl_spill *spill)
+{
+    struct spl_node_panels settled = *panels;
+    size_t numbers = panels->panel_count ? panels->number_capacity : 0;
+    bool all = true;
+    if (!spill)
+        return true;
+    settled.spill = spill;
+    settled.chunks = settle(spill, panels->chunks, panels->chunk_count, sizeof *panels->chunks, &all);
+    settled.cells = settle(spill, panels->cells, panels->chunk_count, sizeof *panels->cells, &all);
+    settled.words = settle(spill, panels->words, panels->word_count, sizeof *panels->words, &all);
+    settled.values = settle(spill, panels->values, panels->panel_count, sizeof *panels->values, &all);
+    settled.numbers = settle(spill, panels->numbers, numbers, sizeof *panels->numbers, &all);
+    if (!all)
+        return false;
+    spl_node_panels_finish(panels);
+    *panels = settled;
+    return true;
 }
 
 static double dot(const double a[3], const double b[3])

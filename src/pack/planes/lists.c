@@ -32,7 +32,7 @@ int spl_plane_levels_init(struct spl_plane_levels *levels, const struct spl_poin
             break;
         rc = spl_cells_init_above(&levels->cells[levels->count++], below, threads, err);
     }
-    if (!rc && !(levels->lists = spl_alloc_raw(levels->cells[0].count, sizeof *levels->lists, err)))
+    if (!rc && !(levels->lists = spl_spill_alloc_raw(points->spill, levels->cells[0].count, sizeof *levels->lists, err)))
         rc = SPL_E_NOMEM;
     return rc;
 }
@@ -101,8 +101,8 @@ void spl_plane_levels_fill_part(struct spl_plane_levels *levels, unsigned k, con
 
 void spl_plane_levels_finish(struct spl_plane_levels *levels)
 {
+    spl_spill_free(levels->cells[0].spill, levels->lists);
     for (unsigned k = 0; k < levels->count; k++)
         spl_cells_finish(&levels->cells[k]);
-    free(levels->lists);
     *levels = (struct spl_plane_levels){0};
 }

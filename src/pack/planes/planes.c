@@ -73,7 +73,7 @@ int spl_planes_find(struct spl_planes *planes, struct spl_points *points, const 
     struct spl_regions regions = {0};
     *planes = (struct spl_planes){0};
     spl_stage_begin(stage, "planes", "points", points->count);
-    points->plane = spl_alloc_raw(points->count, sizeof *points->plane, err);
+    points->plane = spl_spill_alloc_raw(points->spill, points->count, sizeof *points->plane, err);
     int rc = points->plane ? spl_plane_limits_find(&limits, points, options->error, stage->threads, err) : SPL_E_NOMEM;
     if (!rc)
         rc = join_patches(&regions, points->plane, points, &levels, &limits, stage, err);
@@ -95,7 +95,7 @@ int spl_planes_find(struct spl_planes *planes, struct spl_points *points, const 
     spl_plane_levels_finish(&levels);
     if (rc) {
         spl_planes_finish(planes);
-        free(points->plane);
+        spl_spill_free(points->spill, points->plane);
         points->plane = NULL;
     } else {
         spl_stage_finish(stage);

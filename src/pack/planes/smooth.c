@@ -56,14 +56,14 @@ static int find_pieces(struct work *w, struct spl_plane_levels *levels, struct s
 {
     struct spl_patches patches = {0};
     struct spl_patch_graph graph = {0};
-    uint32_t *region = NULL, *taken = spl_alloc_raw(w->points->count, sizeof *taken, err);
-    w->claim = spl_alloc_raw(w->points->count, sizeof *w->claim, err);
+    uint32_t *region = NULL, *taken = spl_spill_alloc_raw(w->points->spill, w->points->count, sizeof *taken, err);
+    w->claim = spl_spill_alloc_raw(w->points->spill, w->points->count, sizeof *w->claim, err);
     for (size_t i = 0; taken && i < w->points->count; i++)
         taken[i] =
             w->label[i] != SPL_NO_PLANE && w->plane[w->label[i]].points > small_most ? w->label[i] : SPL_NO_PLANE;
     int rc = taken && w->claim ? spl_patches_find(&patches, w->claim, taken, w->points, w->limits, w->stage, err)
                                : SPL_E_NOMEM;
-    free(taken);
+    spl_spill_free(w->points->spill, taken);
     if (!rc)
         rc = spl_stage_check(w->stage, err);
     if (!rc)
@@ -357,7 +357,7 @@ int spl_smooth_find(struct spl_planes *planes, uint32_t *label, struct spl_plane
     free(gone);
     free(w.heights);
     free(w.numbers);
-    free(w.claim);
+    spl_spill_free(points->spill, w.claim);
     free(w.member);
     free(w.first);
     spl_regions_finish(&w.pieces);

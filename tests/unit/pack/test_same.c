@@ -1,5 +1,5 @@
-/* A dataset depends on what is in the scans alone: not on threads, on the order of files and of the points in them, nor
- * on how many files they lie in. */
+/* A dataset depends on what is in the scans alone: not on threads, on memory, on the order of files and of the points in
+ * them, nor on how many files they lie in. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,6 +12,7 @@
 
 #include "clouds.h"
 #include "dataset/format.h"
+#include "pack/spill.h"
 #include "support/folder.h"
 
 enum { floor_points = 50000, wall_points = 30000, ball_points = 20000, wire_points = 4000, bush_points = 6000 };
@@ -187,6 +188,62 @@ static void of_any_number_of_threads(void **state)
     }
 }
 
+/* Within which arrays fit, and where all of them lie in files. */
+static void of_any_memory(void **state)
+{
+    const char *path = scan;
+    static const struct {
+        uint64_t memory;
+        size_t forced;
+        unsigned threads;
+    } rows[] = {{1 << 30, 0, 2}, {SPL_PACK_MEMORY_MIN, 4096, 1}, {1 << 30, 65536, 2}};
+    (void)state;
+    for (size_t row = 0; row < sizeof rows / sizeof *rows; row++) {
+        struct spl_pack_options options = get_options(&path, 1, rows[row].threads);
+        options.memory_bytes = rows[row].memory;
+        spl_spill_force(rows[row].forced);
+        struct file other = pack(options);
+        spl_spill_force(0);
+        assert_same("memory", whole, other);
+        free(other.bytes);
+    }
+}
+
+static void of_any_memory_without_surfaces(void **state)
+{
+    const char *path = scan;
+    struct spl_error err = {0};
+    struct file file[2];
+    (void)state;
+    for (int forced = 0; forced < 2; forced++) {
+        struct spl_pack_options options = get_options(&path, 1, 2);
+        options.primitives = SPL_PRIMITIVES_OFF;
+        options.points_only = true;
+        options.memory_bytes = forced ? SPL_PACK_MEMORY_MIN : 0;
+        options.output = in_folder("same.spld");
+        spl_spill_force(forced ? 4096 : 0);
+        if (spl_pack(&options, NULL, &err))
+            fail_msg("%s", err.message);
+        file[forced] = read_file(options.output);
+    }
+    spl_spill_force(0);
+    assert_same("memory, points only", file[0], file[1]);
+    free(file[0].bytes);
+    free(file[1].bytes);
+}
+
+static void too_little_memory_is_refused(void **state)
+{
+    const char *path = scan;
+    struct spl_error err = {0};
+    struct spl_pack_options options = get_options(&path, 1, 1);
+    (void)state;
+    options.output = in_folder("none.spld");
+    options.memory_bytes = SPL_PACK_MEMORY_MIN - 1;
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "memory");
+}
+
 /* A name is in META, so that the points that lie the other way round lie in a file of the same one. */
 static void of_any_order_of_points(void **state)
 {
@@ -218,6 +275,9 @@ static void of_tiles_in_any_order(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(of_any_number_of_threads),
+                                       cmocka_unit_test(of_any_memory),
+                                       cmocka_unit_test(of_any_memory_without_surfaces),
+                                       cmocka_unit_test(too_little_memory_is_refused),
                                        cmocka_unit_test(of_any_order_of_points),
                                        cmocka_unit_test(of_tiles_in_any_order)};
     return cmocka_run_group_tests_name("a dataset depends on its scans alone", tests, setup, teardown);

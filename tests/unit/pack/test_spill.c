@@ -1,0 +1,136 @@
+/* Arrays beyond the bound of memory: they keep what is written into them, the process keeps to its bound, and a disk
+ * without room is an error. */
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "pack/spill.h"
+#include "support/folder.h"
+
+static struct spl_spill *create(uint64_t memory)
+{
+    struct spl_spill *spill;
+    struct spl_error err = {0};
+    if (spl_spill_create(in_folder("any.spld"), memory, &spill, &err))
+        fail_msg("%s", err.message);
+    return spill;
+}
+
+static uint64_t value_at(size_t array, size_t i)
+{
+    return (array + 1) * UINT64_C(0x9e3779b97f4a7c15) ^ i;
+}
+
+/* Three times as much as may be resident, written, read in another order, grown and freed. */
+static void arrays_beyond_the_bound_keep_their_values(void **state)
+{
+    enum { arrays = 8, count = 8 << 20 };
+    const uint64_t memory = 160 << 20;
+    struct spl_spill *spill = create(memory);
+    uint64_t *array[arrays];
+    (void)state;
+    for (size_t a = 0; a < arrays; a++) {
+        array[a] = spl_spill_alloc(spill, count, sizeof **array, NULL);
+        assert_non_null(array[a]);
+        for (size_t i = 0; i < count; i += 512) /* zeroed; one of each page */
+            assert_int_equal(array[a][i], 0);
+        for (size_t i = 0; i < count; i++) {
+            array[a][i] = value_at(a, i);
+            if (i % 65536 == 0)
+                spl_spill_keep_bound(spill);
+        }
+    }
+    assert_true(spl_spill_disk_most(spill) > (uint64_t)arrays * count * sizeof **array - memory);
+    for (size_t i = 0; i < count; i += 64)
+        for (size_t a = 0; a < arrays; a++) {
+            if (array[a][i] != value_at(a, i))
+                fail_msg("array %zu, %zu", a, i);
+            if (i % 65536 == 0)
+                spl_spill_keep_bound(spill);
+        }
+    array[7] = spl_spill_realloc(spill, array[7], count + count / 2, sizeof **array, NULL);
+    array[0] = spl_spill_realloc(spill, array[0], 2 * count, sizeof **array, NULL); /* from the heap to a file */
+    for (size_t i = 0; i < count; i += 999)
+        if (array[7][i] != value_at(7, i) || array[0][i] != value_at(0, i))
+            fail_msg("grown, %zu", i);
+    array[7][count + count / 2 - 1] = 1;
+    for (size_t a = 0; a < arrays; a += 2)
+        spl_spill_free(spill, array[a]);
+    assert_true(spl_spill_memory_most(spill) < memory);
+    spl_spill_destroy(spill);
+}
+
+static void small_ones_lie_beside_each_other(void **state)
+{
+    struct spl_spill *spill = create(64 << 20);
+    uint8_t *at[1000];
+    (void)state;
+    for (size_t i = 0; i < 1000; i++) {
+        at[i] = spl_spill_take(spill, i * 100, 1, NULL);
+        assert_non_null(at[i]);
+        memset(at[i], (int)(i & 255), i * 100);
+    }
+    for (size_t i = 0; i < 1000; i++) {
+        for (size_t k = 0; k < i * 100; k += 99)
+            assert_int_equal(at[i][k], i & 255);
+        spl_spill_give(spill, at[i]);
+    }
+    spl_spill_destroy(spill);
+}
+
+static void without_a_bound_it_is_the_heap(void **state)
+{
+    (void)state;
+    char *at = spl_spill_alloc(NULL, 3, 1, NULL);
+    assert_int_equal(at[2], 0);
+    at = spl_spill_realloc(NULL, at, 5000000, 1, NULL);
+    assert_non_null(at);
+    spl_spill_free(NULL, at);
+    spl_spill_give(NULL, spl_spill_take(NULL, 10, 10, NULL));
+}
+
+static void a_disk_without_room_is_an_error(void **state)
+{
+    struct rlimit before, less = {.rlim_cur = 1 << 20};
+    struct spl_error err = {0};
+    (void)state;
+    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), UINT64_C(1) << 60, &err), SPL_E_IO);
+    assert_string_equal(err.field, "memory");
+    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), 1, &err), SPL_OK);
+    err = (struct spl_error){0};
+    struct spl_spill *spill = create(64 << 20);
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    less.rlim_max = before.rlim_max;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &less), 0);
+    assert_null(spl_spill_alloc(spill, 100 << 20, 1, &err));
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    assert_non_null(strstr(err.message, "0.1 GB more"));
+    assert_string_equal(err.field, "memory");
+    void *at = spl_spill_alloc(spill, 100 << 20, 1, &err);
+    assert_non_null(at);
+    spl_spill_free(spill, at);
+    spl_spill_destroy(spill);
+    err = (struct spl_error){0};
+    assert_int_equal(spl_spill_create("/nowhere/at/all.spld", 64 << 20, &spill, &err), SPL_OK);
+    assert_null(spl_spill_alloc(spill, 100 << 20, 1, &err));
+    assert_non_null(strstr(err.message, "/nowhere/at/"));
+    spl_spill_destroy(spill);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(arrays_beyond_the_bound_keep_their_values), cmocka_unit_test(small_ones_lie_beside_each_other),
+        cmocka_unit_test(without_a_bound_it_is_the_heap), cmocka_unit_test(a_disk_without_room_is_an_error)};
+    return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
+}
