@@ -1,8 +1,9 @@
 /* Morton order over the cubic bounds, and exact duplicates out: of equal coordinates the point stays that has a station,
  * a normal, the greater class and colour, and so on. The order is that of the points, not that in which they were read.
  *
- * A stable parallel radix sort of (key, index) pairs: each pass counts per piece, one prefix sum, each piece scatters,
- * so the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
+ * A stable parallel radix sort of (key, index) pairs: by the first bits of their keys into parts (pieces count, one
+ * prefix sum, pieces scatter), then each part digit by digit, by one worker and in so little memory that it is near. So
+ * the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
  * their own bounds, recursively, so that a dense cluster in a wide cloud is as well ordered as any other; equal
  * coordinates can only lie in one such run. */
 #include "pack/points.h"
@@ -17,6 +18,7 @@
 #include "pack/order.h"
 
 enum { digits = 256, threads_max = 64, short_run = 32, grain = 1 << 16 };
+enum { lead_bits = 16, leads = 1 << lead_bits, lead_shift = 63 - lead_bits, parts_most = 1024 };
 static const uint32_t dropped = UINT32_MAX;
 
 struct order {
@@ -24,8 +26,11 @@ struct order {
     uint64_t *key, *key_to;
     uint32_t *index, *index_to;
     size_t count, piece;
-    unsigned shift, pieces;
-    uint32_t (*histogram)[digits];
+    unsigned pieces, part_count;
+    uint32_t (*leads)[leads];        /* of each piece: points by the first bits of their keys */
+    uint32_t (*at)[parts_most + 2];  /* of each piece: where its next point of a part goes */
+    uint16_t *part_of;               /* of each lead */
+    size_t first[parts_most + 3];    /* points of parts */
     double low[threads_max][3], high[threads_max][3];
     struct spl_stage *stage;
     atomic_bool failed;
@@ -78,63 +83,120 @@ uint64_t spl_points_key(const struct spl_points *points, size_t i, const double 
 static void key_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
-    for (size_t i = begin; i < end; i++) {
+    for (size_t i = begin; i < end; i++)
         o->key[i] = spl_points_key(o->points, i, o->points->bounds_min, o->points->cube_size);
-        o->index[i] = (uint32_t)i;
-    }
     spl_stage_add(o->stage, (end - begin) / 8, worker);
 }
 
+/* How many points of a piece begin with each lead. */
 static void count_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
-    uint32_t *histogram = o->histogram[begin / o->piece];
+    uint32_t *count = o->leads[begin / o->piece];
     (void)worker;
-    memset(histogram, 0, sizeof *o->histogram);
+    memset(count, 0, sizeof *o->leads);
     for (size_t i = begin; i < end; i++)
-        histogram[o->key[i] >> o->shift & (digits - 1)]++;
+        count[o->key[i] >> lead_shift]++;
 }
 
 static void scatter_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
-    uint32_t *at = o->histogram[begin / o->piece];
+    uint32_t *at = o->at[begin / o->piece];
     (void)worker;
     for (size_t i = begin; i < end; i++) {
         if (i % grain == 0)
             spl_spill_keep_bound(o->points->spill);
-        uint32_t to = at[o->key[i] >> o->shift & (digits - 1)]++;
+        uint32_t to = at[o->part_of[o->key[i] >> lead_shift]]++;
         o->key_to[to] = o->key[i];
-        o->index_to[to] = o->index[i];
+        o->index_to[to] = (uint32_t)i;
+    }
+}
+
+/* Parts: runs of leads with about as many points each, however unevenly these lie. */
+static void divide(struct order *o)
+{
+    size_t most = 2 * o->count / parts_most + 1, in_part = 0, sum = 0;
+    o->part_count = 0;
+    for (size_t lead = 0; lead < leads; lead++) {
+        size_t points = 0;
+        for (unsigned t = 0; t < o->pieces; t++)
+            points += o->leads[t][lead];
+        if (!lead || (in_part && in_part + points > most)) {
+            for (unsigned t = 0; t < o->pieces; t++)
+                o->at[t][o->part_count] = 0;
+            o->first[o->part_count++] = sum;
+            in_part = 0;
+        }
+        o->part_of[lead] = (uint16_t)(o->part_count - 1);
+        in_part += points;
+        sum += points;
+        for (unsigned t = 0; t < o->pieces; t++)
+            o->at[t][o->part_count - 1] += o->leads[t][lead];
+    }
+    o->first[o->part_count] = sum;
+    for (unsigned part = 0; part < o->part_count; part++) {
+        uint32_t at = (uint32_t)o->first[part];
+        for (unsigned t = 0; t < o->pieces; t++) {
+            uint32_t n = o->at[t][part];
+            o->at[t][part] = at;
+            at += n;
+        }
+    }
+}
+
+/* Digit by digit from the last on, between the two pairs of arrays. */
+static void sort_part(struct order *o, size_t begin, size_t end)
+{
+    uint32_t count[8][digits] = {0};
+    uint64_t *key = o->key_to, *key_to = o->key;
+    uint32_t *index = o->index_to, *index_to = o->index;
+    for (size_t i = begin; i < end; i++)
+        for (unsigned d = 0; d < 8; d++)
+            count[d][key[i] >> 8 * d & (digits - 1)]++;
+    for (unsigned d = 0; d < 8; d++) {
+        uint32_t *at = count[d], sum = (uint32_t)begin;
+        if (at[key[begin] >> 8 * d & (digits - 1)] == end - begin)
+            continue;
+        for (unsigned v = 0; v < digits; v++) {
+            uint32_t n = at[v];
+            at[v] = sum;
+            sum += n;
+        }
+        for (size_t i = begin; i < end; i++) {
+            uint32_t to = at[key[i] >> 8 * d & (digits - 1)]++;
+            key_to[to] = key[i];
+            index_to[to] = index[i];
+        }
+        uint64_t *other_key = key;
+        uint32_t *other_index = index;
+        key = key_to;
+        index = index_to;
+        key_to = other_key;
+        index_to = other_index;
+    }
+    if (key != o->key) {
+        memcpy(o->key + begin, key + begin, (end - begin) * sizeof *key);
+        memcpy(o->index + begin, index + begin, (end - begin) * sizeof *index);
+    }
+}
+
+static void sort_parts(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    for (size_t part = begin; part < end; part++) {
+        if (o->first[part + 1] > o->first[part])
+            sort_part(o, o->first[part], o->first[part + 1]);
+        spl_stage_add(o->stage, (o->first[part + 1] - o->first[part]) / 2, worker);
     }
 }
 
 static void radix_sort(struct order *o)
 {
-    for (o->shift = 0; o->shift < 64; o->shift += 8) {
-        spl_parallel_for(o->stage->threads, o->count, o->piece, count_piece, o);
-        uint32_t sum = 0;
-        bool trivial = false;
-        for (unsigned d = 0; d < digits; d++) {
-            uint32_t before = sum;
-            for (unsigned t = 0; t < o->pieces; t++) {
-                uint32_t n = o->histogram[t][d];
-                o->histogram[t][d] = sum;
-                sum += n;
-            }
-            trivial |= sum - before == o->count;
-        }
-        if (trivial)
-            continue;
-        spl_parallel_for(o->stage->threads, o->count, o->piece, scatter_piece, o);
-        spl_stage_add(o->stage, o->count / 16, 0);
-        uint64_t *key = o->key;
-        uint32_t *index = o->index;
-        o->key = o->key_to;
-        o->index = o->index_to;
-        o->key_to = key;
-        o->index_to = index;
-    }
+    spl_parallel_for(o->stage->threads, o->count, o->piece, count_piece, o);
+    divide(o);
+    spl_parallel_for(o->stage->threads, o->count, o->piece, scatter_piece, o);
+    spl_parallel_for(o->stage->threads, o->part_count, 1, sort_parts, o);
 }
 
 struct pair {
@@ -291,8 +353,10 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     o.key_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
     o.index = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
     o.index_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
-    o.histogram = spl_alloc_raw(o.pieces, sizeof *o.histogram, err);
-    if (!o.key || !o.key_to || !o.index || !o.index_to || !o.histogram)
+    o.leads = spl_alloc_raw(o.pieces, sizeof *o.leads, err);
+    o.at = spl_alloc_raw(o.pieces, sizeof *o.at, err);
+    o.part_of = spl_alloc_raw(leads, sizeof *o.part_of, err);
+    if (!o.key || !o.key_to || !o.index || !o.index_to || !o.leads || !o.at || !o.part_of)
         goto done;
     find_cube(&o);
     spl_parallel_for(stage->threads, o.count, grain, key_piece, &o);
@@ -326,6 +390,8 @@ done:
     spl_spill_free(points->spill, o.key_to);
     spl_spill_free(points->spill, o.index);
     spl_spill_free(points->spill, o.index_to);
-    free(o.histogram);
+    free(o.leads);
+    free(o.at);
+    free(o.part_of);
     return rc;
 }
