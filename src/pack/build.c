@@ -134,6 +134,20 @@ static int begin_spill(struct spl_build *p, struct spl_error *err)
     return spl_spill_check_disk(o->output, (uint64_t)beyond, err);
 }
 
+/* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
+static void end_spill(const struct spl_pack_options *o, struct spl_stage *stage, bool done)
+{
+    char text[160];
+    uint64_t most = stage->spill ? spl_spill_memory_most(stage->spill) : 0;
+    if (done && o->warn && most > o->memory_bytes) {
+        snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB: so much was needed",
+                 (double)most / 1048576, (double)o->memory_bytes / 1048576);
+        o->warn(o->progress_context, text);
+    }
+    spl_spill_destroy(stage->spill);
+    stage->spill = NULL;
+}
+
 static struct spl_bound get_bound(const struct spl_build *p)
 {
     double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
@@ -272,6 +286,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_kept_check(&p.scans, err);
     if (!rc)
         rc = spl_system_find(&p.system, &p.scans, &said, err);
+    if (!rc)
+        rc = spl_points_check_count(&p.scans, err);
     if (!rc) {
         plan(&p, later);
         rc = stage->spill ? begin_spill(&p, err) : SPL_OK;
@@ -330,7 +346,6 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     spl_points_finish(&p.points);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
-    spl_spill_destroy(stage->spill);
-    stage->spill = NULL;
+    end_spill(options, stage, !rc);
     return rc;
 }

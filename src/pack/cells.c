@@ -13,7 +13,7 @@
 #include "geom/morton.h"
 #include "pack/order.h"
 
-enum { grain = 1 << 14 };
+enum { grain = 1 << 14, around_grain = 32 };
 static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
 struct build {
@@ -66,6 +66,8 @@ struct spl_cell_sums spl_cells_around(const struct spl_cells *cells, uint32_t ce
 {
     struct spl_cell_sums all = {0};
     int64_t at[3];
+    if (cell % around_grain == 0)
+        spl_spill_keep_bound(cells->spill);
     spl_cells_place(cells, cell, at);
     for (int z = -1; z <= 1; z++)
         for (int y = -1; y <= 1; y++)

@@ -29,11 +29,27 @@ static int grow(struct spl_spill *spill, void **array, size_t capacity, size_t s
     return 0;
 }
 
+static int fail_count(struct spl_error *err)
+{
+    return spl_fail(err, SPL_E_LIMIT, "more than %u points; pack them as several datasets", SPL_POINTS_MAX);
+}
+
+int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err)
+{
+    uint64_t points = 0;
+    for (size_t i = 0; i < scans->count; i++) {
+        const struct spl_scan *scan = &scans->list[i];
+        uint64_t more = scan->max_points ? scan->max_points : scan->counted ? scan->points_expected : 0;
+        points += more < SPL_POINTS_MAX ? more : (uint64_t)SPL_POINTS_MAX + 1; /* a million scans do not overflow it */
+    }
+    return points > SPL_POINTS_MAX ? fail_count(err) : SPL_OK;
+}
+
 static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struct spl_error *err)
 {
     size_t capacity = p->capacity, old = p->count;
-    if (old + more > UINT32_MAX - 1)
-        return spl_fail(err, SPL_E_LIMIT, "more than %u points; pack them as several datasets", UINT32_MAX - 1);
+    if (old + more > SPL_POINTS_MAX)
+        return fail_count(err);
     if (old + more > capacity)
         capacity = old + more > capacity + capacity / 2 ? old + more : capacity + capacity / 2;
     int rc = 0;
@@ -157,7 +173,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. */
-    if (info->points_expected && info->points_expected < UINT32_MAX - 1 - p->count)
+    if (info->points_expected && info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         if (rc == SPL_CLOUD_AGAIN) {

@@ -18,6 +18,8 @@
 #include "pack/order.h"
 
 enum { digits = 256, threads_max = 64, short_run = 32, grain = 1 << 16 };
+/* Each element of these may be in a page of its own, which comes with fifteen others. */
+enum { random_grain = 256 };
 enum { lead_bits = 16, leads = 1 << lead_bits, lead_shift = 63 - lead_bits, parts_most = 1024 };
 static const uint32_t dropped = UINT32_MAX;
 
@@ -105,7 +107,7 @@ static void scatter_piece(void *context, size_t begin, size_t end, unsigned work
     uint32_t *at = o->at[begin / o->piece];
     (void)worker;
     for (size_t i = begin; i < end; i++) {
-        if (i % grain == 0)
+        if (i % random_grain == 0)
             spl_spill_keep_bound(o->points->spill);
         uint32_t to = at[o->part_of[o->key[i] >> lead_shift]]++;
         o->key_to[to] = o->key[i];
@@ -324,7 +326,7 @@ static int permute(struct order *o, void **array, size_t size, struct spl_error 
     p.to = spl_spill_alloc_raw(o->points->spill, o->count + SPL_POINTS_PAD, size, err);
     if (!p.to)
         return SPL_E_NOMEM;
-    spl_parallel_for(o->stage->threads, o->count, grain, permute_piece, &p);
+    spl_parallel_for(o->stage->threads, o->count, o->points->spill ? random_grain : grain, permute_piece, &p);
     memset(p.to + o->count * size, 0, SPL_POINTS_PAD * size);
     spl_spill_free(o->points->spill, *array);
     *array = p.to;

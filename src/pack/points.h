@@ -12,6 +12,7 @@
 #include "pack/spill.h"
 
 #define SPL_NO_STATION UINT16_MAX
+#define SPL_POINTS_MAX (UINT32_MAX - 1) /* of a dataset: indices have 32 bits */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
@@ -43,6 +44,9 @@ struct spl_points {
     double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */
     uint64_t points_read, points_skipped, duplicates;
 };
+
+/* SPL_E_LIMIT where the scans' headers say that they have more points than there can be, SPL_POINTS_MAX. */
+int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err);
 
 /* Reads all scans, and counts in them what came of each. SPL_E_INPUT when none has a usable point or a coordinate is
  * beyond SPL_COORDINATE_MAX. */

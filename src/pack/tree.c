@@ -11,6 +11,8 @@
 #include "geom/morton.h"
 #include "pack/order.h"
 
+enum { grain = 1 << 16 };
+
 static uint64_t key_of(const struct spl_tree_node *node, const struct spl_points *points, size_t i)
 {
     return spl_points_key(points, i, node->frame_low, node->frame_size);
@@ -78,8 +80,11 @@ static unsigned shrink_cube(struct spl_tree_node *node, const struct spl_tree_no
 static bool too_wide(const struct spl_tree_node *node, const struct spl_points *points)
 {
     float smallest = points->radius[node->begin];
-    for (size_t i = node->begin; i < node->end; i++)
+    for (size_t i = node->begin; i < node->end; i++) {
+        if (i % grain == 0)
+            spl_spill_keep_bound(points->spill);
         smallest = points->radius[i] < smallest ? points->radius[i] : smallest;
+    }
     return node->size > smallest * (double)(1 << 18);
 }
 
@@ -113,6 +118,7 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
     int rc = add_node(tree, &capacity, &root, err);
     for (uint32_t i = 0; !rc && i < tree->count; i++) {
         struct spl_tree_node node = tree->nodes[i];
+        spl_spill_keep_bound(points->spill);
         unsigned shift = shrink_cube(&node, i ? &tree->nodes[node.parent] : NULL, points);
         size_t count = node.end - node.begin, at = node.begin;
         if (count > most || (count > 1 && too_wide(&node, points))) {

@@ -242,6 +242,25 @@ static void too_little_memory_is_refused(void **state)
     assert_string_equal(err.field, "memory");
 }
 
+/* Before they are read: the file has a hole instead of them. */
+static void too_many_points_are_refused_at_once(void **state)
+{
+    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty float x\n"
+                               "property float y\nproperty float z\nend_header\n";
+    const char *path = in_folder("many.ply");
+    struct spl_error err = {0};
+    struct spl_pack_options options = get_options(&path, 1, 1);
+    (void)state;
+    folder_put_text("many.ply", head);
+    if (truncate(path, (off_t)sizeof head - 1 + 12ll * 4294967295ll))
+        skip(); /* no such large file here */
+    options.output = in_folder("none.spld");
+    options.keep = NULL;
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_LIMIT);
+    assert_non_null(strstr(err.message, "more than 4294967294 points"));
+    assert_int_equal(unlink(path), 0);
+}
+
 /* A name is in META, so that the points that lie the other way round lie in a file of the same one. */
 static void of_any_order_of_points(void **state)
 {
@@ -276,6 +295,7 @@ int main(void)
                                        cmocka_unit_test(of_any_memory),
                                        cmocka_unit_test(of_any_memory_without_surfaces),
                                        cmocka_unit_test(too_little_memory_is_refused),
+                                       cmocka_unit_test(too_many_points_are_refused_at_once),
                                        cmocka_unit_test(of_any_order_of_points),
                                        cmocka_unit_test(of_tiles_in_any_order)};
     return cmocka_run_group_tests_name("a dataset depends on its scans alone", tests, setup, teardown);
