@@ -96,6 +96,8 @@ static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t i = begin; i < end; i++) {
         double direction[2] = {0}, far;
         float u[3], v[3];
+        if (i % 256 == 0)
+            spl_spill_keep_bound(p->spill);
         if (!l->candidate[i])
             continue;
         spl_neighbours_find(l->neighbours, i, l->wide, &near);

@@ -29,7 +29,9 @@
 #include "base/memory.h"
 
 enum { large = 1 << 20, step = 2 << 20, pool_bytes = 32 << 20, checks_a_step = 8 };
-static const double in_memory = 0.35, high = 0.75, low = 0.65; /* of the bound */
+static const double in_memory = 0.35, margin = 0.25, margin_most = 0.45; /* of the bound */
+static const double margin_bytes = 100e6; /* at least: what comes before anybody looks, on a busy machine */
+static const double low = 0.87;           /* of the bound less the margin */
 static const double fill_a_second = 4e9;                    /* bytes that become resident at most */
 static const uint64_t trim_ns = 1000000000;
 static const long shortest_ns = 500000, longest_ns = 20000000;
@@ -78,10 +80,17 @@ static uint64_t get_resident(struct spl_spill *s)
     return resident;
 }
 
+/* Resident bytes from which on pages are taken away. */
+static uint64_t get_most(const struct spl_spill *s)
+{
+    double all = (double)s->memory, spare = margin * all > margin_bytes ? margin * all : margin_bytes;
+    return (uint64_t)(all - (spare < margin_most * all ? spare : margin_most * all));
+}
+
 /* Takes pages away until little enough is resident, or each piece had its turn. */
 static void let_go(struct spl_spill *s)
 {
-    uint64_t wanted = (uint64_t)(low * (double)s->memory), steps = 0;
+    uint64_t wanted = (uint64_t)(low * (double)get_most(s)), steps = 0;
     pthread_mutex_lock(&s->lock);
     uint64_t left = s->on_disk;
     for (size_t turns = 0; left > 0 && turns <= s->count; steps++) {
@@ -108,10 +117,6 @@ static void let_go(struct spl_spill *s)
     pthread_mutex_unlock(&s->lock);
 }
 
-static uint64_t get_most(const struct spl_spill *s)
-{
-    return (uint64_t)(high * (double)s->memory);
-}
 
 void spl_spill_keep_bound(struct spl_spill *s)
 {
