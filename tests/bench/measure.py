@@ -27,6 +27,7 @@ import time
 SPLATD = os.environ["SPLATD_BINARY"]
 DATA = pathlib.Path(os.environ["SPLATD_DATA"])
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "splatd-bench"
+CACHE.mkdir(parents=True, exist_ok=True)
 VIEWS = ["--views", str(DATA / "cameras.json"), "--set", "grenoble"]
 TYPE_BYTES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
 beyond = []
