@@ -88,6 +88,13 @@ static int compare(const void *a, const void *b)
                                   : (p->tv_nsec > q->tv_nsec) - (p->tv_nsec < q->tv_nsec);
 }
 
+/* Is it a file that name_of() makes, or one beside it that is being written? */
+static bool is_block(const char *name)
+{
+    size_t digits = strspn(name, "0123456789abcdef");
+    return digits >= 10 && (!name[digits] || (name[digits] == '-' && strspn(name + digits, "-0123456789") == strlen(name + digits)));
+}
+
 static void list_blocks(int folder, const char *name, struct listing *list)
 {
     int fd = openat(folder, name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);
@@ -98,6 +105,8 @@ static void list_blocks(int folder, const char *name, struct listing *list)
         struct stat status;
         if (item->d_name[0] == '.' || fstatat(fd, item->d_name, &status, AT_SYMLINK_NOFOLLOW) || !S_ISREG(status.st_mode) ||
             strlen(name) + strlen(item->d_name) + 2 > sizeof list->items->name)
+            continue;
+        if (!is_block(item->d_name)) // not ours
             continue;
         if (strchr(item->d_name, '-')) { // being written, or left so by one that was killed
             if (time(NULL) - status.st_mtime > stale_s)
@@ -169,6 +178,13 @@ int spl_page_cache_open(const char *folder, uint64_t bytes_max, struct spl_page_
         code = errno;
     if (!code && !S_ISDIR(status.st_mode))
         code = ENOTDIR;
+    if (!code && (status.st_uid != geteuid() || (status.st_mode & 022))) { // who writes there says what is shown
+        spl_fail_field(err, SPL_E_USAGE, "page-cache",
+                       "page-cache: %s belongs to others, or others may write to it; it has to be the service's alone (chmod 700)",
+                       cache->folder);
+        spl_page_cache_let_go(cache);
+        return SPL_E_USAGE;
+    }
     if (code) {
         spl_fail_field(err, SPL_E_USAGE, "page-cache", "page-cache: cannot keep pages in %s: %s", cache->folder, strerror(code));
         spl_page_cache_let_go(cache);
@@ -217,7 +233,7 @@ bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, 
 {
     char name[PATH_MAX], more;
     struct header header = {0};
-    int fd = cache && name_of(cache, key, &block, name) ? open(name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW) : -1;
+    int fd = cache && name_of(cache, key, &block, name) ? open(name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK) : -1;
     if (fd < 0)
         return false;
     bool sound = read_all(fd, &header, sizeof header) && !memcmp(header.magic, magic, sizeof magic) &&
@@ -268,8 +284,8 @@ void spl_page_cache_write(struct spl_page_cache *cache, struct spl_page_key key,
         return;
     memcpy(header.magic, magic, sizeof magic);
     header.hash = XXH3_64bits(data, bytes);
-    snprintf(beside, sizeof beside, "%s-%ld-%llu", name, (long)getpid(),
-             (unsigned long long)atomic_fetch_add(&cache->numbers, 1));
+    snprintf(beside, sizeof beside, "%s-%ld-%llu-%llu", name, (long)getpid(), (unsigned long long)spl_now_ns(),
+             (unsigned long long)atomic_fetch_add(&cache->numbers, 1)); // containers have equal process numbers
     int fd = -1;
     for (int i = 0; i < 2 && fd < 0; i++) { // another process may have removed the empty folder
         if (mkdir(folder, 0700) && errno != EEXIST)

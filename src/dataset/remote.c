@@ -20,7 +20,8 @@
 #include "dataset/remote_counts.h"
 #include "dataset/remote_run.h"
 
-enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of one request */, kept = 8 /* in memory, unused */ };
+enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of one request */, kept = 8 /* in memory, unused */,
+       forgotten_most = 1 << 16 /* on disk */ };
 
 struct spl_remote_counts spl_remote_counts;
 
@@ -306,14 +307,17 @@ static void forget(void *context, uint64_t offset, uint64_t bytes)
     struct remote *remote = context;
     if (!bytes)
         return;
-    for (uint64_t i = offset / BLOCK; i <= (offset + bytes - 1) / BLOCK; i++) {
-        pthread_mutex_lock(&remote->mutex);
-        struct block *block = find(remote, i);
-        if (block && block->state == READY)
+    const uint64_t first = offset / BLOCK, last = (offset + bytes - 1) / BLOCK; // a server may say any length
+    struct block *block, *next;
+    pthread_mutex_lock(&remote->mutex);
+    for (block = TAILQ_FIRST(&remote->blocks); block; block = next) {
+        next = TAILQ_NEXT(block, link);
+        if (block->state == READY && block->index >= first && block->index <= last)
             unlist(remote, block);
-        pthread_mutex_unlock(&remote->mutex);
-        spl_page_cache_drop(remote->cache, remote->key, i);
     }
+    pthread_mutex_unlock(&remote->mutex);
+    for (uint64_t i = first; remote->cache && i <= last && i - first < forgotten_most; i++)
+        spl_page_cache_drop(remote->cache, remote->key, i);
 }
 
 static uint64_t get_moved_ns(void *context)

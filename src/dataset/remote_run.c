@@ -17,6 +17,7 @@
 #include "dataset/remote_retry.h"
 
 static const uint64_t connect_most_ms = 5000, stall_most_ms = 10000, per_mib_ns = 10 * SPL_NS_PER_S;
+static const uint64_t rest_ms = 2000, rest_most_s = 60; /* of a server that was given up: many reads do not each wait for it */
 
 /* One answer, while it comes. */
 struct taking {
@@ -34,7 +35,9 @@ static bool is_same(const struct spl_remote_state *state, const struct spl_remot
         return false;
     if (*state->etag && *reply->etag)
         return !strcmp(state->etag, reply->etag);
-    return !*state->modified || !*reply->modified || !strcmp(state->modified, reply->modified);
+    if (*state->modified && *reply->modified)
+        return !strcmp(state->modified, reply->modified);
+    return !*state->etag && !*state->modified; // nobody says; else this answer is of something else
 }
 
 static void take_state(struct taking *t)
@@ -104,10 +107,17 @@ static int refuse(const struct spl_remote_origin *origin, const struct spl_remot
                     *reply->code ? " (" : "", reply->code, *reply->code ? ")" : "", spl_remote_get_advice(reply->status));
 }
 
-static int give_up(const struct spl_remote_origin *origin, const struct spl_remote_reply *reply, unsigned failures,
+static uint64_t least(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+static int give_up(struct spl_remote_origin *origin, const struct spl_remote_reply *reply, unsigned failures,
                    struct spl_error *err)
 {
     char status[40];
+    uint64_t rest_ns = least(rest_ms, origin->deadline_ms) * SPL_NS_PER_MS, wish_s = least(reply->retry_after_s, rest_most_s);
+    atomic_store(&origin->rests_until_ns, spl_now_ns() + (wish_s ? wish_s * SPL_NS_PER_S : rest_ns));
     snprintf(status, sizeof status, "it answers %ld", reply->status);
     return spl_fail(err, SPL_E_TIMEOUT, "cannot read %s: given up after %u attempts, at the last %s", name_of(origin),
                     failures, *reply->why ? reply->why : status);
@@ -126,11 +136,6 @@ static bool rest(const struct spl_remote_origin *origin, uint64_t until_ns)
         nanosleep(&(struct timespec){.tv_nsec = (long)nap_ns}, NULL);
     }
     return !spl_is_cancelled(origin->cancelled);
-}
-
-static uint64_t least(uint64_t a, uint64_t b)
-{
-    return a < b ? a : b;
 }
 
 static void ask(struct taking *t, uint64_t deadline_ns)
@@ -160,7 +165,8 @@ static int judge(struct taking *t, struct spl_error *err)
     const struct spl_remote_reply *reply = &t->reply;
     const enum spl_remote_verdict verdict = reply->status ? spl_remote_judge(reply->status)
                                             : reply->may_pass ? SPL_REMOTE_AGAIN : SPL_REMOTE_REFUSE;
-    if (t->changed || verdict == SPL_REMOTE_CHANGED)
+    const bool cut = t->origin->opened && reply->status == 416; // it was longer
+    if (t->changed || cut || verdict == SPL_REMOTE_CHANGED)
         return fail_changed(t->origin, err);
     if (spl_is_cancelled(t->origin->cancelled))
         return spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", name_of(t->origin));
@@ -178,6 +184,9 @@ int spl_remote_run(struct spl_remote_origin *origin, struct spl_remote_run *run,
     unsigned failures = 0, attempts = 0;
     struct spl_error why = {0};
     int rc = atomic_load(&origin->changed) ? fail_changed(origin, &why) : 1;
+    if (rc > 0 && spl_remaining_ns(atomic_load(&origin->rests_until_ns)))
+        return spl_fail(err, SPL_E_TIMEOUT, "cannot read %s: its server was given up a moment ago; come back later",
+                        name_of(origin));
     atomic_store(&origin->moved_ns, since_ns);
     while (rc > 0) {
         uint64_t done = t.done;

@@ -20,6 +20,7 @@ struct spl_remote_origin {
     uint64_t deadline_ms;
     const atomic_bool *cancelled; // may be NULL
     atomic_bool changed;          /* it is another file by now */
+    _Atomic uint64_t rests_until_ns; /* its server was given up a moment ago */
     _Atomic uint64_t moved_ns;    /* when bytes last came */
 };
 

@@ -88,7 +88,8 @@ static int locate_key(const char *text, const struct spl_s3_account *account, ch
     const char *bucket = text + strlen("s3://"), *region = account->region && *account->region ? account->region : "us-east-1";
     size_t length = strspn(bucket, in_buckets);
     if (!length || bucket[length] != '/' || !bucket[length + 1])
-        return spl_fail(err, SPL_E_USAGE, "'%.200s': a dataset in S3 is s3://BUCKET/KEY", text);
+        return spl_fail(err, SPL_E_USAGE, "a dataset in S3 is s3://BUCKET/KEY, a bucket's name of letters, digits, '.', '-' "
+                                          "and '_'; keys of who asks come from the environment"); // not the text: it may have them
     if (strspn(region, "abcdefghijklmnopqrstuvwxyz0123456789-") < strlen(region))
         return spl_fail(err, SPL_E_USAGE, "AWS_REGION is lower case letters, digits and '-', say eu-central-1, not '%.60s'", region);
     int used;

@@ -321,6 +321,8 @@ static void hash_sections(void *context, size_t begin, size_t end, unsigned work
     (void)worker;
     struct hashing *hashing = context;
     for (size_t i = begin; i < end; i++) {
+        if (hashing->dataset->source.far && atomic_load(&hashing->code))
+            return; // a server that fails would be asked for each of them
         int rc = check_section(hashing->dataset, (uint32_t)i, hashing->verify);
         if (!rc)
             continue;

@@ -4,6 +4,7 @@
 #include "dataset/tables.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 
 #include <xxhash.h>
@@ -212,6 +213,7 @@ static int allocate_whole(struct spl_dataset *dataset, struct spl_error *err)
 
 struct reading {
     const struct spl_dataset *dataset;
+    atomic_bool stopped;
     pthread_mutex_t mutex;
     uint32_t failed; /* guarded by: mutex, as all below; the least page whose head is refused */
     struct spl_error err;
@@ -242,7 +244,11 @@ static void read_heads(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t page = begin; page < end; page++) {
         struct spl_counts counts = {0};
         struct spl_error why = {0};
+        if (reading->dataset->source.far && atomic_load(&reading->stopped))
+            return; // a server that fails would be asked for each of them
         int rc = read_and_count((struct spl_dataset *)reading->dataset, (uint32_t)page, &counts, &why);
+        if (rc)
+            atomic_store(&reading->stopped, true);
         pthread_mutex_lock(&reading->mutex);
         if (!rc) {
             spl_counts_add(&reading->counts, &counts);

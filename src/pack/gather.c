@@ -115,7 +115,7 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
             p->station[at] = known ? (uint16_t)station : SPL_NO_STATION;
         }
         for (int c = 0; p->normal && c < 3; c++)
-            p->normal[at][c] = attributes & SPL_CLOUD_NORMAL ? batch->normal[i][c] : 0;
+            p->normal[at][c] = attributes & SPL_CLOUD_NORMAL ? batch->normal[i][c] + 0.0f : 0; // no -0, which has a code of its own
     }
     p->count = at;
     p->points_read += batch->count;
@@ -206,16 +206,22 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     return rc;
 }
 
+/* Of no points yet. */
+static void begin_points(struct spl_points *points, const struct spl_scans *scans, const struct spl_stage *stage)
+{
+    points->keep = scans->how.keep;
+    points->spill = stage->spill;
+    for (int s = 0; s < SPL_POINT_SCALARS; s++)
+        points->scalar[s].spill = stage->spill;
+}
+
 /* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
  * on only to find all that break. */
 static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
                   double *numbers, struct spl_stage *stage, struct spl_error *err)
 {
     int rc = SPL_OK;
-    points->keep = scans->how.keep;
-    points->spill = stage->spill;
-    for (int s = 0; s < SPL_POINT_SCALARS; s++)
-        points->scalar[s].spill = stage->spill;
+    begin_points(points, scans, stage);
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_scan *scan = &scans->list[i];
         struct spl_error why = {0};
@@ -224,6 +230,7 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
             continue;
         }
         spl_points_finish(points);
+        begin_points(points, scans, stage);
         if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
             spl_scans_remove(scans, i);
     }

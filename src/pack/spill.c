@@ -28,7 +28,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 
-enum { large = 1 << 20, step = 2 << 20, pool_bytes = 32 << 20, checks_a_step = 8 };
+enum { large = 1 << 20, step = 2 << 20, pool_least = 32 << 20, pools_a_spill = 64, checks_a_step = 8 };
 static const double in_memory = 0.35, margin = 0.25, margin_most = 0.45; /* of the bound */
 static const double margin_bytes = 100e6; /* at least: what comes before anybody looks, on a busy machine */
 static const double low = 0.87;           /* of the bound less the margin */
@@ -51,7 +51,7 @@ struct spl_spill {
     size_t count, capacity;
     uint64_t trimmed_ns;
     size_t hand, hand_at; /* where pages were taken away last */
-    char *pool;           /* of small ones */
+    char *pool;           /* of small ones: what is left of it */
     size_t pool_left;
     int statm;
     pthread_t watcher;
@@ -75,8 +75,9 @@ static uint64_t get_resident(struct spl_spill *s)
     if (sscanf(text, "%llu %llu", &all, &resident) != 2)
         return 0;
     resident *= (unsigned long long)sysconf(_SC_PAGESIZE);
-    if (resident > atomic_load(&s->memory_most))
-        atomic_store(&s->memory_most, resident);
+    uint_fast64_t most = atomic_load(&s->memory_most);
+    while (resident > most && !atomic_compare_exchange_weak(&s->memory_most, &most, resident))
+        continue;
     return resident;
 }
 
@@ -103,7 +104,7 @@ static void let_go(struct spl_spill *s)
         const struct piece *p = &s->pieces[s->hand];
         size_t bytes = p->bytes - s->hand_at < step ? p->bytes - s->hand_at : step;
         madvise(p->at + s->hand_at, bytes, MADV_DONTNEED);
-        s->hand_at += bytes;
+        s->hand_at += step; // a page's begin, whatever comes to lie behind it
         turns = 0;
         left -= bytes < left ? bytes : left;
         if (steps % checks_a_step == checks_a_step - 1 && get_resident(s) <= wanted)
@@ -117,16 +118,18 @@ static void let_go(struct spl_spill *s)
     pthread_mutex_unlock(&s->lock);
 }
 
-
 void spl_spill_keep_bound(struct spl_spill *s)
 {
     if (!s)
         return;
     uint64_t now = spl_now_ns(), before = atomic_load_explicit(&s->checked_ns, memory_order_relaxed);
-    if (now - before < (uint64_t)shortest_ns || !atomic_compare_exchange_strong(&s->checked_ns, &before, now))
+    if ((int64_t)(now - before) < shortest_ns || !atomic_compare_exchange_strong(&s->checked_ns, &before, now))
         return;
-    if (get_resident(s) > get_most(s))
-        let_go(s);
+    if (get_resident(s) <= get_most(s))
+        return;
+    let_go(s);
+    if (get_resident(s) > get_most(s)) // what cannot be let go of is too much already: no sooner than that again
+        atomic_store(&s->checked_ns, spl_now_ns() + (uint64_t)longest_ns);
 }
 
 static void *watch(void *context)
@@ -288,10 +291,16 @@ static void *add_piece(struct spl_spill *s, size_t bytes, bool zeroed, struct sp
     return at;
 }
 
+/* Bytes from which on an array is a piece. */
+static size_t get_least(void)
+{
+    return atomic_load(&forced) ? atomic_load(&forced) : large;
+}
+
 static void *allocate(struct spl_spill *s, size_t count, size_t size, bool zeroed, struct spl_error *err)
 {
-    size_t bytes, least = atomic_load(&forced) ? atomic_load(&forced) : large;
-    if (!s || __builtin_mul_overflow(count, size, &bytes) || bytes < least)
+    size_t bytes;
+    if (!s || __builtin_mul_overflow(count, size, &bytes) || bytes < get_least())
         return zeroed ? spl_alloc(count, size, err) : spl_alloc_raw(count, size, err);
     pthread_mutex_lock(&s->lock);
     void *at = add_piece(s, bytes, zeroed, err);
@@ -335,6 +344,16 @@ static void *grow_file(struct spl_spill *s, struct piece *p, size_t bytes, struc
     return at;
 }
 
+/* A part at a time, each let go of: nobody else can meanwhile. */
+static void copy_to_file(char *to, const char *from, size_t bytes)
+{
+    for (size_t at = 0; at < bytes; at += step) {
+        size_t some = bytes - at < step ? bytes - at : step;
+        memcpy(to + at, from + at, some);
+        madvise(to + at, some, MADV_DONTNEED);
+    }
+}
+
 void *spl_spill_realloc(struct spl_spill *s, void *old, size_t count, size_t size, struct spl_error *err)
 {
     size_t bytes;
@@ -343,13 +362,15 @@ void *spl_spill_realloc(struct spl_spill *s, void *old, size_t count, size_t siz
     if (!old)
         return allocate(s, count, size, false, err);
     pthread_mutex_lock(&s->lock);
-    size_t i = find_piece(s, old), before = i < s->count ? s->pieces[i].bytes : 0;
+    size_t i = find_piece(s, old), before = i < s->count ? s->pieces[i].bytes : 0, least = get_least();
     void *at = NULL;
-    if (i == s->count) { /* small so far */
+    if (i == s->count && bytes < least) {
         at = spl_realloc(old, count, size, err);
-        if (at && bytes >= large && !spl_array_reserve(s->pieces, s->capacity, s->count + 1, NULL)) {
-            s->pieces[s->count++] = (struct piece){at, bytes, -1};
-            s->on_heap += bytes;
+    } else if (i == s->count) { /* small so far */
+        const size_t had = malloc_usable_size(old);
+        if ((at = add_piece(s, bytes, false, err))) {
+            memcpy(at, old, had < bytes ? had : bytes);
+            free(old);
         }
     } else if (bytes <= before) {
         at = old;
@@ -361,7 +382,7 @@ void *spl_spill_realloc(struct spl_spill *s, void *old, size_t count, size_t siz
             s->on_heap += bytes - before;
         }
     } else if ((at = add_piece(s, bytes, false, err))) {
-        memcpy(at, old, before);
+        copy_to_file(at, old, before);
         drop(s, i);
     }
     pthread_mutex_unlock(&s->lock);
@@ -387,18 +408,21 @@ void spl_spill_free(struct spl_spill *s, void *array)
 void *spl_spill_take(struct spl_spill *s, size_t count, size_t size, struct spl_error *err)
 {
     size_t bytes;
-    if (!s || __builtin_mul_overflow(count, size, &bytes) || bytes > pool_bytes)
+    if (!s || __builtin_mul_overflow(count, size, &bytes) || bytes > pool_least - 64)
         return allocate(s, count, size, false, err);
-    bytes = (bytes + 64) & ~(size_t)63; /* never none */
+    bytes = (bytes + 63) & ~(size_t)63;
+    bytes += bytes ? 0 : 64; /* never none */
     pthread_mutex_lock(&s->lock);
-    if (bytes > s->pool_left) {
+    if (bytes > s->pool_left) { // of a file each: the larger the more there are
+        size_t pool_bytes = s->on_disk / pools_a_spill > pool_least ? s->on_disk / pools_a_spill & ~(size_t)4095 : pool_least;
         char *pool = add_piece(s, pool_bytes, false, err);
         s->pool = pool ? pool : s->pool;
         s->pool_left = pool ? pool_bytes : s->pool_left;
     }
     void *at = NULL;
     if (bytes <= s->pool_left) {
-        at = s->pool + pool_bytes - s->pool_left;
+        at = s->pool;
+        s->pool += bytes;
         s->pool_left -= bytes;
     }
     pthread_mutex_unlock(&s->lock);

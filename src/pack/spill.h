@@ -1,4 +1,4 @@
-/* Large arrays of a pack that need not lie in memory: beyond half of what the pack may take they lie in files without a
+/* Large arrays of a pack that need not lie in memory: beyond a third of what the pack may take they lie in files without a
  * name, mapped, and what of them was not used for a while is let go of whenever the process comes near its bound. What
  * is made with them is the same wherever they lie. */
 #ifndef SPL_PACK_SPILL_H

@@ -173,7 +173,7 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     size_t length;
     const char *stem = spl_catalog_id_of(file->path, &length);
-    const bool far = spl_remote_is_url(file->path) && why->code != SPL_E_USAGE && why->code != SPL_E_UNSUPPORTED;
+    const bool far = spl_remote_is_url(file->path) && why->code != SPL_E_USAGE;
     if (why->code && (!(file->in_directory || far) || !stem)) // a server may come back
         return spl_fail(err, why->code, "%s", why->message);
     snprintf(id, sizeof id, "%.*s", (int)length, stem);

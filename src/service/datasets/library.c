@@ -209,7 +209,9 @@ void spl_library_take_changes(struct spl_service *service)
         if (slot && (slot->next == entry || slot->current == entry)) {
             if (slot->current == entry) // at start: there is no version before it
                 slot->current = NULL;
-            if (entry->err.code == SPL_E_TIMEOUT) { // its disk did not answer
+            const bool far = spl_remote_is_url(slot->path); // its server may answer otherwise later
+            if (entry->err.code == SPL_E_TIMEOUT ||         // its disk did not answer
+                (far && (entry->err.code == SPL_E_IO || entry->err.code == SPL_E_CORRUPT))) {
                 slot->opened = (struct spl_file_mark){0};
                 rest(slot);
             }

@@ -183,7 +183,9 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     }
     for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
         next = TAILQ_NEXT(entry, resident);
-        if (!entry->loading && !entry->aside && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
+        /* What is on a server comes when a view wants it: one that hangs would hold up all. */
+        bool here = !entry->loading && !entry->aside && !spl_dataset_is_remote(entry->dataset);
+        if (here && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
             return rc;
     }
     spl_gpu_publish_residency(gpu);

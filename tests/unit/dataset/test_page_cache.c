@@ -136,7 +136,7 @@ static void test_what_was_spoilt_is_gone(void **state)
     char path[400];
     path_of(key, 0, path);
     for (int at = 0; at < HEADER + BYTES; at += at < HEADER ? 1 : 97) {
-        char byte;
+        char byte = 0;
         put(cache, key, 0, 1);
         int fd = open(path, O_RDWR);
         assert_true(fd >= 0 && pread(fd, &byte, 1, at) == 1);

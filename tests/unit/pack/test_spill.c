@@ -87,6 +87,24 @@ static void small_ones_lie_beside_each_other(void **state)
     spl_spill_destroy(spill);
 }
 
+/* Of a bound that is full: what was small does not become large on the heap, and one as large as a pool is had. */
+static void what_was_small_grows_into_a_file(void **state)
+{
+    struct spl_spill *spill = create(64 << 20);
+    (void)state;
+    uint8_t *at = spl_spill_alloc(spill, 1000, 1, NULL), *pool = spl_spill_take(spill, (32 << 20) - 10, 1, NULL);
+    assert_non_null(at);
+    assert_non_null(pool);
+    memset(at, 7, 1000);
+    at = spl_spill_realloc(spill, at, 100 << 20, 1, NULL);
+    assert_non_null(at);
+    assert_true(at[0] == 7 && at[999] == 7);
+    assert_true(spl_spill_disk_most(spill) >= 100 << 20);
+    pool[(32 << 20) - 11] = 1;
+    spl_spill_free(spill, at);
+    spl_spill_destroy(spill);
+}
+
 static void without_a_bound_it_is_the_heap(void **state)
 {
     (void)state;
@@ -131,6 +149,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arrays_beyond_the_bound_keep_their_values), cmocka_unit_test(small_ones_lie_beside_each_other),
+        cmocka_unit_test(what_was_small_grows_into_a_file),
         cmocka_unit_test(without_a_bound_it_is_the_heap), cmocka_unit_test(a_disk_without_room_is_an_error)};
     return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
 }
