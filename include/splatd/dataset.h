@@ -127,7 +127,10 @@ static inline const struct spl_stream_values *spl_dataset_info_get_values(const 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
  * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the
  * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the
- * caller owns *out. Blocks on disk. */
+ * caller owns *out. Blocks on disk.
+ * A path that begins with https://, http:// or s3:// is asked of that server (api/remote.md), with the keys of the
+ * process's environment, and may block for minutes: do not pass on paths of strangers. Pages are then held against their
+ * checksums when they are read, whatever `verify` says. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 
 /* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
@@ -151,7 +154,8 @@ static inline void spl_reader_init(struct spl_reader *reader)
 struct spl_open_options {
     size_t size;                     /* spl_open_options_init() */
     bool verify;                     /* as of spl_dataset_open() */
-    const struct spl_cancel *cancel; // may be NULL; borrowed until close: ends whatever takes long with the dataset
+    const struct spl_cancel *cancel; // may be NULL; borrowed until close (from a server: until reads have ended, too):
+                                     // ends whatever takes long with the dataset
     const struct spl_reader *reader; // NULL = the file at `path`; the struct itself is read while opening only
     uint64_t tables_bytes;           /* what tables may take; 0 = 64 MiB */
 };

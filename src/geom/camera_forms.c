@@ -83,7 +83,7 @@ int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct
 }
 
 int spl_form_set(struct spl_value *values, enum spl_camera_param param, const char *source, const double *numbers,
-               unsigned count, struct spl_error *err)
+                 unsigned count, struct spl_error *err)
 {
     int rc = spl_value_claim(&values[param], source, err);
     memcpy(values[param].n, numbers, count * sizeof *numbers);
@@ -93,7 +93,7 @@ int spl_form_set(struct spl_value *values, enum spl_camera_param param, const ch
 }
 
 int spl_form_set_number(struct spl_value *values, enum spl_camera_param param, const char *source, double number,
-                      struct spl_error *err)
+                        struct spl_error *err)
 {
     return spl_form_set(values, param, source, &number, 1, err);
 }
@@ -109,20 +109,20 @@ int spl_form_set_lens(struct spl_value *values, const char *source, const double
 
 /* The same with coefficients in COLMAP's order: of OPENCV_FISHEYE four, else of FULL_OPENCV eight. */
 int spl_form_set_bent_lens(struct spl_value *values, const char *source, const double lens[4], const double bend[8],
-                         bool fisheye, struct spl_error *err)
+                           bool fisheye, struct spl_error *err)
 {
     const unsigned count = fisheye ? 4 : 8;
     double params[12];
     memcpy(params, lens, 4 * sizeof *lens);
     memcpy(params + 4, bend, count * sizeof *bend);
     int rc = spl_form_set_number(values, SPL_CAMERA_model, source,
-                        spl_colmap_model_from_name(fisheye ? "OPENCV_FISHEYE" : "FULL_OPENCV"), err);
+                                 spl_colmap_model_from_name(fisheye ? "OPENCV_FISHEYE" : "FULL_OPENCV"), err);
     return rc ? rc : spl_form_set(values, SPL_CAMERA_params, source, params, 4 + count, err);
 }
 
 /* A row-major matrix, camera to world. */
 int spl_form_set_pose(struct spl_value *values, const char *source, const double matrix[16], enum spl_axes axes,
-                    struct spl_error *err)
+                      struct spl_error *err)
 {
     int rc = spl_form_set(values, SPL_CAMERA_matrix, source, matrix, 16, err);
     return rc ? rc : spl_form_set_number(values, SPL_CAMERA_convention, source, axes, err);

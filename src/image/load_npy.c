@@ -1,7 +1,8 @@
 /* NPY 1.0 to 3.0 in: the layer's own numbers, no conversion.
  *
- * The header is a Python dictionary with three keys that numpy always writes; its values are looked for by key, each of which
- * is there once, so that their order does not matter. The file must be as long as its header says before anything is allocated. Any thread. */
+ * The header is a Python dictionary with three keys that numpy always writes; its values are looked for by key, each of
+ * which is there once, so that their order does not matter. The file must be as long as its header says before anything
+ * is allocated. Any thread. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

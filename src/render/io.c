@@ -3,8 +3,8 @@
  * Invariants: `staged` counts the bytes of reads under way and of those ended that were not given back, and is raised
  * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is
  * more to read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one
- * list at a time, but for those taken, which are in none. Of a source as many reads are under way as it says; a thread is begun where
- * one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them,
+ * list at a time, but for those taken, which are in none. Of a source as many reads are under way as it says; a thread
+ * is begun where one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them,
  * waits for those that are not in the middle of a read, and leaves the others behind: then `io` is theirs, and the last
  * one frees it. */
 #include "render/io.h"

@@ -81,8 +81,8 @@ void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* When the read of the source that is longest under way was begun, or has last come on; where none is, when one of any source was last begun, has
- * ended or was given back: what tells a disk that is slow from one that hangs. */
+/* When the read of the source that is longest under way was begun, or has last come on; where none is, when one of any
+ * source was last begun, has ended or was given back: what tells a disk that is slow from one that hangs. */
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source);
 
 /* Has a read of the source been under way for a second in which nothing came, and how many are there that have? */

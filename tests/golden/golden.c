@@ -398,7 +398,8 @@ static bool backends_agree(struct spl_renderer *a, struct spl_renderer *b, const
                 continue;
             snprintf(name, sizeof name, "%s-%s", goldens[i].name, spl_layer_name((enum spl_layer)layer));
             good = encode(&of_a, &view, (enum spl_layer)layer, &left) &&
-                   encode(&of_b, &view, (enum spl_layer)layer, &right) && judge(name, "backends", &right, &left, one_level) && good;
+                   encode(&of_b, &view, (enum spl_layer)layer, &right) &&
+                   judge(name, "backends", &right, &left, one_level) && good;
             spl_encoded_finish(&left);
             spl_encoded_finish(&right);
         }
