@@ -1,4 +1,4 @@
-/* Replies: JSON, RFC 9457 problems, text, and what has no length yet. A problem's status and Retry-After follow from
+/* Replies: JSON, RFC 9457 problems, text, long bodies, and what has no length yet. A problem's status and Retry-After follow from
  * its error. Owned by the loop's thread. */
 #include "service/reply.h"
 
@@ -8,6 +8,7 @@
 
 #include "base/decimal.h"
 #include "base/log.h"
+#include "base/memory.h"
 #include "service/exchange.h"
 #include "service/ops/access_log.h"
 #include "service/pages.h"
@@ -145,6 +146,51 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
     if (request->response && info->retry)
         spl_reply_add_header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u",
                              spl_pipeline_get_retry_after(request->service->views->pipeline, request->large));
+}
+
+struct pieces {
+    const char *bytes;
+    size_t length;
+    void (*release)(void *);
+    void *context;
+};
+
+static ssize_t read_piece(void *context, uint64_t position, char *out, size_t room)
+{
+    const struct pieces *pieces = context;
+    size_t left = pieces->length - (size_t)position, n = left < room ? left : room;
+    memcpy(out, pieces->bytes + position, n);
+    return (ssize_t)n;
+}
+
+static void release_pieces(void *context)
+{
+    struct pieces *pieces = context;
+    pieces->release(pieces->context);
+    free(pieces);
+}
+
+static struct MHD_Response *make_pieces(const void *bytes, size_t length, void (*release)(void *), void *context)
+{
+    enum { piece_bytes = 256 << 10 };
+    struct pieces *pieces = spl_alloc(1, sizeof *pieces, NULL);
+    struct MHD_Response *response =
+        pieces ? MHD_create_response_from_callback(length, piece_bytes, read_piece, pieces, release_pieces) : NULL;
+    if (!response)
+        free(pieces);
+    else
+        *pieces = (struct pieces){bytes, length, release, context};
+    return response;
+}
+
+void spl_reply_bytes(struct request *request, const void *bytes, size_t length, void (*release)(void *), void *context)
+{
+    enum { whole_bytes = 1 << 20 }; // of frames nothing is copied
+    request->status = MHD_HTTP_OK;
+    request->response = length > whole_bytes
+                            ? make_pieces(bytes, length, release, context)
+                            : MHD_create_response_from_buffer_with_free_callback_cls(
+                                  length, (void *)(uintptr_t)bytes, release, context);
 }
 
 void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCallback read, void *context,

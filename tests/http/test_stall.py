@@ -1,15 +1,18 @@
 """No request holds up the others: bodies of a whole MiB of every shape to every route that takes one, what tours leave
 on disk listed, read and fetched, and in all of it no turn of the loop of 50 ms, nor memory or disk beyond what was said.
 
-A turn is judged by the processor time that it took, which others on the machine do not change; by the clock it may have
-been as much longer as the kernel says that the loop's thread waited for a processor."""
+A turn is judged by the processor time that it took; by the clock it may have been as much longer as the kernel says that
+the loop's thread waited for a processor. Others on the machine change that, too, where they share a core or its host: so
+a processor that counts slower than it might may take as much longer, and a stall is one that comes three times."""
 import array
+import functools
 import json
 import math
 import os
 import pathlib
 import random
 import re
+import statistics
 import tempfile
 import time
 
@@ -19,6 +22,32 @@ MIB = 1 << 20
 TOURS = "/v1/datasets/wall/tours"
 SMALL = {"width": 64, "height": 48}
 STALL_S, MEMORY = 0.05, 400 * MIB
+
+
+class Stalled(AssertionError):
+    pass
+
+
+def thrice(test):
+    """What stalls in each of three attempts stalls."""
+    @functools.wraps(test)
+    def attempt():
+        for last in False, False, True:
+            try:
+                return test()
+            except Stalled as why:
+                if last:
+                    raise
+                print(f"     again: {why}")
+    return attempt
+
+
+def counting_s():
+    """Processor time of a sum that takes 2.5 ms where nobody shares the core."""
+    began, x = time.thread_time(), 0
+    for i in range(20000):
+        x = (x * 1103515245 + i) & 0xffffffff
+    return time.thread_time() - began
 
 
 def waited_s(d):
@@ -39,9 +68,10 @@ class Watch:
     """Blames whatever has made a turn longer than any before it."""
 
     def __init__(self, d):
-        self.d, self.told, self.longest = d, 0, []
+        self.d, self.told, self.longest, self.counted = d, 0, [], []
 
     def blame(self, what):
+        self.counted.append(counting_s())
         busiest = metrics(self.d)["splatd_loop_stall_cpu_seconds"]
         if busiest > self.told:
             self.longest.append(f"{what}: {1000 * busiest:.1f} ms")
@@ -49,10 +79,12 @@ class Watch:
 
     def judge(self):
         got = metrics(self.d)
-        print(f"     turns: {1000 * got['splatd_loop_stall_cpu_seconds']:.1f} ms of processor time, "
-              f"{1000 * got['splatd_loop_stall_seconds']:.1f} ms by the clock; {self.longest[-1:]}; {peak_bytes(self.d) >> 20} MiB")
-        assert got["splatd_loop_stall_cpu_seconds"] < STALL_S, self.longest
-        assert got["splatd_loop_stall_seconds"] < STALL_S + waited_s(self.d), (got["splatd_loop_stall_seconds"], waited_s(self.d))
+        slower = max(1, statistics.median(self.counted) / 0.0025)
+        busiest, longest = got["splatd_loop_stall_cpu_seconds"], got["splatd_loop_stall_seconds"]
+        print(f"     turns: {1000 * busiest:.1f} ms of processor time, {1000 * longest:.1f} ms by the clock; {self.longest[-1:]}; "
+              f"{peak_bytes(self.d) >> 20} MiB; counts {slower:.2f} times slower")
+        if busiest >= STALL_S * slower or longest >= STALL_S * slower + waited_s(self.d):
+            raise Stalled(self.longest, longest, waited_s(self.d), slower)
 
 
 def filled(head, piece, tail, separator=","):
@@ -129,6 +161,7 @@ def paths():
     yield "ignored text", filled(small + '"', "\\\"", '"}}', "")
 
 
+@thrice
 def test_bodies_of_a_mib_stall_nobody():
     with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder, Daemon(FAKE, "--tours", folder, "--deadline", "60000") as d:
         watch = Watch(d)
@@ -137,6 +170,7 @@ def test_bodies_of_a_mib_stall_nobody():
                 assert len(body) <= MIB, name
                 reply = d.post(body, path)
                 assert reply.status in (200, 400), (path, name, reply.status)
+                assert "number" not in name or path == TOURS or b"the limit" in reply.body, (name, reply.body)
                 watch.blame(f"{name} to {path}")
         assert d.ask("/v1/datasets/wall", "PUT", os.urandom(MIB)).status in (403, 401)
         watch.blame("PUT")
@@ -144,6 +178,7 @@ def test_bodies_of_a_mib_stall_nobody():
         assert not os.listdir(folder) and peak_bytes(d) < MEMORY, peak_bytes(d) / MIB
 
 
+@thrice
 def test_paths_of_a_mib_stall_nobody():
     with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder, Daemon(FAKE, "--tours", folder, "--tour-frames", "100000", "--tour-pixels", "1000000000",
                                     "--deadline", "60000") as d:
@@ -193,6 +228,7 @@ def lists():
         yield name, sent.ljust(MIB - 1), "", "application/json", status
 
 
+@thrice
 def test_a_million_rays_stall_nobody():
     # Meson has malloc() fill what it gives: a long body's room, which is there at once and filled as the body comes
     with Daemon(FAKE, "--deadline", "60000", FAKE_FRAME_MS=1, MALLOC_PERTURB_=0) as d:
@@ -232,6 +268,7 @@ def length_of(d, uri):
     return length
 
 
+@thrice
 def test_what_tours_leave_stalls_nobody():
     frame = 192 * MIB
     with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder:

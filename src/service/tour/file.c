@@ -32,10 +32,7 @@ struct reading {
 static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
 {
     struct reading *reading = context;
-    ssize_t got;
-    do
-        got = pread(reading->fd, out, room, (off_t)(reading->offset + position));
-    while (got < 0 && errno == EINTR);
+    ssize_t got = spl_tour_file_read_at(reading->fd, reading->offset + position, out, room);
     reading->connection->since_ns = spl_now_ns();
     return got > 0 ? got : MHD_CONTENT_READER_END_WITH_ERROR; // the size was said: it became shorter
 }
@@ -115,6 +112,7 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
     struct reading *reading = spl_alloc(1, sizeof *reading, NULL);
     if (!reading)
         goto close_file;
+    spl_tour_file_pace(fd);
     *reading = (struct reading){tour, request->connection, fd, first};
     request->response = MHD_create_response_from_callback(length, block_bytes, on_read, reading, on_free);
     if (!request->response) {

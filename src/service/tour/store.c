@@ -53,18 +53,35 @@ int spl_tour_file_open(const char *directory, const char *name, const char *file
         out->left = (uint64_t)status.st_size;
     if (rc)
         spl_tour_file_close(out);
+    else
+        spl_tour_file_pace(out->fd);
     return rc;
+}
+
+void spl_tour_file_pace(int fd)
+{
+    posix_fadvise(fd, 0, 0, POSIX_FADV_RANDOM);
+}
+
+ssize_t spl_tour_file_read_at(int fd, uint64_t offset, void *out, size_t room)
+{
+    static const off_t ahead_bytes = 512 << 10;
+    ssize_t got;
+    do
+        got = pread(fd, out, room, (off_t)offset);
+    while (got < 0 && errno == EINTR);
+    if (got > 0)
+        posix_fadvise(fd, (off_t)offset + got, ahead_bytes, POSIX_FADV_WILLNEED);
+    return got;
 }
 
 size_t spl_tour_file_read(struct spl_tour_file *file, void *out, size_t room)
 {
-    ssize_t got;
     room = room < file->left ? room : (size_t)file->left;
-    do
-        got = read(file->fd, out, room);
-    while (got < 0 && errno == EINTR);
+    ssize_t got = spl_tour_file_read_at(file->fd, file->offset, out, room);
     if (got <= 0)
         return 0;
+    file->offset += (uint64_t)got;
     file->left -= (size_t)got;
     return (size_t)got;
 }

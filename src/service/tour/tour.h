@@ -124,13 +124,17 @@ int spl_tour_store_read(const char *directory, const char *name, const char *fil
 /* One that is read piece by piece, since a frame may have hundreds of megabytes. */
 struct spl_tour_file {
     int fd; /* -1 = none */
-    uint64_t left;
+    uint64_t offset, left;
 };
 int spl_tour_file_open(const char *directory, const char *name, const char *file, struct spl_tour_file *out,
                        struct spl_error *err);
 size_t spl_tour_file_read(struct spl_tour_file *file, void *out,
                           size_t room);               /* 0: nothing left, or it cannot be read */
 void spl_tour_file_close(struct spl_tour_file *file); /* idempotent */
+/* The kernel reads ahead as far as its disk says, 8 MiB at some, and a hole's zeros it writes at once: 20 ms of the loop
+ * for a block. Of an opened file that is paced it reads what is asked, and half a MiB behind it in its own time. */
+void spl_tour_file_pace(int fd);
+ssize_t spl_tour_file_read_at(int fd, uint64_t offset, void *out, size_t room); /* as pread(); not interrupted */
 void spl_tour_store_remove(const char *directory, const char *name);
 bool spl_tour_name_is_valid(const char *name);
 

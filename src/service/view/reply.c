@@ -48,9 +48,7 @@ static void release_rendering(void *rendering)
 void spl_reply_rendering(struct request *request, struct spl_rendering *rendering, const char *origin)
 {
     struct spl_encoded *encoded = &rendering->encoded;
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback_cls(encoded->length, encoded->bytes,
-                                                                               release_rendering, rendering);
+    spl_reply_bytes(request, encoded->bytes, encoded->length, release_rendering, rendering);
     if (!request->response)
         return;
     spl_rendering_ref(rendering);
@@ -88,9 +86,7 @@ void spl_reply_bundle(struct request *request, struct spl_encoded *bundle, size_
     struct outgoing *outgoing = spl_alloc(1, sizeof *outgoing, NULL);
     if (!outgoing)
         return;
-    request->status = MHD_HTTP_OK;
-    request->response = MHD_create_response_from_buffer_with_free_callback_cls(bundle->length, bundle->bytes,
-                                                                               release_outgoing, outgoing);
+    spl_reply_bytes(request, bundle->bytes, bundle->length, release_outgoing, outgoing);
     if (!request->response) {
         free(outgoing);
         return;
