@@ -31,7 +31,7 @@ void draw(splat_run run, splat a, splat b)
         float z;
         bool second;
         float distance = capsule_sample(c, walk, z, second);
-        if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u)) {
+        if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u, CUT_OPEN)) {
             precise float bent = z + capsule_margin(c, z) * distance;
             uint at = image_sample_index(sample_of(c, walk)), bits = floatBitsToUint(bent);
             uint own = second ? payloads.y : payloads.x;

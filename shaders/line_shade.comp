@@ -28,7 +28,7 @@ void draw(splat_run run, splat a, splat b)
         float z;
         bool second;
         float distance = capsule_sample(c, walk, z, second);
-        if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u)) {
+        if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u, CUT_OPEN)) {
             uint at = image_sample_index(sample_of(c, walk));
             float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
             precise float pushed = z + capsule_margin(c, z);

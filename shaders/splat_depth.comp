@@ -19,6 +19,8 @@ bool prepare(splat_run run, splat s, out work w)
         return false;
     w.d = make_disc(s, run.low, run.high);
     w.line = load_clip(run.chunk, s);
+    if (w.line.verdict == CUT_GONE)
+        return false;
     w.rule = load_trim(s);
     return true;
 }

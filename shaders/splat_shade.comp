@@ -48,6 +48,8 @@ bool prepare(splat_run run, splat s, out work w)
     w.id = identity(SPL_DRAWN, run.chunk.first_id + item_of(s.index));
     w.d = make_disc(s, run.low, run.high);
     w.line = load_clip(run.chunk, s);
+    if (w.line.verdict == CUT_GONE)
+        return false;
 #ifdef SPL_TEXTURED
     w.texture = load_texture(run.chunk, s, w.value);
     lay_texture(w.texture, run.chunk, s, own_entry() * SPL_RUN_SPLATS + s.index % SPL_RUN_SPLATS);

@@ -17,7 +17,7 @@ struct clip_line {
     float end;
     vec3 center;
     float radius;
-    uint known;
+    uint known, verdict; /* CUT_GONE: no sample of it is drawn */
 };
 
 clip_line load_clip(spl_draw_chunk chunk, splat s)
@@ -28,6 +28,7 @@ clip_line load_clip(spl_draw_chunk chunk, splat s)
     line.center = s.position;
     line.radius = s.radius;
     line.known = load_known(chunk, mark_byte(s.index));
+    line.verdict = judge_cut(s.position, s.radius, line.known);
     if (CLIPPED == 0u)
         return line;
     uint at = chunk.color_word + (chunk.color_bits >> SPL_COLOR_CLIP) - 1u, own = s.index >> 5, bit = s.index & 31u;
@@ -62,7 +63,7 @@ float cut(clip_line line, vec3 offset)
 {
     precise float within = line.radius / sqrt(max(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z, 1.0));
     precise vec3 p = line.center + within * offset;
-    return is_kept(p, line.known) ? 0.0 : 2.0;
+    return is_kept(p, line.known, line.verdict) ? 0.0 : 2.0;
 }
 #endif
 

@@ -8,6 +8,8 @@
 #include "common/cut.glsl"
 #else
 #define CUT 0u
+#define CUT_GONE 2u
+#define judge_cut(p, radius, known) 0u
 #endif
 
 layout(constant_id = 3) const uint MARKED = 0;

@@ -172,7 +172,7 @@ void draw_sample(panel_draw d, ivec2 at)
     float within = clamp(z, d.least, d.most);
     uvec2 cell = uvec2(clamp(place, vec2(0.0), vec2(float(SPL_PANEL_SIDE) - 0.5)));
     bool inside = z > 0.0 && covers(d, place) && within >= frame.near && within <= frame.far;
-    if (inside && at.y <= d.last.y && panel_has(d.own, cell) && is_kept(view_point(uv, within), d.known))
+    if (inside && at.y <= d.last.y && panel_has(d.own, cell) && is_kept(view_point(uv, within), d.known, CUT_OPEN))
         panel_fragment(d, at, within, 0.0, panel_push(d, within, tilt), place);
 }
 
@@ -210,7 +210,7 @@ void draw_cell(splat_run run, panel_draw d, uvec2 cell, vec3 p)
     tilt = PARALLEL != 0u ? plane_tilt(d, uv) : tilt;
     bool inside = z >= frame.near && z <= frame.far && place.x >= run.low.x && place.y >= run.low.y &&
                   place.x < run.high.x + 1.0 && place.y < run.high.y + 1.0;
-    if (inside && panel_has(d.own, cell) && is_kept(p, d.known))
+    if (inside && panel_has(d.own, cell) && is_kept(p, d.known, CUT_OPEN))
         panel_fragment(d, ivec2(place), z, 1.0, panel_push(d, z, tilt), vec2(cell) + 0.5);
 }
 

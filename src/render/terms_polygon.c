@@ -71,10 +71,11 @@ double spl_polygon_distance(const double *corners, uint32_t count, const double 
         const double *a = corners + 2 * i, *b = corners + 2 * ((i + 1) % count);
         const double way[2] = {b[0] - a[0], b[1] - a[1]}, off[2] = {p[0] - a[0], p[1] - a[1]};
         const double t = fmin(fmax((off[0] * way[0] + off[1] * way[1]) / (way[0] * way[0] + way[1] * way[1]), 0), 1);
-        least = fmin(least, hypot(off[0] - t * way[0], off[1] - t * way[1]));
+        const double beside[2] = {off[0] - t * way[0], off[1] - t * way[1]};
+        least = fmin(least, beside[0] * beside[0] + beside[1] * beside[1]);
         const bool above = off[1] < 0, ends_above = p[1] - b[1] < 0;
         const double side = way[0] * off[1] - way[1] * off[0];
         inside ^= above != ends_above && (ends_above ? side > 0 : side < 0);
     }
-    return inside ? -least : least;
+    return inside ? -sqrt(least) : sqrt(least);
 }

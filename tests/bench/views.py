@@ -11,6 +11,7 @@ environment: as for measure.py, and SPLATD_BENCH_ROUNDS (5)
 import contextlib
 import http.client
 import json
+import math
 import os
 import re
 import statistics
@@ -76,6 +77,10 @@ def variants(info):
     scalars = [a["name"] for a in info.get("attributes", [])]
     yield "clip=box of the middle 80 %", {"clip": f"box:{inner}"}, 1.1
     yield "clip=z below the middle", {"clip": f"z<{(low[2] + high[2]) / 2:.3f}"}, 1.1
+    for count in 6, 24:
+        turns = [2 * math.pi * i / count for i in range(count)]
+        yield f"clip=polygon of {count} corners", {"clip": "polygon:" + ",".join(
+            f"{m + 0.45 * w * f(t):.3f}" for t in turns for m, w, f in zip([(l + h) / 2 for l, h in zip(low, high)], wide, (math.cos, math.sin)))}, 1.1
     yield "color_by=height", {"color_by": "height"}, 1.1
     if "class" in scalars:
         yield "class=!5", {"class": "!5"}, 1.1
