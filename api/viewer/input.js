@@ -67,7 +67,7 @@ export function attach(stage) {
     const pixel = pointers.get(event.pointerId);
     if (!pixel) return;
     pointers.delete(event.pointerId);
-    if (event.type === "pointercancel" || pointers.size || many || button || travel >= DRAG_PX) return;
+    if (event.type === "pointercancel" || pointers.size || many || button || travel >= DRAG_PX || !stage.dataset) return;
     const twice =
       lastClick &&
       event.timeStamp - lastClick.time < DOUBLE_MS &&

@@ -140,6 +140,7 @@ async function open() {
     Object.assign(wanted, named(found, wanted, stage.size), await toWorld(found, wanted));
     if (turn !== opening) return;
     dataset = found;
+    $("panel").classList.remove("idle");
     makeParts();
     stage.pixels = limits.pixels;
     $("making-of").hidden = !tours;

@@ -1421,6 +1421,10 @@ def test_a_token_is_asked_for():
             with page(site, ready="!document.querySelector('#token').hidden", complaints="401") as tab:
                 assert tab.text("#notice p") == "A token is needed: enter it in the panel, under Token"
                 assert not tab.run("document.querySelector('#panel').hidden")
+                tab.click(300, 300)  # there is nothing to pick yet, nor to set
+                assert tab.text("#said") == ""
+                assert tab.run("[...document.querySelectorAll('#panel :is(button, select, input)')].filter(e => e.offsetParent).map(e => e.id || e.form.id)") \
+                    == ["dataset", "token", "token"]
                 for text in ("some-other-token-than-that", token):
                     tab.run(
                         f"""document.querySelector('#token input').value = '{text}';
