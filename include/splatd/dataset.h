@@ -104,6 +104,7 @@ struct spl_dataset_info {
                        eye lie behind those that face it */
     const struct spl_stream_values *stream_values; /* of each stream, borrowed until close; NULL = the file says nothing
                                                       of any */
+    const struct spl_stream_values *heights; /* z of the leaf splats, likewise; NULL = the file does not say */
     double default_fit[2]; /* degrees across and upright that the default view shows in an image of any shape; 0 = it has
                               default_fov in all of them */
     const char *title, *description;    // may be NULL; what its packer called it; borrowed until close

@@ -270,7 +270,7 @@ void spl_cmd_print_colors(FILE *out, size_t column)
                           "plane:x,y,z,nx,ny,nz, flat:COLOUR; rgb+intensity: times the splats' own (rgb)");
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --range LOW..HIGH"), column,
                           "of values, which a ramp reaches from and to: 0..200, or shares of the splats, q0.02..q0.98 "
-                          "(the latter of attributes; of heights all there are)");
+                          "(the latter of attributes; of heights all there are but strays)");
     print_changing(out, SPL_CHANGES_COLORS, column);
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
                           "for shape: none, edl (darker where what lies around is nearer), headlight, "

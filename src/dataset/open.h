@@ -66,7 +66,7 @@ struct spl_dataset {
 
     struct spl_stream streams[SPL_STREAMS_MAX]; /* info.stream_count of them */
     enum spl_stream_type stream_types[SPL_STREAMS_MAX];
-    struct spl_stream_values stream_values[SPL_STREAMS_MAX];
+    struct spl_stream_values stream_values[SPL_STREAMS_MAX], heights;
     struct spl_dictionary dictionary; /* count 0 = no textures */
     json_t *meta;
     double (*stations)[16]; // info.station_count of them; may be NULL

@@ -13,9 +13,10 @@
 #include "dataset/values.h"
 #include "dataset/writer_parts.h"
 
-/* META as the caller has it, "streams" and "counts"; NULL where memory is refused. */
+/* META as the caller has it, "streams", "heights" and "counts"; NULL where memory is refused. */
 static char *describe(const struct spl_dataset_writer *writer, const struct spl_counts *counts,
-                      const struct spl_stream_values *values, const json_t *meta)
+                      const struct spl_stream_values *values, const struct spl_stream_values *heights,
+                      const json_t *meta)
 {
     json_t *whole = json_copy((json_t *)meta), *streams = json_array();
     bool failed = false;
@@ -32,6 +33,9 @@ static char *describe(const struct spl_dataset_writer *writer, const struct spl_
     }
     failed |= json_array_size(streams) != writer->stream_count;
     failed |= json_object_set_new(whole, "streams", streams) != 0;
+    json_object_del(whole, "heights"); // of the file that this one is made of
+    if (heights->count)
+        failed |= json_object_set_new(whole, "heights", spl_values_to_json(heights)) != 0;
     failed |= json_object_set_new(whole, "counts", spl_counts_to_json(counts, writer->stream_count)) != 0;
     char *text = failed ? NULL : json_dumps(whole, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
     json_decref(whole);
@@ -153,13 +157,14 @@ static int write_rest(struct spl_dataset_writer *writer, const struct described 
 static int finish(struct spl_dataset_writer *writer, const struct described *what, const json_t *meta,
                   struct spl_error *err)
 {
-    struct spl_stream_values *values = spl_alloc(SPL_STREAMS_MAX, sizeof *values, err);
-    int gathered = values ? spl_writer_gather_values(writer, what->pages, values, err) : SPL_E_NOMEM;
+    struct spl_stream_values *values = spl_alloc(SPL_STREAMS_MAX + 1, sizeof *values, err);
+    struct spl_stream_values *heights = values + SPL_STREAMS_MAX;
+    int gathered = values ? spl_writer_gather_values(writer, what->pages, values, heights, err) : SPL_E_NOMEM;
     if (gathered) {
         free(values);
         return gathered;
     }
-    char *text = describe(writer, &what->counts, values, meta);
+    char *text = describe(writer, &what->counts, values, heights, meta);
     free(values);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %s", writer->file.path);

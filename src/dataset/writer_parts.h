@@ -42,9 +42,10 @@ static inline uint64_t spl_align(uint64_t offset, uint64_t alignment)
 int spl_writer_add_section(struct spl_dataset_writer *writer, uint32_t type, uint32_t index, const void *data,
                            size_t bytes, struct spl_error *err);
 
-/* How the values of each stream are distributed over the leaves of all pages, which are written. */
+/* How the values of each stream, and heights, are distributed over the leaves of all pages, which are written. */
 int spl_writer_gather_values(struct spl_dataset_writer *writer, const struct spl_tables *pages,
-                             struct spl_stream_values *out, struct spl_error *err);
+                             struct spl_stream_values *out, struct spl_stream_values *out_heights,
+                             struct spl_error *err);
 
 /* Writes the page being filled, where there is one. */
 int spl_writer_flush_page(struct spl_dataset_writer *writer, struct spl_error *err);

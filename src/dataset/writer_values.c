@@ -1,11 +1,12 @@
-/* What META says of the values of optional attributes, from the codes of the leaves as they were written: they are read
- * again page by page, so whoever writes a file, of whatever was packed, pruned or coloured, has them right. Owned by the
- * writer's thread. */
+/* What META says of the values of optional attributes, and of heights, from the codes of the leaves as they were written:
+ * they are read again page by page, so whoever writes a file, of whatever was packed, pruned or coloured, has them right.
+ * Owned by the writer's thread. */
 #include <stdlib.h>
 
 #include "base/memory.h"
 #include "dataset/chunk.h"
 #include "dataset/panels.h"
+#include "dataset/relief.h"
 #include "dataset/values.h"
 #include "dataset/writer_parts.h"
 
@@ -18,8 +19,29 @@ static uint64_t weight_of(const struct spl_chunk *chunk, uint32_t i)
     return points * (i + 1) / chunk->count - points * i / chunk->count;
 }
 
+/* The height of item `i` above its node's origin; of a panel that of its middle. */
+static double height_of(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i)
+{
+    if (!spl_kind_has_panels(spl_chunk_kind(chunk))) {
+        struct spl_splat splat;
+        spl_chunk_decode(chunk, page, i, &splat);
+        return (double)splat.position[2];
+    }
+    const float middle = 0.5f * SPL_PANEL_SIDE;
+    struct spl_panel_frame frame;
+    struct spl_panel panel;
+    struct spl_relief relief;
+    float at[3], normal[3];
+    spl_panels_get_frame(chunk, &frame);
+    spl_panels_decode(chunk, page, i, &panel);
+    spl_panels_get_relief(chunk, page, i, &relief);
+    spl_panels_place(&frame, &panel, &relief, middle, middle, at, normal);
+    return (double)at[2];
+}
+
 static int add_chunk(const struct spl_dataset_writer *writer, const struct spl_tables *tables, uint32_t index,
-                     const uint32_t *page, uint64_t page_words, struct spl_values *values, struct spl_error *err)
+                     double origin, const uint32_t *page, uint64_t page_words, struct spl_values *values,
+                     struct spl_values *heights, struct spl_error *err)
 {
     const struct spl_chunk *chunk = &tables->chunks[index];
     const uint64_t first = (uint64_t)chunk->geometry_word + spl_chunk_words(chunk);
@@ -29,7 +51,9 @@ static int add_chunk(const struct spl_dataset_writer *writer, const struct spl_t
         return SPL_OK;
     if (first + spl_tables_get_stream_words(tables, writer->stream_count, index) + SPL_PAGE_TAIL_WORDS > page_words)
         return SPL_OK; /* no chunk of that page: whoever opens the file refuses it */
-    for (uint32_t s = 0; s < writer->stream_count; s++) {
+    for (uint32_t i = 0; i < chunk->count && !rc; i++)
+        rc = spl_values_add(heights, origin + height_of(chunk, page, i), weight_of(chunk, i), err);
+    for (uint32_t s = 0; s < writer->stream_count && !rc; s++) {
         const struct spl_stream_code code = {tables->base[s][index], tables->width[s][index]};
         for (uint32_t i = 0; i < chunk->count && !rc; i++)
             rc = spl_values_add(&values[s], spl_stream_decode(&writer->streams[s], code, words, i),
@@ -48,14 +72,15 @@ static const struct spl_section *find_page(const struct spl_dataset_writer *writ
 }
 
 int spl_writer_gather_values(struct spl_dataset_writer *writer, const struct spl_tables *pages,
-                             struct spl_stream_values *out, struct spl_error *err)
+                             struct spl_stream_values *out, struct spl_stream_values *out_heights,
+                             struct spl_error *err)
 {
-    struct spl_values values[SPL_STREAMS_MAX] = {0};
+    struct spl_values values[SPL_STREAMS_MAX] = {0}, heights = {.too_many_kinds = true};
     uint32_t *words = NULL;
     uint64_t room = 0;
     size_t at = 0;
     int rc = SPL_OK;
-    for (uint32_t page = 0; page < writer->page_count && writer->stream_count && !rc; page++) {
+    for (uint32_t page = 0; page < writer->page_count && !rc; page++) {
         const struct spl_tables *tables = &pages[page];
         const struct spl_section *section = find_page(writer, page, &at);
         uint32_t chunk = 0;
@@ -72,8 +97,11 @@ int spl_writer_gather_values(struct spl_dataset_writer *writer, const struct spl
         for (uint32_t n = 0; n < tables->node_count; n++)
             for (uint32_t c = 0; c < tables->nodes[n].chunk_count; c++, chunk++)
                 if (!tables->nodes[n].child_count && !rc)
-                    rc = add_chunk(writer, tables, chunk, words, section->bytes / sizeof *words, values, err);
+                    rc = add_chunk(writer, tables, chunk, tables->nodes[n].origin[2], words,
+                                   section->bytes / sizeof *words, values, &heights, err);
     }
+    spl_values_sum_up(&heights, out_heights);
+    spl_values_finish(&heights);
     for (uint32_t s = 0; s < writer->stream_count; s++) {
         spl_values_sum_up(&values[s], &out[s]);
         spl_values_finish(&values[s]);

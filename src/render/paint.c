@@ -53,26 +53,39 @@ static void bound_distance(const struct spl_paint *paint, const struct spl_datas
     }
 }
 
+/* All the heights that there are, but for those of few points far off the others: a bird, an echo from below the ground. */
+static void bound_heights(const struct spl_stream_values *heights, double range[2])
+{
+    static const double far = 0.5; /* of what most lie within */
+    const double low = spl_marks_value_at(heights, quantile_low), high = spl_marks_value_at(heights, quantile_high);
+    range[0] = fmax(range[0], low - far * (high - low));
+    range[1] = fmin(range[1], high + far * (high - low));
+}
+
 static int find_ends(struct spl_paint *paint, const struct spl_color_params *color, const struct spl_dataset_info *info,
                      struct spl_error *err)
 {
-    const struct spl_stream_values *values =
-        paint->stream < 0 ? NULL : spl_dataset_info_get_values(info, (uint32_t)paint->stream);
+    const bool of_heights = color->by == SPL_COLOR_BY_HEIGHT;
+    const struct spl_stream_values *values = of_heights           ? info->heights
+                                             : paint->stream >= 0 ? spl_dataset_info_get_values(info, (uint32_t)paint->stream)
+                                                                  : NULL;
     double range[2] = {color->range[0], color->range[1]};
     const bool shares[2] = {color->has_range ? color->shares[0] : paint->stream >= 0,
                             color->has_range ? color->shares[1] : paint->stream >= 0};
     if (!color->has_range && paint->stream < 0)
         bound_distance(paint, info, range);
+    if (!color->has_range && of_heights && values)
+        bound_heights(values, range);
     for (int i = 0; i < 2; i++) {
         if (!shares[i])
             continue;
-        if (paint->stream < 0)
+        if (paint->stream < 0 && !of_heights)
             return spl_fail_field(err, SPL_E_INPUT, "range",
-                                  "range has quantiles, which distances and heights do not have; give values");
+                                  "range has quantiles, which distances do not have; give values");
         if (!values)
             return spl_fail_field(err, SPL_E_INPUT, "range",
                                   "dataset '%s' does not say how its values of '%s' are distributed; give a range of "
-                                  "values, as 0..200", info->id, color->name);
+                                  "values, as 0..200", info->id, of_heights ? "height" : color->name);
         range[i] = spl_marks_value_at(values, color->has_range ? color->range[i] : i ? quantile_high : quantile_low);
     }
     if (range[0] > range[1])
