@@ -188,6 +188,16 @@ def test_slow_servers_hold_up_nobody():
             assert slots(d)["stuck"]["state"] == "failed"
 
 
+def test_many_urls():
+    data = pathlib.Path(WALL).read_bytes()
+    with Server({f"/w{i}.spld": File(data) for i in range(90)}) as server:
+        with Daemon(FAKE, datasets=[server.url(f"w{i}.spld") for i in range(90)]) as d:
+            assert {slot["state"] for slot in opened(d).values()} == {"ready"}
+            files = [os.readlink(path) for path in pathlib.Path(f"/proc/{d.process.pid}/fd").iterdir() if path.is_symlink()]
+            # a kept connection has a socket, and two that wake it: 90 would be 270
+            assert len([name for name in files if name.startswith("socket:")]) < 3 * 64 + 24, files
+
+
 def test_a_kept_tour_waits_for_its_dataset():
     file = File(pathlib.Path(WALL).read_bytes())
     with Server({"/wall.spld": file}) as server, tempfile.TemporaryDirectory() as folder:

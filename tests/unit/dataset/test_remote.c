@@ -642,6 +642,34 @@ static void test_a_server_that_claims_exabytes(void **state)
     }
 }
 
+/* What is kept of many files is bounded for all of them together, and what was read last stays. */
+static void test_many_files(void **state)
+{
+    (void)state;
+    enum { count = 40 };
+    struct server s;
+    struct spl_dataset_source sources[count];
+    struct spl_error err = {0};
+    start(&s, SMALL);
+    const size_t before = count_held();
+    for (int i = 0; i < count; i++) {
+        sources[i] = open_with(&s, &(struct spl_remote_how){0});
+        assert_int_equal(read_range(&sources[i], &s, 2 * BLOCK, 8 * BLOCK, &err), SPL_OK);
+    }
+    if (before) // nobody counts under sanitisers
+        assert_in_range(count_held() - before, 60 << 20, 76 << 20);
+    int asks = s.asks;
+    expect_range(&sources[count - 1], &s, 2 * BLOCK, 8 * BLOCK);
+    expect_range(&sources[count - 5], &s, 2 * BLOCK, 8 * BLOCK);
+    assert_int_equal(s.asks, asks);
+    expect_range(&sources[0], &s, 2 * BLOCK, 8 * BLOCK); // longest ago
+    assert_int_equal(s.asks, asks + 1);
+    for (int i = 0; i < count; i++)
+        spl_dataset_source_close(&sources[i]);
+    assert_true(count_held() <= before + (1 << 20));
+    stop(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -651,7 +679,7 @@ int main(void)
         cmocka_unit_test(test_a_file_that_changes),            cmocka_unit_test(test_equal_requests_are_joined),
         cmocka_unit_test(test_crowd),                          cmocka_unit_test(test_cancelling),
         cmocka_unit_test(test_the_page_cache),                 cmocka_unit_test(test_bytes_that_are_spoilt),
-        cmocka_unit_test(test_a_server_that_claims_exabytes),
+        cmocka_unit_test(test_a_server_that_claims_exabytes),  cmocka_unit_test(test_many_files),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }
