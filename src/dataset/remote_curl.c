@@ -211,6 +211,10 @@ static bool set_up(const struct server *server, CURL *handle, struct exchange *e
     SET(CURLOPT_HTTPHEADER, *headers);
     SET(CURLOPT_CONNECTTIMEOUT_MS, (long)ask->connect_ms);
     SET(CURLOPT_TIMEOUT_MS, left_ms < 86400000 ? (long)left_ms : 86400000L);
+#if LIBCURL_VERSION_NUM >= 0x075700
+    /* a name that is still looked up at the deadline goes on without us; a library that is older than its header refuses */
+    curl->curl_easy_setopt(handle, CURLOPT_QUICK_EXIT, 1L);
+#endif
     curl->curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 256L << 10); // refused where a handle still has its buffer
     SET(CURLOPT_HEADERFUNCTION, on_header);
     SET(CURLOPT_HEADERDATA, e);

@@ -188,6 +188,16 @@ def test_slow_servers_hold_up_nobody():
             assert slots(d)["stuck"]["state"] == "failed"
 
 
+def test_names_that_take_long():
+    """A resolver that does not answer is waited for no longer than a server."""
+    with Daemon(FAKE, "--remote-deadline", "1000", "--watch", "0", datasets=["http://far.slow/hall.spld", WALL],
+                LD_PRELOAD=os.environ["SPLATD_SLOW_DISK"]) as d:
+        began = time.monotonic()
+        now = opened(d)["hall"]
+        assert now["state"] == "failed" and "given up after" in now["reason"], now
+        assert time.monotonic() - began < 10 and d.ask("/v1/datasets/wall/view?width=16&height=16").status == 200
+
+
 def test_many_urls():
     data = pathlib.Path(WALL).read_bytes()
     with Server({f"/w{i}.spld": File(data) for i in range(90)}) as server:
