@@ -1,6 +1,7 @@
 /* A packed dataset (NAME.spld), read-only. api/format.md documents the file byte by byte.
  *
  * Threads: open and close on any one thread; between them every call below may run on any thread at once.
+ * A dataset is a file, what a reader gives, or an object at a URL, which takes longer and can fail whenever it is read.
  * A file that is renamed over or removed goes on being what it was. One that is cut or overwritten in place makes
  * frames that need its pages anew fail with SPL_E_CORRUPT. */
 #ifndef SPLATD_DATASET_H
@@ -130,8 +131,17 @@ static inline const struct spl_stream_values *spl_dataset_info_get_values(const 
  * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the
  * caller owns *out. Blocks on disk.
  * A path that begins with https://, http:// or s3:// is asked of that server (api/remote.md), with the keys of the
- * process's environment, and may block for minutes: do not pass on paths of strangers. Pages are then held against their
- * checksums when they are read, whatever `verify` says. */
+ * process's environment: do not pass on paths of strangers. Pages are then held against their checksums when they are
+ * read, whatever `verify` says.
+ * Deadlines of one: a read asks again until nothing has come for 30 s, and takes 10 s more for each MiB at most, looking
+ * up names of hosts included; opening takes as many reads as the dataset's tables need. A `cancel` ends each within a
+ * second or two. What reads while it is open blocks as long: spl_dataset_find_value() the thread that calls it, pages
+ * the renderer's own threads, where frames have their deadlines.
+ * Errors of one: SPL_E_USAGE (no URL that can be one, half of a key), SPL_E_UNSUPPORTED (there is no libcurl),
+ * SPL_E_NOT_FOUND (404, 410), SPL_E_INPUT (no byte ranges, an empty file), SPL_E_TIMEOUT (given up; another attempt may
+ * do), SPL_E_IO (anything else that its server refuses), SPL_E_CANCELLED, and SPL_E_CORRUPT, also where the file has
+ * changed at its server since it was opened: then only what is here already can be drawn, and it is to be opened anew.
+ * Messages have the URL without user, password and query. */
 SPL_API int spl_dataset_open(const char *path, bool verify, struct spl_dataset **out, struct spl_error *err);
 
 /* Bytes that do not lie in a file of their own: in an archive, in memory, on a server. */
@@ -186,8 +196,8 @@ SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, ui
 
 /* Reads the value that splat `id` has in stream `stream` (of info.streams; less than 0: none): NaN where it is one of
  * those that have no value. False (*value untouched) where there is no such splat, it is the vertex of a wire, the
- * stream is of a type that this library does not know, or the file was cut short in place. Any thread; blocks on
- * disk. */
+ * stream is of a type that this library does not know, the file was cut short in place, or its server could not be
+ * read. Any thread; blocks on disk, or on its server. */
 SPL_API bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
 
 SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */

@@ -16,6 +16,7 @@
 #define SPL_PAGE_BYTES_MAX (64u << 20)
 #define SPL_HEAD_BYTES_MAX (16u << 20) /* the writer begins a new page rather than a longer head */
 #define SPL_NODE_CHUNKS_MAX 4096u
+#define SPL_SECTIONS_MAX (1u << 22) /* pages of 32 TiB, and what belongs to them */
 #define SPL_META_BYTES_MAX (8u << 20) /* JSON takes some fifty times as much memory at worst */
 
 struct spl_file_header { /* at offset 0 */

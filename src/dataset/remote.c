@@ -1,6 +1,7 @@
 /* A remote file by blocks of 1 MiB: what is asked for small, as tables are, comes as the blocks that it lies in, and what
  * is asked for large, as pages are, as one range of all its blocks that are missing. Blocks that somebody is fetching are
- * waited for, not fetched again. Some of the last used stay in memory, all go to the page cache, if there is one.
+ * waited for, not fetched again. Some of the last used stay in memory, of a file and of all together, and all go to the page
+ * cache, if there is one.
  *
  * Invariant: a block in the list is WANTED, and then one thread is about to end that, or READY and never written again.
  * One that fails leaves the list before its users hear of it, so whoever comes later fetches it anew. Who has the claim
@@ -20,7 +21,7 @@
 #include "dataset/remote_counts.h"
 #include "dataset/remote_run.h"
 
-enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of one request */, kept = 8 /* in memory, unused */,
+enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of one request */, kept = 8 /* in memory, unused */, kept_of_all = 64,
        forgotten_most = 1 << 16 /* on disk */ };
 
 struct spl_remote_counts spl_remote_counts;
@@ -39,6 +40,7 @@ struct block {
 TAILQ_HEAD(block_list, block);
 
 struct remote {
+    TAILQ_ENTRY(remote) link; // guarded by: all.mutex
     struct spl_remote_origin origin;
     struct spl_page_cache *cache; // may be NULL
     struct spl_page_key key;
@@ -48,6 +50,13 @@ struct remote {
     unsigned listed;
     uint64_t expected, expected_end; /* bytes that are wanted soon */
 };
+
+/* Open ones, those that were read last behind the others. Its mutex is taken before one of theirs. */
+static struct {
+    pthread_mutex_t mutex;
+    TAILQ_HEAD(, remote) remotes; // guarded by: mutex
+    _Atomic uint64_t blocks; /* listed */
+} all = {.mutex = PTHREAD_MUTEX_INITIALIZER, .remotes = TAILQ_HEAD_INITIALIZER(all.remotes)};
 
 /* What one read has of blocks, from index `first` on. */
 struct claim {
@@ -77,20 +86,39 @@ static void unlist(struct remote *remote, struct block *block)
     if (block->listed)
         TAILQ_REMOVE(&remote->blocks, block, link);
     remote->listed -= block->listed;
+    atomic_fetch_sub(&all.blocks, block->listed);
     block->listed = false;
     if (!block->users)
         free(block);
 }
 
-/* Forgets what was not used for longest. */
-static void trim(struct remote *remote)
+/* Forgets what was not used for longest. The mutex is held. */
+static void trim(struct remote *remote, unsigned most)
 {
     struct block *block, *next;
-    for (block = TAILQ_FIRST(&remote->blocks); block && remote->listed > kept; block = next) {
+    for (block = TAILQ_FIRST(&remote->blocks); block && remote->listed > most; block = next) {
         next = TAILQ_NEXT(block, link);
         if (!block->users)
             unlist(remote, block);
     }
+}
+
+/* `remote` was read just now: what others keep goes first, of those whose last read is longest ago. */
+static void trim_all(struct remote *remote)
+{
+    pthread_mutex_lock(&all.mutex);
+    TAILQ_REMOVE(&all.remotes, remote, link);
+    TAILQ_INSERT_TAIL(&all.remotes, remote, link);
+    struct remote *other;
+    TAILQ_FOREACH(other, &all.remotes, link)
+    {
+        if (other == remote || atomic_load(&all.blocks) <= kept_of_all)
+            break;
+        pthread_mutex_lock(&other->mutex);
+        trim(other, 0);
+        pthread_mutex_unlock(&other->mutex);
+    }
+    pthread_mutex_unlock(&all.mutex);
 }
 
 static struct block *add(struct remote *remote, uint64_t index, struct spl_error *err)
@@ -102,6 +130,7 @@ static struct block *add(struct remote *remote, uint64_t index, struct spl_error
     *block = (struct block){.index = index, .state = WANTED, .listed = true, .bytes = bytes};
     TAILQ_INSERT_TAIL(&remote->blocks, block, link);
     remote->listed++;
+    atomic_fetch_add(&all.blocks, 1);
     return block;
 }
 
@@ -262,8 +291,9 @@ static int fetch_window(struct remote *remote, uint64_t offset, char *out, size_
     for (unsigned i = 0; i < claim.count; i++)
         if (!--claim.blocks[i]->users && !claim.blocks[i]->listed)
             free(claim.blocks[i]);
-    trim(remote);
+    trim(remote, kept);
     pthread_mutex_unlock(&remote->mutex);
+    trim_all(remote);
     return rc;
 }
 
@@ -352,6 +382,9 @@ static void release(struct remote *remote)
 static void close_remote(void *context)
 {
     struct remote *remote = context;
+    pthread_mutex_lock(&all.mutex);
+    TAILQ_REMOVE(&all.remotes, remote, link);
+    pthread_mutex_unlock(&all.mutex);
     remote->origin.link.close(remote->origin.link.context);
     release(remote);
 }
@@ -378,6 +411,7 @@ static int read_first(struct remote *remote, struct spl_error *err)
     }
     TAILQ_INSERT_TAIL(&remote->blocks, block, link);
     remote->listed = 1;
+    atomic_fetch_add(&all.blocks, 1);
     return SPL_OK;
 }
 
@@ -415,6 +449,10 @@ int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, 
         remote->key = spl_page_key_of(shown, *state->etag ? state->etag : state->modified, state->size);
     }
     origin->opened = true;
+    pthread_mutex_lock(&all.mutex);
+    TAILQ_INSERT_TAIL(&all.remotes, remote, link);
+    pthread_mutex_unlock(&all.mutex);
+    trim_all(remote);
     *out = (struct spl_dataset_source){
         .size = state->size, .close = close_remote, .context = remote, .far = &far, .owned = true};
     return SPL_OK;

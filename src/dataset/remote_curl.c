@@ -1,5 +1,5 @@
 /* Requests over HTTP/1.1 and 2, through libcurl. Handles are lent to one request at a time and kept with their connections,
- * so that neighbours in time need no new one.
+ * so that neighbours in time need no new one: some of a server, and of all some that were used last.
  *
  * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http. Bytes
  * of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password, query, keys)
@@ -13,23 +13,31 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/queue.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
 #include "base/work.h"
 #include "dataset/remote_curl.h"
 
-enum { handles_kept = 8, redirects_most = 5, refusal_bytes = 1024, swallowed_most = 64 << 10 };
+enum { handles_kept = 8, handles_kept_of_all = 64, redirects_most = 5, refusal_bytes = 1024, swallowed_most = 64 << 10 };
 
 struct server {
     const struct spl_curl *curl;
     char *url;
     bool tls, s3, sign;
     char *key_id, *secret, *token_header, *provider; // NULL where nothing is signed
-    pthread_mutex_t mutex;
-    CURL *kept[handles_kept]; // guarded by: mutex
-    unsigned kept_count;      // guarded by: mutex
+    TAILQ_ENTRY(server) link; // guarded by: parked.mutex, as all below; in its list where it has some
+    CURL *kept[handles_kept];
+    unsigned kept_count;
 };
+
+/* Handles that nobody uses; those servers that were given one last stand behind the others. */
+static struct {
+    pthread_mutex_t mutex;
+    TAILQ_HEAD(, server) servers;
+    unsigned handles;
+} parked = {.mutex = PTHREAD_MUTEX_INITIALIZER, .servers = TAILQ_HEAD_INITIALIZER(parked.servers)};
 
 /* One request under way. */
 struct exchange {
@@ -203,6 +211,10 @@ static bool set_up(const struct server *server, CURL *handle, struct exchange *e
     SET(CURLOPT_HTTPHEADER, *headers);
     SET(CURLOPT_CONNECTTIMEOUT_MS, (long)ask->connect_ms);
     SET(CURLOPT_TIMEOUT_MS, left_ms < 86400000 ? (long)left_ms : 86400000L);
+#if LIBCURL_VERSION_NUM >= 0x075700
+    /* a name that is still looked up at the deadline goes on without us; a library that is older than its header refuses */
+    curl->curl_easy_setopt(handle, CURLOPT_QUICK_EXIT, 1L);
+#endif
     curl->curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 256L << 10); // refused where a handle still has its buffer
     SET(CURLOPT_HEADERFUNCTION, on_header);
     SET(CURLOPT_HEADERDATA, e);
@@ -222,24 +234,40 @@ static bool set_up(const struct server *server, CURL *handle, struct exchange *e
     return !refused;
 }
 
+/* The mutex is held. */
+static CURL *unpark(struct server *server)
+{
+    CURL *handle = server->kept[--server->kept_count];
+    parked.handles--;
+    if (!server->kept_count)
+        TAILQ_REMOVE(&parked.servers, server, link);
+    return handle;
+}
+
 static CURL *take_handle(struct server *server)
 {
-    pthread_mutex_lock(&server->mutex);
-    CURL *handle = server->kept_count ? server->kept[--server->kept_count] : NULL;
-    pthread_mutex_unlock(&server->mutex);
+    pthread_mutex_lock(&parked.mutex);
+    CURL *handle = server->kept_count ? unpark(server) : NULL;
+    pthread_mutex_unlock(&parked.mutex);
     return handle ? handle : server->curl->curl_easy_init();
 }
 
 static void give_handle(struct server *server, CURL *handle)
 {
     server->curl->curl_easy_reset(handle);
-    pthread_mutex_lock(&server->mutex);
-    bool room = server->kept_count < handles_kept;
-    if (room)
+    pthread_mutex_lock(&parked.mutex);
+    if (server->kept_count)
+        TAILQ_REMOVE(&parked.servers, server, link);
+    TAILQ_INSERT_TAIL(&parked.servers, server, link);
+    CURL *surplus = server->kept_count == handles_kept ? handle : NULL;
+    if (!surplus) {
         server->kept[server->kept_count++] = handle;
-    pthread_mutex_unlock(&server->mutex);
-    if (!room)
-        server->curl->curl_easy_cleanup(handle);
+        if (++parked.handles > handles_kept_of_all)
+            surplus = unpark(TAILQ_FIRST(&parked.servers));
+    }
+    pthread_mutex_unlock(&parked.mutex);
+    if (surplus)
+        server->curl->curl_easy_cleanup(surplus);
 }
 
 static void ask(void *context, const struct spl_remote_ask *what, struct spl_remote_reply *reply)
@@ -274,9 +302,14 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
 static void close_server(void *context)
 {
     struct server *server = context;
-    for (unsigned i = 0; i < server->kept_count; i++)
-        server->curl->curl_easy_cleanup(server->kept[i]);
-    pthread_mutex_destroy(&server->mutex);
+    CURL *handles[handles_kept];
+    unsigned count = 0;
+    pthread_mutex_lock(&parked.mutex);
+    while (server->kept_count)
+        handles[count++] = unpark(server);
+    pthread_mutex_unlock(&parked.mutex);
+    while (count)
+        server->curl->curl_easy_cleanup(handles[--count]);
     if (server->secret)
         explicit_bzero(server->secret, strlen(server->secret));
     free(server->url);
@@ -303,7 +336,6 @@ int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_a
     struct server *server = spl_alloc(1, sizeof *server, err);
     if (!server)
         return SPL_E_NOMEM;
-    pthread_mutex_init(&server->mutex, NULL);
     server->curl = curl;
     server->tls = url->tls;
     server->s3 = url->s3;

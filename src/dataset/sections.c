@@ -13,9 +13,13 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "dataset/dictionary.h"
 #include "dataset/open.h"
 
 enum { table_alignment = 8 };
+
+/* A texel has 4 bytes when it is expanded, and of three coefficients of 37 bits at most. */
+#define ATOMS_BYTES_MAX (4ull * SPL_DICTIONARY_BYTES_MAX)
 
 /* A kind of section: a row to add, not code. */
 static const struct kind {
@@ -34,11 +38,11 @@ static const struct kind {
                        .bytes_max = SPL_META_BYTES_MAX, .wrong_size = "is larger than 8 MiB",
                        .check = spl_dataset_check_meta},
     [SPL_KIND_DIRECTORY] = {SPL_SECTION_DIRECTORY, .kept = true, .alignment = 64,
-                            .item_bytes = sizeof(struct spl_page_row), .bytes_max = UINT64_MAX,
-                            .wrong_size = "is not a whole number of rows", .check = spl_dataset_check_directory},
+                            .item_bytes = sizeof(struct spl_page_row), .bytes_max = (SPL_SECTIONS_MAX + 1ull) * sizeof(struct spl_page_row),
+                            .wrong_size = "is not a whole number of rows, or has too many", .check = spl_dataset_check_directory},
     [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .group = TEXTURES, .kept = true, .alignment = 64, .item_bytes = 1,
-                        .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = UINT64_MAX,
-                        .wrong_size = "is shorter than its header", .check = spl_dataset_check_dictionary},
+                        .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = ATOMS_BYTES_MAX,
+                        .wrong_size = "is shorter than its header, or longer than a dictionary can be", .check = spl_dataset_check_dictionary},
     [SPL_KIND_STATIONS] = {SPL_SECTION_STATIONS, .group = MAPS, .kept = true, .alignment = 64,
                            .item_bytes = sizeof(struct spl_map_row), .bytes_min = sizeof(struct spl_map_row),
                            .bytes_max = SPL_MAPS_MAX * sizeof(struct spl_map_row),
@@ -147,17 +151,41 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
     return SPL_OK;
 }
 
+/* Bytes of the source, malloc'd; NULL and `err` when they cannot be read. From a server memory is taken as they come: how
+ * many there are is only said until then. */
+static void *copy_bytes(const struct spl_dataset *dataset, uint64_t offset, uint64_t bytes, struct spl_error *err)
+{
+    const uint64_t block = 16 << 20;
+    uint64_t room = dataset->source.far && bytes > block ? block : bytes;
+    char *copy = spl_alloc_raw(room, 1, err);
+    for (uint64_t done = 0, some; copy && done < bytes; done += some) {
+        some = bytes - done < block ? bytes - done : block;
+        char *larger = copy;
+        if (done + some > room) {
+            room = room < bytes / 2 ? 2 * room : bytes;
+            if ((larger = spl_realloc(copy, room, 1, err)))
+                copy = larger;
+        }
+        if (!larger || spl_dataset_check_cancelled(dataset, err) ||
+            spl_dataset_read(dataset, offset + done, copy + done, some, err)) {
+            free(copy);
+            return NULL;
+        }
+    }
+    return copy;
+}
+
 static int read_table(struct spl_dataset *dataset, const struct spl_file_header *header, struct spl_error *err)
 {
     uint64_t offset = header->table_offset, bytes = (uint64_t)header->section_count * sizeof(struct spl_section);
     if (offset < sizeof *header || offset % table_alignment || offset > dataset->source.size ||
         bytes > dataset->source.size - offset)
         return corrupt(dataset, err, "section table", "lies outside the file");
-    if (!(dataset->sections = spl_alloc_raw(header->section_count, sizeof *dataset->sections, err)))
-        return SPL_E_NOMEM;
-    int rc = spl_dataset_read(dataset, offset, dataset->sections, bytes, err);
-    if (rc)
-        return rc;
+    if (header->section_count > SPL_SECTIONS_MAX)
+        return corrupt(dataset, err, "section table", "has more than 4194304 rows");
+    struct spl_error why = {0};
+    if (!(dataset->sections = copy_bytes(dataset, offset, bytes, &why)))
+        return spl_fail(err, why.code, "%s", why.message);
     if (header->table_hash != XXH3_64bits(dataset->sections, bytes))
         return corrupt(dataset, err, "section table", "fails its checksum");
     dataset->section_count = header->section_count;
@@ -183,22 +211,6 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
         end = s->offset + s->bytes;
     }
     return SPL_OK;
-}
-
-/* A section as it is in the file, malloc'd; NULL and `err` when it cannot be read. */
-static void *copy_section(const struct spl_dataset *dataset, const struct spl_section *section, struct spl_error *err)
-{
-    const uint64_t block = 16 << 20;
-    char *copy = spl_alloc_raw(section->bytes, 1, err);
-    for (uint64_t done = 0; copy && done < section->bytes; done += block) {
-        uint64_t left = section->bytes - done;
-        if (spl_dataset_check_cancelled(dataset, err) ||
-            spl_dataset_read(dataset, section->offset + done, copy + done, left < block ? left : block, err)) {
-            free(copy);
-            return NULL;
-        }
-    }
-    return copy;
 }
 
 /* How many sections of a kind a file has that has any of its group. */
@@ -287,7 +299,7 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
     for (uint32_t i = 0; i < dataset->section_count; i++) {
         const struct kind *kind = kind_of(&dataset->sections[i]);
         struct spl_error why = {0};
-        if (kind && kind->kept && !(dataset->copies[i] = copy_section(dataset, &dataset->sections[i], &why)))
+        if (kind && kind->kept && !(dataset->copies[i] = copy_bytes(dataset, dataset->sections[i].offset, dataset->sections[i].bytes, &why)))
             return spl_fail(err, why.code, "%s", why.message);
     }
     dataset->pages = dataset->found[SPL_KIND_PAGES].at;

@@ -1,7 +1,8 @@
 /* The io threads; see io.h.
  *
- * Invariants: `staged` counts the bytes of reads under way and of those ended that were not given back, and is raised
- * before memory is taken; it exceeds SPL_IO_BYTES only for one read alone. Memory that is given back while there is
+ * Invariants: staged[far] counts the bytes of reads under way and of those ended that were not given back, from afar or
+ * not, and is raised before memory is taken; it exceeds SPL_IO_BYTES only for one read alone, and from afar by what hangs,
+ * SPL_IO_HANGING_BYTES at most. Memory that is given back while there is
  * more to read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one
  * list at a time, but for those taken, which are in none. Of a source as many reads are under way as it says; a thread
  * is begun where one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them,
@@ -32,7 +33,8 @@ struct spl_io {
     struct read_list free, waiting, being_read, ended;
     unsigned threads, idle, reading; /* idle: that look for work, or are about to */
     size_t used, under_way;          /* not free; of these, waiting, being read or ended */
-    uint64_t staged, numbers, moved_ns;
+    uint64_t staged[2], numbers, moved_ns;
+    size_t used_far;
     struct spl_spares spares;
     struct spl_io_read reads[READS];
 };
@@ -83,25 +85,51 @@ static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
     return any_hangs || count >= (what->at_once ? what->at_once : 1);
 }
 
-/* The best that waits for a thread only, if there is room for it. */
-static struct spl_io_read *choose(struct spl_io *io)
+/* Is there memory for it, and from afar a thread? */
+static bool has_room(struct spl_io *io, const struct spl_io_read *next)
+{
+    const uint64_t staged = io->staged[next->far];
+    uint64_t hanging = 0;
+    unsigned from_afar = 0;
+    struct spl_io_read *read;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    {
+        from_afar += read->far;
+        hanging += next->far && read->far && hangs(read) ? read->what.bytes : 0;
+    }
+    if (hanging > SPL_IO_HANGING_BYTES)
+        hanging = SPL_IO_HANGING_BYTES;
+    return (!next->far || from_afar < SPL_IO_THREADS / 4 * 3) &&
+           (staged <= hanging || staged - hanging + next->what.bytes <= SPL_IO_BYTES);
+}
+
+/* The best that waits for a thread only, of those from afar or of the others, if there is room for it. */
+static struct spl_io_read *choose_of(struct spl_io *io, bool far)
 {
     struct spl_io_read *best = NULL, *read;
     TAILQ_FOREACH(read, &io->waiting, link)
-    if ((!best || goes_before(read, best)) && !is_busy(io, &read->what))
+    if (read->far == far && (!best || goes_before(read, best)) && !is_busy(io, &read->what))
         best = read;
-    return best && (!io->staged || io->staged + best->what.bytes <= SPL_IO_BYTES) ? best : NULL;
+    return best && has_room(io, best) ? best : NULL;
+}
+
+static struct spl_io_read *choose(struct spl_io *io)
+{
+    struct spl_io_read *near = choose_of(io, false), *far = choose_of(io, true);
+    return !near || (far && goes_before(far, near)) ? far : near;
 }
 
 static void give_back(struct spl_io *io, struct spl_io_read *read)
 {
+    io->used_far -= read->far;
     if (read->data) {
-        io->staged -= read->what.bytes;
+        io->staged[read->far] -= read->what.bytes;
+        const uint64_t staged = io->staged[0] + io->staged[1];
         io->moved_ns = spl_now_ns(); // there is room again: nothing hung if it was waited for
         if (!io->under_way)
             spl_spares_drop(&io->spares);
         spl_spares_keep(&io->spares, read->data, read->room,
-                        io->under_way && io->staged < SPL_IO_BYTES ? SPL_IO_BYTES - io->staged : 0);
+                        io->under_way && staged < SPL_IO_BYTES ? SPL_IO_BYTES - staged : 0);
     }
     *read = (struct spl_io_read){.state = FREE};
     TAILQ_INSERT_HEAD(&io->free, read, link);
@@ -147,7 +175,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     size_t room;
     void *data = spl_spares_take(&io->spares, what.bytes, &room);
     io->reading++;
-    io->staged += what.bytes;
+    io->staged[read->far] += what.bytes;
     io->moved_ns = read->began_ns;
     see_to_waiting(io);
     pthread_mutex_unlock(&io->mutex);
@@ -176,7 +204,7 @@ static void perform(struct spl_io *io, struct spl_io_read *read)
     read->room = room;
     read->err = err;
     if (!data)
-        io->staged -= what.bytes;
+        io->staged[read->far] -= what.bytes;
     if (read->unwanted) {
         io->under_way--;
         give_back(io, read);
@@ -298,10 +326,14 @@ struct spl_io_read *spl_io_try_begin(struct spl_io *io, const struct spl_io_what
     struct spl_io_read *read = TAILQ_FIRST(&io->free);
     if (io->used >= SPL_IO_READS && count_of(io, what->source) >= SPL_IO_READS)
         read = NULL;
+    const bool far = what->get_moved_ns;
+    if (far && io->used_far >= READS / 4 * 3)
+        read = NULL;
     if (read) {
         io->used++;
+        io->used_far += far;
         TAILQ_REMOVE(&io->free, read, link);
-        *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .state = WAITS};
+        *read = (struct spl_io_read){.what = *what, .rank = rank, .number = io->numbers++, .far = far, .state = WAITS};
         TAILQ_INSERT_TAIL(&io->waiting, read, link);
         io->under_way++;
         if (!is_busy(io, what)) // a thread turns to it
@@ -341,7 +373,7 @@ void *spl_io_take_data(struct spl_io *io, struct spl_io_read *read)
     pthread_mutex_lock(&io->mutex);
     void *data = read->data;
     spl_assert(read->state == TAKEN && data);
-    io->staged -= read->what.bytes;
+    io->staged[read->far] -= read->what.bytes;
     read->data = NULL;
     pthread_mutex_unlock(&io->mutex);
     return data;
@@ -389,9 +421,21 @@ bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns)
     return ended;
 }
 
+static size_t count_hanging(struct spl_io *io)
+{
+    size_t count = 0;
+    const struct spl_io_read *read;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    count += hangs(read);
+    if (count && !TAILQ_EMPTY(&io->waiting)) // what hangs by now has made room
+        see_to_waiting(io);
+    return count;
+}
+
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source)
 {
     pthread_mutex_lock(&io->mutex);
+    count_hanging(io); // who waits for pages asks this, again and again
     const struct spl_io_read *own = find_being_read(io, source);
     uint64_t moved_ns = own ? get_sign_ns(own) : io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
@@ -409,11 +453,8 @@ bool spl_io_hangs(struct spl_io *io, const void *source)
 
 size_t spl_io_count_hanging(struct spl_io *io)
 {
-    size_t count = 0;
-    const struct spl_io_read *read;
     pthread_mutex_lock(&io->mutex);
-    TAILQ_FOREACH(read, &io->being_read, link)
-    count += hangs(read);
+    size_t count = count_hanging(io);
     pthread_mutex_unlock(&io->mutex);
     return count;
 }

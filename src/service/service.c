@@ -287,6 +287,9 @@ int spl_service_run(const struct spl_service_options *options, struct spl_error 
                                     .views = &house->views,
                                     .library = &house->library,
                                     .ops = &house->ops};
+    char threads[16];
+    snprintf(threads, sizeof threads, "%d", SPL_POOL_THREADS);
+    setenv("UV_THREADPOOL_SIZE", threads, 0); // read when the pool begins; there are no other threads yet
     raise_descriptor_limit(options);
     int rc = init_loop(service, err);
     if (rc)

@@ -83,8 +83,10 @@ class Daemon:
                 self.port = int(found[1])
             if line.rstrip().endswith("ready"):
                 break
-        self.ready_s = time.monotonic() - began
         threading.Thread(target=self.process.stderr.read, daemon=True).start()
+        while json.loads(self.ask("/v1/datasets")[2])["datasets"][0]["state"] == "loading":  # what is on a server is opened then
+            time.sleep(0.01)
+        self.ready_s = time.monotonic() - began
 
     def ask(self, path):
         began = time.monotonic()

@@ -4,11 +4,12 @@ was kept outlives the daemon, and is not trusted."""
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
 
-from harness import FAKE, REAL, SANITIZED, Daemon, Skipped, eventually, fresh, run, together
+from harness import FAKE, REAL, SANITIZED, WALL, Daemon, Skipped, eventually, fresh, run, together
 from range_server import File, Server
 
 if os.environ.get("SPLATD_REMOTE") == "0":
@@ -27,7 +28,15 @@ COARSE = "view?width=96&height=64&format=png"
 ACCOUNT = ("AKIDEXAMPLE", SECRET, "eu-central-1")
 
 
+def opened(daemon):
+    """What comes from servers is opened beside the service: once that was tried."""
+    eventually(lambda: all(slot["state"] != "loading" for slot in slots(daemon).values()))
+    return slots(daemon)
+
+
 def view(daemon, dataset, query=QUERY):
+    if slots(daemon)[dataset]["state"] == "loading":
+        opened(daemon)
     reply = daemon.ask(fresh(f"/v1/datasets/{dataset}/{query}"))
     assert reply.status == 200, reply.body
     assert reply.headers["Splatd-Complete"] == "true"
@@ -88,8 +97,7 @@ def test_what_is_refused_is_a_state():
     with Server({f"/s/{name}.spld": file for name, (file, *_) in files.items() if file}, moved={"/s/loop.spld": "/s/loop.spld"}) as server:
         urls = [server.url(f"s/{name}.spld?key={SECRET}") for name in files]
         with Daemon(REAL, "--remote-deadline", "1000", "--watch", "100", datasets=[*urls, TREE]) as d:
-            eventually(lambda: all(slot["state"] != "loading" for slot in slots(d).values()))
-            now = slots(d)
+            now = opened(d)
             for name, (_, *parts) in files.items():
                 if parts[0]:
                     assert now[name]["state"] == "failed" and all(part in now[name]["reason"] for part in parts), now[name]
@@ -114,7 +122,7 @@ def test_a_file_that_changes():
         shutil.copy(TREE, f"{folder}/before.spld")
         shutil.copy(WALL_LARGE, f"{folder}/after.spld")
         with Daemon(REAL, "--watch", "300", datasets=[server.url("hall.spld"), folder]) as d:
-            version = slots(d)["hall"]["version"]
+            version = opened(d)["hall"]["version"]
             with file.lock:
                 file.data, file.etag = later, '"2"'
             reply = d.ask(f"/v1/datasets/hall/{QUERY}")
@@ -159,18 +167,68 @@ def test_a_page_cache():
 def test_slow_servers_hold_up_nobody():
     slow, stuck = File(DATA, delay_s=0.8), File(DATA, delay_s=20)
     with Server({"/slow.spld": slow, "/hall.spld": File(DATA)}) as server, Server({"/stuck.spld": stuck}) as other:
-        with Daemon(REAL, "--remote-deadline", "4000", "--watch", "100", "--deadline", "30000",
-                    datasets=[server.url("slow.spld"), other.url("stuck.spld"), TREE],
-                    wait_for="health and metrics on|message.*health and metrics") as d:
-            began = time.monotonic()  # they are being opened: the loop answers
-            assert d.ops("/healthz").status == 200 and time.monotonic() - began < 1 + 9 * SANITIZED
-            eventually(lambda: d.ops("/readyz").status == 200)
-            assert slots(d)["stuck"]["state"] == "failed"
+        with Daemon(REAL, "--remote-deadline", "4000", "--watch", "0", "--deadline", "30000",
+                    datasets=[server.url("slow.spld"), other.url("stuck.spld"), TREE]) as d:
+            began = time.monotonic()  # it is not waited for
+            assert d.ops("/readyz").status == 200 and slots(d)["tree"]["state"] == "ready"
+            assert slots(d)["stuck"]["state"] == "loading"
+            assert d.ask(f"/v1/datasets/stuck/{COARSE}").status == 503
+            truth = view(d, "tree", COARSE)
+            assert slots(d)["stuck"]["state"] == "loading" and time.monotonic() - began < 3 + 20 * SANITIZED
+            eventually(lambda: slots(d)["slow"]["state"] == "ready")
             coarse = view(d, "slow", COARSE)
             part = d.ask(fresh(f"/v1/datasets/slow/{QUERY}&wait=0"))  # what is here: coarse, and said to be so
             assert part.status == 200 and part.headers["Splatd-Complete"] == "false", part.headers
             whole = together(2, lambda i: view(d, "tree" if i else "slow"))
-            assert whole[0] == whole[1] != part.body and coarse == view(d, "tree", COARSE)
+            assert whole[0] == whole[1] != part.body and coarse == truth
+            assert opened(d)["stuck"]["state"] == "failed"
+        with Daemon(REAL, "--remote-deadline", "2000", "--watch", "0", datasets=[other.url("stuck.spld")]) as d:
+            assert d.ops("/readyz").status == 503  # until it was tried, where it is all that there is
+            eventually(lambda: d.ops("/readyz").status == 200)
+            assert slots(d)["stuck"]["state"] == "failed"
+
+
+def test_names_that_take_long():
+    """A resolver that does not answer is waited for no longer than a server."""
+    with Daemon(FAKE, "--remote-deadline", "1000", "--watch", "0", datasets=["http://far.slow/hall.spld", WALL],
+                LD_PRELOAD=os.environ["SPLATD_SLOW_DISK"]) as d:
+        began = time.monotonic()
+        now = opened(d)["hall"]
+        assert now["state"] == "failed" and "given up after" in now["reason"], now
+        assert time.monotonic() - began < 10 and d.ask("/v1/datasets/wall/view?width=16&height=16").status == 200
+
+
+def test_many_urls():
+    data = pathlib.Path(WALL).read_bytes()
+    with Server({f"/w{i}.spld": File(data) for i in range(90)}) as server:
+        with Daemon(FAKE, datasets=[server.url(f"w{i}.spld") for i in range(90)]) as d:
+            assert {slot["state"] for slot in opened(d).values()} == {"ready"}
+            files = [os.readlink(path) for path in pathlib.Path(f"/proc/{d.process.pid}/fd").iterdir() if path.is_symlink()]
+            # a kept connection has a socket, and two that wake it: 90 would be 270
+            assert len([name for name in files if name.startswith("socket:")]) < 3 * 64 + 24, files
+
+
+def test_a_kept_tour_waits_for_its_dataset():
+    file = File(pathlib.Path(WALL).read_bytes())
+    with Server({"/wall.spld": file}) as server, tempfile.TemporaryDirectory() as folder:
+        options = [FAKE, "--tours", folder, "--watch", "100"]
+        with Daemon(*options, datasets=[server.url("wall.spld")], FAKE_FRAME_MS=100) as d:
+            opened(d)
+            camera = {"eye": [3, 0.2, 1], "target": [0, 0, 1], "fov": 60}
+            document = {"path": {"keyframes": [{"camera": camera}, {"camera": {**camera, "eye": [2, -1, 2]}}]}, "frames": 30,
+                        "settings": {"width": 64, "height": 48}}
+            uri = d.post(document, "/v1/datasets/wall/tours").json()["uri"]
+            eventually(lambda: d.ask(uri).json()["frames_done"] >= 2)
+            d.stop(signal.SIGKILL)
+        server.files.clear()  # at the next start it is not there
+        with Daemon(*options, datasets=[server.url("wall.spld")]) as d:
+            assert opened(d)["wall"]["state"] == "failed"
+            tour = d.ask(uri).json()
+            assert tour["state"] == "rendering" and 2 <= tour["frames_done"] < 30, tour
+            server.files["/wall.spld"] = file
+            eventually(lambda: d.ask(uri).json()["state"] != "rendering")
+            tour = d.ask(uri).json()
+            assert tour["state"] == "done" and tour["frames_done"] == 30, tour
 
 
 def info(*arguments, **environment):
@@ -237,7 +295,7 @@ def test_nginx():
                 assert view(d, "hall") == view(d, "tree")
                 log = pathlib.Path(folder, "access").read_text()
                 assert log.count(" 206 ") > 3 and " 200 " not in log
-                version = slots(d)["other"]["version"]
+                version = opened(d)["other"]["version"]
                 shutil.copy(WALL_LARGE, f"{folder}/next")
                 os.rename(f"{folder}/next", f"{folder}/other.spld")
                 reply = d.ask(f"/v1/datasets/other/{QUERY}")

@@ -162,8 +162,9 @@ static void open_range(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     struct opening *opening = context;
     for (size_t i = begin; i < end; i++)
-        spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->how,
-                               &opening->entries[i], &opening->errors[i]);
+        if (!spl_remote_is_url(opening->files->items[i].path)) // library.c opens them, once others are served
+            spl_catalog_entry_open(opening->files->items[i].path, opening->files->items[i].path, opening->how,
+                                   &opening->entries[i], &opening->errors[i]);
 }
 
 /* Puts one opened file into its slot; takes the entry. */
@@ -173,8 +174,7 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
     char id[sizeof((struct spl_catalog_slot *)0)->id];
     size_t length;
     const char *stem = spl_catalog_id_of(file->path, &length);
-    const bool far = spl_remote_is_url(file->path) && why->code != SPL_E_USAGE;
-    if (why->code && (!(file->in_directory || far) || !stem)) // a server may come back
+    if (why->code && (!file->in_directory || !stem))
         return spl_fail(err, why->code, "%s", why->message);
     snprintf(id, sizeof id, "%.*s", (int)length, stem);
     struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, id);
@@ -192,7 +192,7 @@ static int place(struct spl_catalog *catalog, const struct spl_catalog_file *fil
         return SPL_E_NOMEM;
     slot->in_directory = file->in_directory;
     slot->seen = file->mark;
-    if (!spl_catalog_may_pass(file->path, why))
+    if (*entry || (why->code && !spl_catalog_may_pass(file->path, why)))
         slot->opened = file->mark;
     slot->current = *entry;
     *entry = NULL;

@@ -71,7 +71,7 @@ const char *spl_catalog_first_directory(char *const *paths, size_t path_count);
 
 /* Opens everything at start, one dataset a core, until *how->cancelled (may be NULL) is set. A path that is not there,
  * a broken file that was named itself, two of these with one id are refused; a broken file of a directory gets a slot
- * with the reason, as does a URL whose server does not give it. On failure *catalog is empty. */
+ * with the reason. A URL gets one that is still to be opened. On failure *catalog is empty. */
 int spl_catalog_open(struct spl_catalog *catalog, char *const *paths, size_t path_count,
                      const struct spl_dataset_opening *how, struct spl_error *err);
 

@@ -15,9 +15,10 @@
 #include "base/memory.h"
 #include "dataset/remote_url.h"
 #include "service/state.h"
+#include "service/tour/tour.h"
 #include "service/view/views.h"
 
-enum { far_openings_most = 2, looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
+enum { looks_before_drop = 2, rests_most = 6 /* 64 looks, two minutes, between openings that fail */ };
 
 /* One listing of the served paths; belongs to the pool while it runs. */
 struct look {
@@ -65,6 +66,8 @@ static void free_opening(struct opening *opening)
     free(opening);
 }
 
+static void open_far(struct spl_service *service);
+
 static void run_opening(uv_work_t *work)
 {
     struct opening *opening = work->data;
@@ -93,6 +96,7 @@ static void after_opening(uv_work_t *work, int status)
     }
     spl_catalog_entry_unref(opening->entry);
     free_opening(opening);
+    open_far(service);
 }
 
 struct spl_dataset_opening spl_library_get_opening(struct spl_service *service)
@@ -107,7 +111,7 @@ struct spl_dataset_opening spl_library_get_opening(struct spl_service *service)
 static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot)
 {
     const bool far = spl_remote_is_url(slot->path);
-    if (far && service->library->far_openings == far_openings_most) // the pool has threads for others
+    if (far && service->library->far_openings == SPL_FAR_OPENINGS_MAX) // the pool has threads for others
         return;
     struct opening *opening = spl_alloc(1, sizeof *opening, NULL);
     if (!opening || !(opening->path = strdup(slot->path))) {
@@ -126,6 +130,30 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
     slot->busy = true;
     service->library->tasks++;
     service->library->far_openings += far;
+}
+
+/* What is on servers and was not tried yet: at start, so that nobody waits for them. */
+static void open_far(struct spl_service *service)
+{
+    struct spl_library *library = service->library;
+    for (size_t i = 0; i < library->catalog.count && !library->stopped && library->far_openings < SPL_FAR_OPENINGS_MAX; i++) {
+        struct spl_catalog_slot *slot = &library->catalog.slots[i];
+        if (!slot->busy && !slot->current && !slot->reason[0] && spl_remote_is_url(slot->path))
+            open_slot(service, slot);
+    }
+}
+
+bool spl_library_has_nothing_yet(const struct spl_service *service)
+{
+    const struct spl_catalog *catalog = &service->library->catalog;
+    bool opens = false;
+    for (size_t i = 0; i < catalog->count; i++) {
+        const struct spl_catalog_slot *slot = &catalog->slots[i];
+        if (slot->current)
+            return false;
+        opens |= !slot->reason[0] && spl_remote_is_url(slot->path);
+    }
+    return opens;
 }
 
 static void run_closing(uv_work_t *work)
@@ -204,6 +232,7 @@ void spl_library_take_changes(struct spl_service *service)
             continue;
         if (slot && slot->next == entry && resident) {
             spl_library_serve(slot, entry);
+            spl_tours_take_up(service->tours, entry);
             continue;
         }
         if (slot && (slot->next == entry || slot->current == entry)) {
@@ -329,6 +358,7 @@ void spl_library_init(struct spl_service *service)
 void spl_library_start(struct spl_service *service)
 {
     uint64_t interval_ms = service->options->watch_ms;
+    open_far(service);
     if (interval_ms)
         uv_timer_start(&service->library->timer, on_timer, interval_ms, interval_ms);
 }

@@ -36,12 +36,16 @@ struct spl_library {
 /* loading.c: opens the datasets at start beside the loop, then calls spl_service_go_on() or stops the loop. */
 int spl_loading_start(struct spl_service *service, struct spl_error *err);
 
+enum { SPL_FAR_OPENINGS_MAX = 4, SPL_POOL_THREADS = 8 /* of which the rest is for others */ };
+
 /* library.c: datasets that come, change and go while the service runs. init makes what the loop holds. */
 void spl_library_init(struct spl_service *service);
-void spl_library_start(struct spl_service *service);        /* once the pipeline is ready */
+void spl_library_start(struct spl_service *service);        /* once the pipeline is ready: opens what is on servers, too */
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
 void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry); /* takes the resident `entry` */
 struct spl_dataset_opening spl_library_get_opening(struct spl_service *service); /* as the operator says; any thread */
+bool spl_library_has_nothing_yet(const struct spl_service *service); /* what comes from servers is being opened, and no
+                                                                       dataset is served */
 void spl_library_stop(struct spl_service *service); /* waits for the thread pool; idempotent */
 
 /* change_route.c, change.c: PUT and DELETE of a dataset. */

@@ -11,6 +11,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "service/datasets/library.h"
 #include "service/http.h"
 #include "service/ops/ops.h"
 #include "service/ops/supervisor.h"
@@ -44,7 +45,7 @@ bool spl_health_is_ready(struct spl_service *service, char why[SPL_HEALTH_TEXT])
         snprintf(why, SPL_HEALTH_TEXT, "stopping");
         return false;
     }
-    if (!pipeline || !service->http->daemon) {
+    if (!pipeline || !service->http->daemon || spl_library_has_nothing_yet(service)) {
         snprintf(why, SPL_HEALTH_TEXT, "datasets are being loaded");
         return false;
     }

@@ -279,7 +279,7 @@ void spl_tours_pump(struct spl_tours *tours)
     struct spl_tour *tour, *next;
     for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
         next = TAILQ_NEXT(tour, link);
-        if (!tour->state_bytes)
+        if (!tour->state_bytes || tour->waits)
             continue; // frames without a tour.json would be nobody's after a crash
         advance(tour);
         while (tour->state == SPL_TOUR_RENDERING && !tour->failure.code && tour->first_open < tour->spec.frames) {

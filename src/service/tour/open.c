@@ -15,6 +15,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "dataset/remote_url.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
 #include "service/view/views.h"
@@ -31,35 +32,62 @@ struct spl_tour_limits spl_tour_get_limits(const struct spl_service *service)
     };
 }
 
-/* The cameras again. The same version of the dataset has the same defaults, so they are the same to the bit. */
-static void take_up(struct spl_tour *tour, const struct spl_catalog *catalog)
+/* The same version of the dataset has the same defaults, so they are the same to the bit. */
+int spl_tour_read_again(const struct spl_tour *tour, const struct spl_catalog_entry *entry, struct spl_tour_spec *out,
+                        struct spl_error *err)
 {
-    struct spl_service *service = tour->tours->service;
-    const struct spl_catalog_entry *entry = spl_catalog_find(catalog, tour->dataset);
-    struct spl_tour_limits limits = spl_tour_get_limits(service);
-    struct spl_tour_spec spec;
-    struct spl_error err = {0};
+    struct spl_tour_limits limits = spl_tour_get_limits(tour->tours->service);
     struct spl_places_hook places;
-    struct spl_camera_defaults defaults = {0};
-    if (entry) {
-        spl_places_hook_init(&places, entry->places, true);
-        defaults = entry->defaults;
-        defaults.places = &places.hook;
-    }
     if (!entry)
-        spl_fail(&err, SPL_E_NOT_FOUND, "dataset '%s' is no longer served", tour->dataset);
-    else if (!spl_tour_spec_from_text(tour->body, tour->body_length, &defaults, &limits, &spec, &err) &&
-             spec.frames != tour->spec.frames) {
-        spl_tour_spec_finish(&spec);
-        spl_fail(&err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);
+        return spl_fail(err, SPL_E_NOT_FOUND, "dataset '%s' is no longer served", tour->dataset);
+    spl_places_hook_init(&places, entry->places, true);
+    struct spl_camera_defaults defaults = entry->defaults;
+    defaults.places = &places.hook;
+    int rc = spl_tour_spec_from_text(tour->body, tour->body_length, &defaults, &limits, out, err);
+    if (!rc && out->frames != tour->spec.frames) {
+        spl_tour_spec_finish(out);
+        rc = spl_fail(err, SPL_E_CORRUPT, "its path no longer has %zu frames", tour->spec.frames);
     }
-    tour->failure = err; // said by spl_tours_start()
-    if (err.code)
-        return;
+    return rc;
+}
+
+static void take(struct spl_tour *tour, struct spl_tour_spec *spec)
+{
     spl_tour_spec_finish(&tour->spec);
-    tour->spec = spec;
+    tour->spec = *spec;
+    *spec = (struct spl_tour_spec){0};
     tour->state = SPL_TOUR_RENDERING; // a video that was being made is begun again
     spl_log_info("tour %s: goes on at %zu of %zu frames", tour->name, tour->frames_done, tour->spec.frames);
+}
+
+/* One of a dataset that comes from a server is taken up when that has been opened. */
+static void take_up(struct spl_tour *tour, const struct spl_catalog *catalog)
+{
+    const struct spl_catalog_slot *slot = spl_catalog_find_slot(catalog, tour->dataset);
+    struct spl_tour_spec spec;
+    struct spl_error err = {0};
+    tour->waits = slot && !slot->current && spl_remote_is_url(slot->path);
+    if (!tour->waits && !spl_tour_read_again(tour, slot ? slot->current : NULL, &spec, &err))
+        take(tour, &spec);
+    tour->failure = err; // said by spl_tours_start()
+}
+
+void spl_tour_go_on(struct spl_tour *tour, struct spl_tour_spec *spec, const struct spl_error *why)
+{
+    if (why->code)
+        spl_tour_fail(tour, why);
+    else
+        take(tour, spec);
+}
+
+void spl_tours_take_up(struct spl_tours *tours, struct spl_catalog_entry *entry)
+{
+    struct spl_tour *tour;
+    if (!tours)
+        return;
+    TAILQ_FOREACH(tour, &tours->all, link)
+    if (tour->waits && !tour->works && !strcmp(tour->dataset, entry->info->id))
+        spl_tour_work_take_up(tour, entry);
 }
 
 static void load(struct spl_tours *tours, const char *name)

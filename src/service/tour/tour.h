@@ -51,6 +51,7 @@ struct spl_tour {
     uint64_t changes;                /* of anything a client sees */
     size_t works, readers;           /* file works and replies that hold it */
     bool state_writing, state_again; /* tour.json is being written; has changed since */
+    bool waits;                      /* for its dataset, which is being opened: nothing is made yet */
     bool removed;                    /* off the list; freed when nothing holds it */
     atomic_bool cancelled;           /* read by file works */
 };
@@ -77,6 +78,16 @@ int spl_tours_load(struct spl_tours *tours, const struct spl_catalog *catalog, s
 void spl_tours_start(struct spl_tours *tours);
 void spl_tours_stop(struct spl_tours *tours);
 void spl_tours_close(struct spl_tours *tours);
+
+/* Reads the cameras of a kept tour again, of `entry`, which may be NULL: there is none. Any thread. */
+int spl_tour_read_again(const struct spl_tour *tour, const struct spl_catalog_entry *entry, struct spl_tour_spec *out,
+                        struct spl_error *err);
+
+/* The tour goes on with `spec`, which is taken, or fails. */
+void spl_tour_go_on(struct spl_tour *tour, struct spl_tour_spec *spec, const struct spl_error *why);
+
+/* `entry` is served from now on: tours that wait for it are taken up. Takes NULL tours. */
+void spl_tours_take_up(struct spl_tours *tours, struct spl_catalog_entry *entry);
 
 /* Gives idle slots of the pipeline to frames; call when something may have become free. Takes NULL. */
 void spl_tours_pump(struct spl_tours *tours);
@@ -143,6 +154,7 @@ void spl_tour_work_state(struct spl_tour *tour);
 void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded *encoded); /* takes the bytes */
 void spl_tour_work_video(struct spl_tour *tour);
 void spl_tour_work_remove(struct spl_tour *tour);
+void spl_tour_work_take_up(struct spl_tour *tour, struct spl_catalog_entry *entry);
 
 /* engine.c, called by work.c on the loop. */
 void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, const struct spl_error *err);

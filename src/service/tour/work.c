@@ -28,6 +28,8 @@ struct work {
     struct spl_encoded encoded; // owned
     size_t length, frame;
     uint64_t video_bytes;
+    struct spl_catalog_entry *entry; /* one reference; that a tour is taken up with */
+    struct spl_tour_spec spec;       /* the same */
     struct spl_error err;
 };
 
@@ -224,4 +226,33 @@ void spl_tour_work_remove(struct spl_tour *tour)
     tour->works--;
     work->tour = NULL; // the tour itself is freed now
     queue(work, remove_files, after_remove);
+}
+
+static void take_up(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    spl_tour_read_again(work->tour, work->entry, &work->spec, &work->err);
+}
+
+static void after_take_up(uv_work_t *uv, int status)
+{
+    (void)status;
+    struct work *work = uv->data;
+    struct spl_tour *tour = work->tour;
+    if (!tour->removed && !tour->tours->stopping) { // else the next start does
+        tour->waits = false;
+        spl_tour_go_on(tour, &work->spec, &work->err);
+    }
+    spl_tour_spec_finish(&work->spec);
+    spl_catalog_entry_unref(work->entry);
+    finish(work);
+}
+
+void spl_tour_work_take_up(struct spl_tour *tour, struct spl_catalog_entry *entry)
+{
+    struct work *work = begin(tour, NULL); // without memory the tour waits
+    if (!work)
+        return;
+    work->entry = spl_catalog_entry_ref(entry);
+    queue(work, take_up, after_take_up);
 }

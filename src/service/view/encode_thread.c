@@ -1,12 +1,12 @@
 /* The encode threads, `encoders` for small images and one for large ones, so that no small one waits for these: one
- * frame in, bytes of a format out: an image, several in a container, or what a pick found. Each frame's pixels are
+ * frame in, bytes of a format out: an image, several in a container, or what a pick found in a dataset on disk. Each frame's pixels are
  * released as soon as they are encoded, so that what waits for slow clients is compressed. */
 #include "base/clock.h"
 #include "service/view/bundle.h"
 #include "service/view/pick.h"
 #include "service/view/stages.h"
 
-static void encode(struct spl_job *job)
+void spl_encode_job(struct spl_job *job)
 {
     uint64_t began = spl_now_ns();
     if (spl_job_is_over(job))
@@ -25,7 +25,7 @@ static void encode(struct spl_job *job)
 static void *run(struct spl_pipeline *pipeline, struct spl_queue *queue)
 {
     for (struct spl_job *job; (job = spl_queue_pop(queue, SPL_NEVER));) {
-        encode(job);
+        spl_encode_job(job);
         spl_pipeline_finish_job(pipeline, job);
     }
     return NULL;

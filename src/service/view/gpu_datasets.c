@@ -244,6 +244,8 @@ int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct s
     struct spl_error why = {0};
     uint32_t before = entry->pages_wanted;
     int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, &entry->pages_wanted, &more, &why);
+    if (!rc && spl_dataset_is_remote(entry->dataset)) // its first page comes as well: others do not wait for its server
+        more = false;
     gpu->loading_waits = !rc && more && entry->pages_wanted == before;
     if (gpu->loading_waits)
         return 0;

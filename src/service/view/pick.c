@@ -9,6 +9,7 @@
 
 #include "base/decimal.h"
 #include "base/error.h"
+#include "dataset/dataset.h"
 #include "render/pick.h"
 
 static const double most_whole = 0x1p53; /* that doubles count to */
@@ -21,6 +22,20 @@ static json_t *vector(const double v[3])
 static json_t *normal(const double n[3])
 {
     return n[0] == 0 && n[1] == 0 && n[2] == 0 ? json_null() : vector(n);
+}
+
+/* Could its dataset's server be read? What could not is no value, and is not said to be missing. */
+static bool was_read(const struct spl_pick *p, const struct spl_dataset *dataset)
+{
+    const struct spl_dataset_info *info = dataset ? spl_dataset_get_info(dataset) : NULL;
+    double value;
+    if (!info || !spl_dataset_is_remote(dataset) || p->splat < 0 || (uint64_t)p->splat >= info->ids)
+        return true;
+    bool good = p->primitive != SPL_SHAPE_NONE; // read with the tables
+    for (uint32_t s = 0; s < info->stream_count && good && p->primitive != SPL_SHAPE_LINE; s++)
+        good = spl_dataset_find_stream(dataset, info->streams[s].name) < 0 ||
+               spl_dataset_find_value(dataset, (int)s, (uint64_t)p->splat, &value);
+    return good;
 }
 
 /* What the splat has by name; null where it is none, or has nothing: on wires. */
@@ -89,6 +104,9 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
     struct spl_pick pick;
     *out = (struct spl_encoded){.media_type = "application/json"};
     spl_pick_read(&request->pick.camera, x, y, frame, dataset, &pick);
+    if (!was_read(&pick, dataset))
+        return spl_fail(err, SPL_E_TIMEOUT, "what lies there of %s could not be read from its server; come back later",
+                        spl_dataset_get_info(dataset)->id);
     json_t *json = json_pack("{s:f, s:f, s:s}", "x", x, "y", y, "unit", request->encode.unit);
     if (json)
         fill(json, &pick, dataset);

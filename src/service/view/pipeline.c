@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "dataset/dataset.h"
 #include "geom/ray_list.h"
 #include "service/view/stages.h"
 
@@ -47,6 +48,8 @@ uint64_t spl_pipeline_get_still_ns(struct spl_pipeline *pipeline)
 
 int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job)
 {
+    if (job->request.picks && job->dataset && spl_dataset_is_remote(job->dataset))
+        return spl_far_picks_take(pipeline, job);
     if (!spl_pipeline_image_is_large(&job->request.view))
         return spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
     bool room = spl_queue_try_push(pipeline->encode_large, job);
@@ -120,7 +123,7 @@ struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline
 static int create_queues(struct spl_pipeline *pipeline, struct spl_error *err)
 {
     size_t queue = pipeline->options.queue, encoders = pipeline->options.encoders;
-    size_t inside = 3 * queue + 2 * encoders + 2 * SPL_PIPELINE_BEHIND + 1;
+    size_t inside = 3 * queue + 2 * encoders + 2 * SPL_PIPELINE_BEHIND + SPL_FAR_PICKS_MAX + 1;
     const struct {
         struct spl_queue **queue;
         size_t capacity;
@@ -156,6 +159,7 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     STAILQ_INIT(&pipeline->orders);
     STAILQ_INIT(&pipeline->changes);
     pthread_mutex_init(&pipeline->mutex, NULL);
+    spl_far_picks_init(&pipeline->far);
     int rc = create_queues(pipeline, err);
     if (!rc)
         rc = start_encoders(pipeline, err);
@@ -217,6 +221,7 @@ void spl_pipeline_destroy(struct spl_pipeline *pipeline)
         pthread_join(pipeline->encode_threads[i], NULL);
     if (pipeline->large_started)
         pthread_join(pipeline->large_thread, NULL);
+    spl_far_picks_finish(&pipeline->far);
     if (pipeline->done)
         for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
             spl_job_destroy(job);

@@ -1,4 +1,5 @@
-/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c and encode_thread.c include it. */
+/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c,
+ * encode_thread.c and far_picks.c include it. */
 #ifndef SPL_SERVICE_STAGES_H
 #define SPL_SERVICE_STAGES_H
 
@@ -7,12 +8,24 @@
 #include "base/queue.h"
 #include "service/view/pipeline.h"
 
-enum { ENCODERS_MAX = 16 };
+enum { ENCODERS_MAX = 16, SPL_FAR_PICKS_MAX = 48 /* inside */, SPL_FAR_PICKS_READ = 8 /* at a time */ };
 
 /* What is inside on one of the ways that are let in by work. */
 struct spl_load {
     size_t jobs;
     uint64_t samples, bytes;
+};
+
+/* Picks of datasets from servers; far_picks.c. */
+struct spl_far_picks {
+    pthread_mutex_t mutex;
+    pthread_cond_t changed;
+    TAILQ_HEAD(, spl_job) waiting;                         // guarded by: mutex, as all but `threads`
+    const struct spl_dataset *reading[SPL_FAR_PICKS_READ]; // compared, not looked at; NULL = none
+    size_t inside;                                         /* waiting or being read */
+    bool closed;
+    size_t started;
+    pthread_t threads[SPL_FAR_PICKS_READ + 1];
 };
 
 struct spl_pipeline {
@@ -23,6 +36,7 @@ struct spl_pipeline {
     struct spl_load large_load, behind_load; // owned by: loop
     pthread_t gpu_thread, encode_threads[ENCODERS_MAX], large_thread;
     size_t encode_started;
+    struct spl_far_picks far;
     bool gpu_started, large_started;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
     _Atomic uint64_t device_bytes, device_limit_bytes, pages_pending, renderer;
@@ -41,6 +55,14 @@ void *spl_gpu_thread_run(void *argument);
 void *spl_encode_thread_run(void *argument);
 void *spl_encode_large_thread_run(void *argument);
 
+/* Fills `encoded` of a rendered job, or sets its error. Reads what a pick is of: from a server it may block for long. */
+void spl_encode_job(struct spl_job *job);
+
+/* far_picks.c: finish ends what is inside first. On failure, with the job's error set, the caller keeps the job. */
+void spl_far_picks_init(struct spl_far_picks *far);
+int spl_far_picks_take(struct spl_pipeline *pipeline, struct spl_job *job);
+void spl_far_picks_finish(struct spl_far_picks *far);
+
 /* admission.c: lets the job in on its way to the gpu thread and counts it, until it is let out. Loop's thread. */
 int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
 void spl_pipeline_let_out(struct spl_pipeline *pipeline, const struct spl_job *job);
@@ -51,7 +73,8 @@ bool spl_pipeline_image_is_large(const struct spl_view *view);
 /* Refuses further jobs; those inside can still be popped. */
 void spl_pipeline_close_render(struct spl_pipeline *pipeline);
 
-/* Hands a rendered job to the encoders of its kind. Waits for room among the small ones, until its deadline. */
+/* Hands a rendered job to the encoders of its kind. Waits for room among the small ones, until its deadline: those never
+ * wait for a server. */
 int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* The oldest entry that the gpu thread is to add or to let go of, or NULL. */

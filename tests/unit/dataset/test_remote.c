@@ -1,6 +1,7 @@
 /* A remote file over a link that does as the test says: its bytes come whole whatever breaks off, what is wrong at its
  * server is an error that says so, a file that changes is never mixed with what it was, and what several ask for at once is
  * asked once. */
+#include <malloc.h>
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,9 +13,11 @@
 #include <unistd.h>
 
 #include <cmocka.h>
+#include <xxhash.h>
 
 #include "base/clock.h"
 #include "dataset/dataset.h"
+#include "dataset/format.h"
 #include "dataset/remote.h"
 #include "dataset/remote_counts.h"
 #include "support/folder.h"
@@ -564,6 +567,109 @@ static void test_bytes_that_are_spoilt(void **state)
     stop(&s);
 }
 
+/* A file of which its server says that it is as long as a file can be, and nothing but its beginning is there. */
+struct liar {
+    struct spl_file_header header;
+    struct spl_section sections[4]; /* behind it */
+    size_t held_most;               /* memory, while it was asked */
+};
+
+static size_t count_held(void)
+{
+    struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+}
+
+static int fetch_lie(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
+{
+    struct liar *liar = context;
+    size_t held = count_held(), there = offsetof(struct liar, held_most);
+    liar->held_most = held > liar->held_most ? held : liar->held_most;
+    memset(out, 0, bytes);
+    if (offset < there)
+        memcpy(out, (char *)liar + offset, bytes < there - offset ? bytes : there - offset);
+    return offset + bytes > (64 << 20) + there ? spl_fail(err, SPL_E_TIMEOUT, "nothing comes any more") : SPL_OK;
+}
+
+static void hint(void *context, uint64_t offset, uint64_t bytes)
+{
+    (void)context, (void)offset, (void)bytes;
+}
+
+static bool is_same(void *context)
+{
+    (void)context;
+    return false;
+}
+
+static void test_a_server_that_claims_exabytes(void **state)
+{
+    (void)state;
+    static const struct spl_source_far far = {.fetch = fetch_lie, .expect = hint, .forget = hint, .has_changed = is_same};
+    enum { TABLE, ROWS, ATOM, PDIR, TOO_FAR, COUNT };
+    static const struct {
+        int code;
+        const char *message;
+        size_t held_most;
+    } wanted[COUNT] = {[TABLE] = {SPL_E_CORRUPT, "section table has more than 4194304 rows", 1 << 20},
+                       [ROWS] = {SPL_E_TIMEOUT, "nothing comes any more", 129 << 20}, // of which 64 MiB came
+                       [ATOM] = {SPL_E_CORRUPT, "section ATOM is shorter than its header, or longer", 1 << 20},
+                       [PDIR] = {SPL_E_CORRUPT, "section PDIR is not a whole number of rows", 1 << 20},
+                       [TOO_FAR] = {SPL_E_LIMIT, "more than a dataset can have", 1 << 20}};
+    for (int lie = 0; lie < COUNT; lie++) {
+        struct liar *liar = calloc(1, sizeof *liar);
+        const uint64_t size = lie == TOO_FAR ? UINT64_MAX : INT64_MAX / 2 & ~(uint64_t)63;
+        struct spl_file_header *header = &liar->header;
+        struct spl_dataset *dataset;
+        struct spl_error err = {0};
+        *header = (struct spl_file_header){.version = SPL_FILE_VERSION, .header_bytes = sizeof *header, .file_bytes = size,
+                                           .table_offset = sizeof *header, .section_count = 2};
+        memcpy(header->magic, SPL_FILE_MAGIC, sizeof header->magic);
+        if (lie == TABLE || lie == ROWS)
+            header->section_count = lie == TABLE ? UINT32_MAX : SPL_SECTIONS_MAX;
+        liar->sections[0] = (struct spl_section){.type = SPL_SECTION_META, .offset = 256, .bytes = 2};
+        liar->sections[1] = (struct spl_section){.type = lie == ATOM ? SPL_SECTION_ATOMS : SPL_SECTION_DIRECTORY, .offset = 320,
+                                                 .bytes = size / 2 & ~(uint64_t)63};
+        header->table_hash = XXH3_64bits(liar->sections, 2 * sizeof *liar->sections);
+        header->header_hash = XXH3_64bits(header, offsetof(struct spl_file_header, header_hash));
+        const struct spl_dataset_source source = {.size = size, .context = liar, .far = &far, .owned = true};
+        const size_t before = count_held();
+        assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld", &(struct spl_dataset_opening){.tables_bytes = SPL_TABLES_BYTES},
+                                                    &dataset, &err), wanted[lie].code);
+        assert_non_null(strstr(err.message, wanted[lie].message));
+        assert_true(!liar->held_most || liar->held_most <= before + wanted[lie].held_most);
+        free(liar);
+    }
+}
+
+/* What is kept of many files is bounded for all of them together, and what was read last stays. */
+static void test_many_files(void **state)
+{
+    (void)state;
+    enum { count = 40 };
+    struct server s;
+    struct spl_dataset_source sources[count];
+    struct spl_error err = {0};
+    start(&s, SMALL);
+    const size_t before = count_held();
+    for (int i = 0; i < count; i++) {
+        sources[i] = open_with(&s, &(struct spl_remote_how){0});
+        assert_int_equal(read_range(&sources[i], &s, 2 * BLOCK, 8 * BLOCK, &err), SPL_OK);
+    }
+    if (before) // nobody counts under sanitisers
+        assert_in_range(count_held() - before, 60 << 20, 76 << 20);
+    int asks = s.asks;
+    expect_range(&sources[count - 1], &s, 2 * BLOCK, 8 * BLOCK);
+    expect_range(&sources[count - 5], &s, 2 * BLOCK, 8 * BLOCK);
+    assert_int_equal(s.asks, asks);
+    expect_range(&sources[0], &s, 2 * BLOCK, 8 * BLOCK); // longest ago
+    assert_int_equal(s.asks, asks + 1);
+    for (int i = 0; i < count; i++)
+        spl_dataset_source_close(&sources[i]);
+    assert_true(count_held() <= before + (1 << 20));
+    stop(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -573,6 +679,7 @@ int main(void)
         cmocka_unit_test(test_a_file_that_changes),            cmocka_unit_test(test_equal_requests_are_joined),
         cmocka_unit_test(test_crowd),                          cmocka_unit_test(test_cancelling),
         cmocka_unit_test(test_the_page_cache),                 cmocka_unit_test(test_bytes_that_are_spoilt),
+        cmocka_unit_test(test_a_server_that_claims_exabytes),  cmocka_unit_test(test_many_files),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -23,7 +23,11 @@ static struct file {
     bool open;
     unsigned asked, holds;
     uint32_t order[reads_max];
-} files[2] = {{.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+} files[6] = {{.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+              {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+              {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+              {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
+              {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER},
               {.mutex = PTHREAD_MUTEX_INITIALIZER, .moved = PTHREAD_COND_INITIALIZER}};
 static atomic_uint wakes;
 
@@ -108,7 +112,7 @@ static void on_read(void *context)
 static struct spl_io *start(void)
 {
     struct spl_io *io = NULL;
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         await_let_go(&files[i]); // what the test before left behind
         files[i].may_pass = files[i].asked = 0;
         files[i].open = false;
@@ -410,6 +414,54 @@ static void a_file_from_afar_is_read_by_several(void **state)
     spl_io_destroy(io);
 }
 
+static uint64_t never_moved(const void *source)
+{
+    (void)source;
+    return 0;
+}
+
+/* They fill what is read from afar, and what hangs of it counts apart; a disk has memory of its own, and places. */
+static void servers_that_hang_take_nothing_from_a_disk(void **state)
+{
+    (void)state;
+    enum { quarter = SPL_IO_BYTES / 4 };
+    struct spl_io *io = start();
+    struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .bytes = quarter, .owner = &files[0],
+                               .get_moved_ns = never_moved, .at_once = 4};
+    const struct spl_io_rank rank = {.awaited = true, .walk = 1};
+    what.source = &files[0];
+    for (what.index = 0; what.index < 5; what.index++)
+        assert_non_null(spl_io_try_begin(io, &what, rank));
+    await_asked(&files[0], 4);
+    let_pass(&files[5], 0, true);
+    for (uint32_t i = 0; i < 4; i++) // all that may be read of a disk, beside them
+        assert_non_null(begin(io, &files[5], i, quarter, true, 1));
+    struct spl_io_read *near[4];
+    for (int i = 0; i < 4; i++) {
+        near[i] = take(io);
+        assert_ptr_equal(near[i]->what.source, &files[5]);
+    }
+    for (int i = 0; i < 4; i++)
+        spl_io_end(io, near[i]);
+    for (int f = 1; f < 4; f++) { // of another server once the first hangs, until what hangs is as much as may
+        what.source = &files[f];
+        for (what.index = 0; what.index < SPL_IO_READS; what.index++)
+            spl_io_try_begin(io, &what, rank);
+        while (spl_io_count_hanging(io) < 4 * (size_t)(f + 1))
+            usleep(10000);
+    }
+    what.source = &files[4];
+    what.index = 0;
+    assert_null(spl_io_try_begin(io, &what, rank)); // three quarters of all places are from afar
+    assert_non_null(begin(io, &files[5], 9, SPL_IO_BYTES, true, 1));
+    spl_io_end(io, take(io));
+    for (int f = 0; f < 4; f++) {
+        assert_int_equal(get_asked(&files[f]), 4);
+        let_pass(&files[f], 0, true);
+    }
+    spl_io_destroy(io);
+}
+
 /* Each is left with its thread, in any order. */
 static void reads_that_hang_are_left_behind_together(void **state)
 {
@@ -446,6 +498,7 @@ int main(void)
         cmocka_unit_test(it_says_when_anything_moved),
         cmocka_unit_test(a_file_that_hangs_holds_up_no_other),
         cmocka_unit_test(a_file_from_afar_is_read_by_several),
+        cmocka_unit_test(servers_that_hang_take_nothing_from_a_disk),
         cmocka_unit_test(reads_that_hang_are_left_behind_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,6 +10,8 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
+#include "dataset/dataset.h"
+#include "dataset/source.h"
 #include "service/view/pipeline.h"
 #include "support/make_dataset.h"
 
@@ -600,6 +602,134 @@ static void a_pipeline_ends_with_versions_in_every_state(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
+/* A small dataset on a server that stops answering. */
+static struct server {
+    char *bytes;
+    uint64_t size;
+    atomic_bool hangs, fails;
+    atomic_uint asked;
+} server;
+
+static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
+{
+    struct server *s = context;
+    atomic_fetch_add(&s->asked, 1);
+    while (atomic_load(&s->hangs))
+        usleep(1000);
+    if (atomic_load(&s->fails))
+        return spl_fail(err, SPL_E_TIMEOUT, "it was given up");
+    memcpy(out, s->bytes + offset, bytes);
+    return 0;
+}
+
+static void expect_or_forget(void *context, uint64_t offset, uint64_t bytes)
+{
+    (void)context, (void)offset, (void)bytes;
+}
+
+static uint64_t get_moved_ns(void *context)
+{
+    (void)context;
+    return 0;
+}
+
+static bool has_changed(void *context)
+{
+    (void)context;
+    return false;
+}
+
+static struct spl_dataset *open_far(void)
+{
+    static const struct spl_source_far far = {fetch, expect_or_forget, expect_or_forget, get_moved_ns, has_changed};
+    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1, .classification = 6}, {.position = {1, 0, 0}, .normal = {1, 0, 0}, .radius = 1}};
+    char path[256] = "";
+    struct spl_dataset *dataset = NULL;
+    struct spl_dataset_opening how = {.verify = true, .tables_bytes = SPL_TABLES_BYTES};
+    make_folder(path);
+    strcat(path, "/far.spld");
+    make_dataset_file(path, splats, 2, 1);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    free(server.bytes);
+    server = (struct server){.bytes = malloc(1 << 20)};
+    server.size = fread(server.bytes, 1, 1 << 20, file);
+    fclose(file);
+    unlink(path);
+    *strrchr(path, '/') = '\0';
+    rmdir(path);
+    const struct spl_dataset_source source = {.size = server.size, .context = &server, .far = &far, .owned = true};
+    assert_int_equal(spl_dataset_open_source_as(&source, "far.spld", &how, &dataset, NULL), 0);
+    return dataset;
+}
+
+/* Of splat 0, which is what depth 0 has the bits of. */
+static struct spl_job *make_pick(const struct spl_dataset *dataset, double x, unsigned deadline_ms)
+{
+    static const struct spl_camera_defaults defaults = {
+        .eye = {10, 0, -100}, .target = {0, 0, -100}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    struct spl_job *job = calloc(1, sizeof *job);
+    char query[80];
+    snprintf(query, sizeof query, "width=64&height=64&x=%g&y=1", x);
+    assert_int_equal(spl_pick_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
+    job->dataset = dataset;
+    job->accepted_ns = spl_now_ns();
+    job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
+    return job;
+}
+
+static void picks_of_a_server_that_hangs_hold_up_nobody(void **state)
+{
+    (void)state;
+    enum { picks = 20 /* 16 may be inside */, late = 3 /* of them have no time left when it answers */ };
+    struct spl_dataset *far = open_far();
+    struct spl_pipeline *pipeline = start(32);
+    assert_int_equal(spl_pipeline_submit(pipeline, make_pick(far, 1, 10000), NULL), 0);
+    struct spl_job *job = take(pipeline);
+    assert_int_equal(job->err.code, 0);
+    assert_non_null(strstr((const char *)job->encoded.bytes, "\"class\": 6"));
+    spl_job_destroy(job);
+
+    atomic_store(&server.hangs, true);
+    server.asked = 0;
+    for (int i = 0; i < picks; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, make_pick(far, i + 1, i >= 2 && i < 2 + late ? 100 : 60000), NULL), 0);
+    while (server.asked < 2)
+        usleep(500);
+    for (int i = 0, ended[3] = {0}; i < picks - 16 + late + 4; i++) { // what is refused, late, or of other datasets
+        if (i < 4)
+            assert_int_equal(spl_pipeline_submit(pipeline, make_job(5000), NULL), 0);
+        job = take(pipeline);
+        ended[job->err.code == SPL_E_BUSY ? 0 : job->err.code == SPL_E_TIMEOUT ? 1 : 2]++;
+        assert_true(job->err.code == SPL_E_BUSY || job->request.picks == (job->err.code == SPL_E_TIMEOUT));
+        spl_job_destroy(job);
+        if (i == picks - 16 + late + 3) {
+            assert_int_equal(ended[0], picks - 16);
+            assert_int_equal(ended[1], late);
+        }
+    }
+    assert_int_equal(server.asked, 2); // at a time
+    assert_true(spl_pipeline_get_still_ns(pipeline) < SPL_NS_PER_S);
+    atomic_store(&server.fails, true); // which is no answer: nobody keeps that there is no class
+    atomic_store(&server.hangs, false);
+    for (int i = 0; i < 16 - late; i++) {
+        job = take(pipeline);
+        assert_int_equal(job->err.code, SPL_E_TIMEOUT);
+        assert_non_null(strstr(job->err.message, "far"));
+        spl_job_destroy(job);
+    }
+    atomic_store(&server.hangs, true); // what is inside at the end comes out first
+    assert_int_equal(spl_pipeline_submit(pipeline, make_pick(far, 1, 60000), NULL), 0);
+    while (server.asked < 17)
+        usleep(500);
+    atomic_store(&server.hangs, false);
+    spl_pipeline_destroy(pipeline);
+    spl_dataset_close(far);
+    free(server.bytes);
+    server.bytes = NULL;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -613,6 +743,7 @@ int main(void)
         cmocka_unit_test(views_that_wait_for_pages_end),
         cmocka_unit_test(what_was_read_is_uploaded_without_rests),
         cmocka_unit_test(a_full_queue_refuses),
+        cmocka_unit_test(picks_of_a_server_that_hangs_hold_up_nobody),
         cmocka_unit_test(what_costs_the_device_twice_is_put_aside),
         cmocka_unit_test(what_costs_the_device_while_it_is_loaded_is_refused),
         cmocka_unit_test(a_view_ends_within_its_tile_when_nobody_waits),
