@@ -63,7 +63,7 @@ def test_what_is_wrong_is_named():
                                    ("color_by=smell&budget=500ms", "color_by", "smell"), ("color_by=plane:1,2", "color_by", "plane:1,2"),
                                    ("color_by=", "color_by", "empty"), ("color_by=class&color_by=height", "color_by", "color_by"),
                                    ("color_by=height&ramp=jet", "ramp", "jet"),
-                                   ("color_by=height&range=5", "range", "5"), ("color_by=height&range=q0..q1", "range", "quantiles"),
+                                   ("color_by=height&range=5", "range", "5"), ("color_by=plane:0,0,0,0,0,1&range=q0..q1", "range", "quantiles"),
                                    ("color_by=class&range=2..1", "range", "2..1"),
                                    ("color_by=" + "x" * 500, "color_by", "")]:
             reply = d.ask(f"{VIEW}?{query}")
@@ -90,7 +90,7 @@ def test_a_legend_says_what_colours_mean():
         assert texts("color_by=normal") == ["normal", "x", "y", "z"]
         assert texts("color_by=flat:red") == ["flat", "flat:ff0000"]
         for query, field in [("", "color_by"), ("color_by=rgb", "color_by"), ("color_by=smell", "color_by"), ("color_by=class&width=5", "width"),
-                             ("color_by=class&ramp=jet", "ramp"), ("color_by=height&range=q0..q1", "range")]:
+                             ("color_by=class&ramp=jet", "ramp"), ("color_by=plane:0,0,0,0,0,1&range=q0..q1", "range")]:
             reply = d.ask(f"{LEGEND}?{query}")
             assert reply.status == 400 and reply.json()["field"] == field, (query, reply.body)
         assert d.ask(LEGEND.replace("wall", "hall") + "?color_by=class").status == 404

@@ -64,6 +64,9 @@ static void by_page_they_are_the_same(void **state)
     assert_true(info->stream_values && same.stream_values && info->stream_count);
     assert_memory_equal(info->stream_values, same.stream_values, info->stream_count * sizeof *same.stream_values);
     assert_int_equal(info->view_count, same.view_count);
+    assert_true(info->heights && same.heights);
+    assert_memory_equal(info->heights, same.heights, sizeof *same.heights);
+    same.heights = info->heights;
     same.stream_values = info->stream_values;
     same.views = info->views;
     assert_memory_equal(info, &same, sizeof *info);

@@ -142,6 +142,10 @@ static void datasets_have_theirs(void **state)
         assert_int_equal(classes->kind_count, 2);
         assert_int_equal(classes->kinds[0].count, count / 4);
         assert_true(classes->kinds[1].value == 5 && classes->quantiles[15] == 2 && classes->quantiles[17] == 5);
+        const struct spl_stream_values *heights = info->heights; /* 0 to 4, each of as many */
+        assert_true(heights && heights->count == count && !heights->kind_count);
+        for (int q = 0; q <= SPL_VALUES_QUANTILES; q++)
+            assert_true(fabs(heights->quantiles[q] - fmin(q * 5 / SPL_VALUES_QUANTILES, 4)) < 0.05);
         assert_true(uncertain->quantiles[0] == 1 && uncertain->p99 == 2 && uncertain->quantiles[32] == 2);
         spl_dataset_close(dataset);
     }
@@ -163,6 +167,7 @@ static void datasets_have_theirs(void **state)
     const struct spl_stream_values *classes =
         spl_dataset_info_get_values(spl_dataset_get_info(pruned), SPL_STREAM_CLASS);
     assert_true(classes && classes->count == count / 8 && classes->kinds[0].count == count / 32);
+    assert_true(spl_dataset_get_info(pruned)->heights->count == count / 8);
     spl_dataset_close(pruned);
     spl_dataset_close(whole);
     unlink(path);

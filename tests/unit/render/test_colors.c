@@ -225,6 +225,28 @@ static void test_values_find_their_place(void **state)
     assert_true(paint.classes && paint.colors[2] == 0x0055aa && paint.colors[5] == 0x00aa00);
 }
 
+/* Of heights the ends are the dataset's, but for strays; shares of them are known where the dataset says them. */
+static void test_strays_do_not_take_the_colours_of_heights(void **state)
+{
+    (void)state;
+    struct spl_dataset_info info = attributes();
+    struct spl_stream_values heights = {.count = 100, .p99 = 19.9};
+    struct spl_color_params color = {.by = SPL_COLOR_BY_HEIGHT};
+    struct spl_paint paint;
+    for (int i = 0; i <= SPL_VALUES_QUANTILES; i++)
+        heights.quantiles[i] = 10 + 10.0 * i / SPL_VALUES_QUANTILES;
+    info.heights = &heights;
+    assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
+    assert_true(paint.low == 10 && paint.high == 20); /* all of them */
+    heights.quantiles[0] = info.bounds_min[2] = -1000; /* an echo from below, and a bird */
+    heights.quantiles[SPL_VALUES_QUANTILES] = info.bounds_max[2] = 20.5;
+    assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
+    assert_true(paint.low > -1000 && paint.low < 10 && paint.high == 20.5);
+    color = (struct spl_color_params){.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0.25, 0.75}, .shares = {true, true}};
+    assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
+    assert_true(fabs(paint.low - 12.5) < 1e-9 && fabs(paint.high - 17.5) < 1e-9);
+}
+
 static void test_what_a_dataset_lacks_is_refused(void **state)
 {
     (void)state;
@@ -235,7 +257,10 @@ static void test_what_a_dataset_lacks_is_refused(void **state)
     } cases[] = {
         {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "smell"}, "color_by", "it has intensity, class"},
         {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "class", .ramp = SPL_RAMP_GREY}, "range", "give a range"},
-        {{.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0, 1}, .shares = {true, true}}, "range", "give values"},
+        {{.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0, 1}, .shares = {true, true}}, "range",
+         "values of 'height'"},
+        {{.by = SPL_COLOR_BY_PLANE, .plane = {0, 0, 0, 0, 0, 1}, .has_range = true, .range = {0, 1}, .shares = {true, true}},
+         "range", "give values"},
         {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "intensity", .has_range = true, .range = {950, 0.5}, .shares = {false, true}},
          "range", "950"},
         {{.by = SPL_COLOR_BY_NORMAL}, "color_by", "--points-only"},
@@ -279,6 +304,7 @@ int main(void)
         cmocka_unit_test(test_colors_read_and_print),
         cmocka_unit_test(test_ranges_read),
         cmocka_unit_test(test_values_find_their_place),
+        cmocka_unit_test(test_strays_do_not_take_the_colours_of_heights),
         cmocka_unit_test(test_what_a_dataset_lacks_is_refused),
         cmocka_unit_test(test_ramps_begin_and_end_as_known),
     };
