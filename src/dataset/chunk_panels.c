@@ -308,7 +308,8 @@ static bool positive(float value)
 
 static const char *judge(const struct spl_chunk *c)
 {
-    uint32_t known = 255u << SPL_PANEL_COLUMNS | 255u << SPL_PANEL_ROWS | 7u << SPL_GEOMETRY_AXIS, columns, rows;
+    uint32_t known = 255u << SPL_PANEL_COLUMNS | 255u << SPL_PANEL_ROWS | 7u << SPL_GEOMETRY_AXIS;
+    const float most = 2 * 256; /* columns and rows: of a page that is forged those of a panel may be beyond the header's */
     uint32_t heights = relief_words(c);
     if (c->count == 0 || c->count > SPL_PANELS_MAX)
         return "has no panels, or more than 32";
@@ -328,9 +329,8 @@ static const char *judge(const struct spl_chunk *c)
         return "has heights whose step is not positive";
     if (!(fabsf(c->normal_u) <= 1 && fabsf(c->normal_v) <= 1))
         return "has a normal off the octahedron";
-    spl_panels_get_extent(c, &columns, &rows);
     for (int a = 0; a < 3; a++)
-        if (!isfinite(fabsf(c->origin[a]) + c->step * side * (float)(columns + rows) + spl_panels_get_reach(c)))
+        if (!isfinite(fabsf(c->origin[a]) + c->step * side * most + spl_panels_get_reach(c)))
             return "has a plane that is not finite";
     return NULL;
 }
