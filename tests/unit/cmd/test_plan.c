@@ -53,11 +53,11 @@ static void what_is_full_is_not_one_more(void **state)
     assert_true(VALUE(spl_plan_reckon(&asked), datasets) == 1);
     asked.points += 1;
     assert_true(VALUE(spl_plan_reckon(&asked), datasets) == 2);
-    asked.headroom = 1.3; /* 260 × 1.3 has a last bit too many */
-    asked.views = 260;
-    assert_true(VALUE(spl_plan_reckon(&asked), devices) == 1);
-    asked.views = 260.001;
-    assert_true(VALUE(spl_plan_reckon(&asked), devices) == 2);
+    asked.headroom = 1.1; /* 3380 × 1.1 ÷ 338 is 11 and a last bit too many */
+    asked.views = 3380;
+    assert_true(VALUE(spl_plan_reckon(&asked), devices) == 11);
+    asked.views = 3380.001;
+    assert_true(VALUE(spl_plan_reckon(&asked), devices) == 12);
 }
 
 /* As measured at the next size up, and beyond the largest by the pixels. */
