@@ -15,7 +15,7 @@ ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "http"))
 from harness import REAL, TEXTURED, Daemon, run
 
-COMMANDS = "serve pack render tour info synth bench compare devices sign".split()
+COMMANDS = "serve pack render tour info synth bench compare devices sign plan".split()
 SERVICE = "http://127.0.0.1:8080"
 # What an example of a reader's own site needs, which no test has.
 ELSEWHERE = re.compile(r"https://|s3://|\$TOKEN|docker |kubectl ")
@@ -129,7 +129,7 @@ def test_commands():
                 assert done.returncode == 0 or absent or unbuilt, (where, command, done.returncode, done.stderr)
                 if done.returncode == 0:
                     ran.add(name)
-        assert ran == {"pack", "render", "tour", "info", "synth", "devices", "sign"}, ran
+        assert ran == {"pack", "render", "tour", "info", "synth", "devices", "sign", "plan"}, ran
 
 
 def test_pictures():

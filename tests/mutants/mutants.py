@@ -24,7 +24,7 @@ import tomllib
 HERE = pathlib.Path(__file__).resolve().parent
 LEAST = 40  # faults of the list
 ROOMS = {"base", "geom", "image", "cloud", "sparse", "dataset", "gpu", "render", "synth", "pack", "measure", "service",
-         "shaders"}
+         "cmd", "shaders"}
 KEYS = {"what", "file", "old", "new", "fails"}
 
 

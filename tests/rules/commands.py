@@ -24,7 +24,7 @@ def check(arguments, code, where):
 
 overview = check(["--help"], 0, "stdout")
 commands = re.findall(r"^  ([a-z]+) {2,}\S", overview, re.MULTILINE)
-if sorted(commands) != sorted("serve pack render tour info synth bench compare devices sign".split()):
+if sorted(commands) != sorted("serve pack render tour info synth bench compare devices sign plan".split()):
     wrong.append(f"splatd --help lists {commands}")
 for command in commands:
     text = check([command, "--help"], 0, "stdout")
@@ -70,6 +70,13 @@ for words, wanted in {
     "render a.spld --ramp turbo -o b.png": "--ramp is of values.*--color-by height",
     "tour a.spld --path b --color-by flat:red --range 0..1 -o c": "--range is of values",
     "bench a.spld --soft-opacity 0.2": "--soft 'class:3-5'", "render a.spld --soft class=5 -o b.png": "write 'class:5'",
+    "plan": r"--points N is missing: splatd plan --points \S+", "plan --points 1e16": "--points takes.*'1e16'",
+    "plan --points nan": "--points takes.*'nan'", "plan --points 1.5": "--points takes a whole number.*'1.5'",
+    "plan --points -1": "--points takes.*'-1'", "plan --points 1e12 --gpu a100": "--gpu takes h100 or cpu, not 'a100'",
+    "plan --points 1e12 --views-per-second inf": "--views-per-second takes.*'inf'",
+    "plan --points 1e12 --cached 1.1": "--cached takes.*'1.1'", "plan --points 1e12 --headroom 0.9": "--headroom takes.*'0.9'",
+    "plan --points 1e12 --copies 0": "--copies takes.*'0'", "plan --points 1e12 --size 0x9": "--size takes.*'0x9'",
+    "plan --points 1e12 --size 32769x9": "--size takes.*32769x9", "plan 1e12": "no argument '1e12'",
     "serve nosuch": r"nosuch: there is no such file or directory of datasets.*splatd pack",
     "sign /v1/datasets/a/view --key nosuch": "nosuch.*openssl rand -hex 32",
 }.items():
@@ -107,6 +114,24 @@ with tempfile.TemporaryDirectory() as folder:
     if told["classes"] is not None or "  classes " in text or not any(term.startswith("plane:") for term in told["soft"]) or \
             [line.split("'")[1] for line in text.splitlines() if "--soft '" in line] != told["soft"]:
         wrong.append(f"info's terms of what is soft: {told['classes']}, {told['soft']}, {text!r}")
+# What deploy/operating.md shows of a plan is what the command says; every heading that a figure names is there, and JSON has the
+# same lines.
+root = pathlib.Path(sys.argv[2]).parent
+shown = (root / "deploy/operating.md").read_text(encoding="utf-8").split("## Larger than one machine")[1].split("\n## ")[0]
+shown = max(re.findall(r"(?:^(?: {4}.*)?\n)+", shown, re.M), key=len)
+shown = re.sub(r"^ {4}", "", shown, flags=re.M).strip()
+words = "plan --points 1e12 --views-per-second 1000 --gpu h100".split()
+said = check(words, 0, "stdout")
+if len(shown.splitlines()) < 40 or not said.startswith(shown):
+    wrong.append(f"deploy/operating.md does not show what splatd {' '.join(words)} says: {said}")
+told = json.loads(check([*words, "--json"], 0, "stdout"))
+for figure in told["figures"]:
+    file, headings = figure["measured"].split(", ", 1)
+    found = re.findall(r"^#+ (.*)$", (root / file).read_text(encoding="utf-8"), re.M)
+    if headings not in found and not all(heading in found for heading in headings.split("; ")):
+        wrong.append(f"splatd plan: {file} has no heading {headings!r}")
+if any(line["what"] not in said or not line["value"] >= 0 for line in told["lines"]) or len(told["lines"]) < 25:
+    wrong.append(f"splatd plan --json: {told['lines']}")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")
