@@ -176,6 +176,8 @@ static int read_measure(struct reader *r, struct spl_term *term, struct spl_term
         return fail(r, "what is measured is missing; write %s", write_attribute);
     if (length >= SPL_TERM_NAME_MAX)
         return fail(r, "a name of more than %d characters; write %s", SPL_TERM_NAME_MAX - 1, write_attribute);
+    if (begins_end(r->at)) /* what is printed would not read as the same */
+        return fail(r, "'%.*s' is a share of splats, not a name; write %s", (int)length, r->at, write_attribute);
     if (length == 1 && *r->at >= 'x' && *r->at <= 'z') {
         term->measure = SPL_TERM_COORDINATE;
         term->shape[3 + *r->at++ - 'x'] = 1;

@@ -197,6 +197,7 @@ static void test_what_is_wrong_is_named(void **state)
         {"uncertainty>0x10", "no number"},
         {"uncertainty>inf", "no number"},
         {"uncertainty>1e999", "no number"},
+        {"5>q2", "'q2' is a share of splats, not a name"},
         {"uncertainty>q1.5", "quantile 1.5, which is not within 0 and 1"},
         {"uncertainty>q-0.1", "quantile -0.1"},
         {"uncertainty:q0.5..0.9", "one end is a share"},
