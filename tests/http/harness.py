@@ -190,6 +190,12 @@ def together(count, work):
     return results
 
 
+def break_page(data):
+    """Flips a bit of a dataset's first page, which the section table knows (api/format.md)."""
+    row = data.index(b"PAGE", struct.unpack_from("<Q", data, 24)[0])
+    data[struct.unpack_from("<Q", data, row + 8)[0]] ^= 1
+
+
 class Skipped(Exception):
     """What a test raises that cannot judge here; its words are why."""
 

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import tempfile
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, run
+from harness import FAKE, REAL, VIEW, WALL, Daemon, break_page, run
 
 # query, field; the parser's unit test has many more
 QUERIES = [
@@ -205,7 +205,7 @@ def test_the_command_line_is_checked():
         second = os.path.join(folder, "wall.spld")
         broken = os.path.join(folder, "broken.spld")
         flipped = bytearray(open(WALL, "rb").read())
-        flipped[len(flipped) // 4] ^= 1  # in its page, which is most of it
+        break_page(flipped)
         open(broken, "wb").write(flipped)
         os.symlink(WALL, second)
         for arguments, said in [

@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, WALL, Daemon, eventually, fresh, run
+from harness import FAKE, REAL, WALL, Daemon, break_page, eventually, fresh, run
 
 WATCH = ("--watch", "30")
 
@@ -141,7 +141,7 @@ def test_the_old_version_finishes_what_it_began():
 
 def test_a_broken_file_is_said_once_and_skipped():
     broken = bytearray(wall())
-    broken[-5000] ^= 1
+    break_page(broken)
     with folder() as home:
         put(home, "bad", broken)
         put(home, "good", wall())

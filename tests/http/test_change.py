@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, WALL, Daemon, eventually, run, together
+from harness import FAKE, REAL, WALL, Daemon, break_page, eventually, run, together
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/octet-stream"}
@@ -188,7 +188,7 @@ def test_names_that_are_no_ids_make_no_files():
 
 def test_bodies_that_are_no_datasets_leave_what_was_there():
     broken = bytearray(WALL_1)
-    broken[-5000] ^= 1
+    break_page(broken)
     with serving() as d:
         assert put(d, "a", WALL_1).status == 201
         for body in (b"", b"x", b"ply\nformat ascii 1.0\n", bytes(broken), WALL_1[:-1], WALL_1 + b"x", b"\0" * 3_000_000):
