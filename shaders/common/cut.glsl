@@ -29,6 +29,18 @@ bool is_within_one(vec3 p)
     return above && below;
 }
 
+/* The shape that word `at` says, and what joins it: folds whether p is in it, and returns the distance. */
+float fold_shape(inout term_fold f, uint at, vec3 p, uint known)
+{
+    const bool bodies = (CUT & SPL_CUT_BODIES) != 0u;
+    uint shape = test_word(at), joint = test_word(at + 1u), bit = joint >> SPL_TEST_BIT & 15u;
+    uint flags = test_word(shape + SPL_SHAPE_FLAGS);
+    float distance = distance_to(shape, SPL_SHAPE_KIND(flags), p, bodies, bodies);
+    fold_test(f, joint & ~(15u << SPL_TEST_BIT), is_within(shape, flags, distance),
+              (known << 1u >> bit & 1u) != 0u && bit != 0u);
+    return distance;
+}
+
 /* What is known of all samples of a splat. */
 #define CUT_OPEN 0u
 #define CUT_KEPT 1u
@@ -45,15 +57,11 @@ bool is_kept(vec3 p, uint known, uint verdict)
         bool outside = (frame.cut_flags & SPL_TEST_OUTSIDE) != 0u;
         return is_within_one(p) != outside || (known << 1u >> bit & (bit != 0u ? 1u : 0u)) != 0u;
     }
-    bool bodies = (CUT & SPL_CUT_BODIES) != 0u, open = verdict == CUT_OPEN;
+    bool open = verdict == CUT_OPEN;
     uint at = frame.fill_from, count = open ? test_word(at) : 0u; /* no branch: a loop without rounds is what drivers leave out */
     term_fold f = begin_fold();
-    for (uint t = 0u; t < count; t++) {
-        uint shape = test_word(at + 1u + 2u * t), flags = test_word(shape + SPL_SHAPE_FLAGS);
-        uint joint = test_word(at + 2u + 2u * t), bit = joint >> SPL_TEST_BIT & 15u;
-        bool holds = is_within(shape, flags, distance_to(shape, SPL_SHAPE_KIND(flags), p, bodies, bodies));
-        fold_test(f, joint & ~(15u << SPL_TEST_BIT), holds, (known << 1u >> bit & 1u) != 0u && bit != 0u);
-    }
+    for (uint t = 0u; t < count; t++)
+        fold_shape(f, at + 1u + 2u * t, p, known);
     end_condition(f);
     return open ? f.all : verdict == CUT_KEPT;
 }
@@ -65,20 +73,17 @@ uint judge_cut(vec3 p, float radius, uint known)
 {
     if (CUT == 0u || CUT >= SPL_CUT_ONE)
         return CUT_OPEN;
-    bool bodies = (CUT & SPL_CUT_BODIES) != 0u, near = false;
+    bool near = false;
     uint at = frame.fill_from, count = test_word(at);
     term_fold f = begin_fold();
     for (uint t = 0u; t < count; t++) {
-        uint shape = test_word(at + 1u + 2u * t), flags = test_word(shape + SPL_SHAPE_FLAGS);
-        uint joint = test_word(at + 2u + 2u * t), bit = joint >> SPL_TEST_BIT & 15u;
-        float distance = distance_to(shape, SPL_SHAPE_KIND(flags), p, bodies, bodies);
+        uint shape = test_word(at + 1u + 2u * t);
+        float distance = fold_shape(f, at + 1u + 2u * t, p, known);
         float far = abs(p.x) + abs(p.y) + abs(p.z) + abs(test_float(shape + 3u)) + abs(test_float(shape + 7u)) +
                     abs(test_float(shape + 11u)) + abs(distance);
         float reach = radius * 1.001 + far * 1e-5;
         near = near || abs(distance - test_float(shape + SPL_SHAPE_LEAST)) <= reach ||
                abs(distance - test_float(shape + SPL_SHAPE_MOST)) <= reach;
-        fold_test(f, joint & ~(15u << SPL_TEST_BIT), is_within(shape, flags, distance),
-                  (known << 1u >> bit & 1u) != 0u && bit != 0u);
     }
     end_condition(f);
     return near ? CUT_OPEN : f.all ? CUT_KEPT : CUT_GONE;

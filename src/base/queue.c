@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-#include "base/clock.h"
+#include "base/condition.h"
 #include "base/memory.h"
 
 struct spl_queue {
@@ -29,12 +29,8 @@ int spl_queue_create(size_t capacity, struct spl_queue **out, struct spl_error *
         return SPL_E_NOMEM;
     queue->capacity = capacity;
     pthread_mutex_init(&queue->mutex, NULL);
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    pthread_cond_init(&queue->filled, &monotonic);
-    pthread_cond_init(&queue->drained, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    spl_condition_init(&queue->filled);
+    spl_condition_init(&queue->drained);
     *out = queue;
     return 0;
 }
@@ -47,20 +43,6 @@ void spl_queue_destroy(struct spl_queue *queue)
     pthread_cond_destroy(&queue->filled);
     pthread_mutex_destroy(&queue->mutex);
     free(queue);
-}
-
-/* False once the deadline has passed; the caller checks its condition again either way. */
-static bool wait_until(pthread_cond_t *condition, pthread_mutex_t *mutex, uint64_t deadline_ns)
-{
-    if (deadline_ns == SPL_NEVER) {
-        pthread_cond_wait(condition, mutex);
-        return true;
-    }
-    if (!spl_remaining_ns(deadline_ns))
-        return false;
-    struct timespec t = {.tv_sec = (time_t)(deadline_ns / SPL_NS_PER_S), .tv_nsec = (long)(deadline_ns % SPL_NS_PER_S)};
-    pthread_cond_timedwait(condition, mutex, &t);
-    return true;
 }
 
 static void append(struct spl_queue *queue, void *item)
@@ -86,7 +68,7 @@ int spl_queue_push(struct spl_queue *queue, void *item, uint64_t deadline_ns, st
     int rc = 0;
     pthread_mutex_lock(&queue->mutex);
     while (!queue->closed && queue->length == queue->capacity)
-        if (!wait_until(&queue->drained, &queue->mutex, deadline_ns))
+        if (!spl_condition_wait(&queue->drained, &queue->mutex, deadline_ns))
             break;
     if (queue->closed)
         rc = spl_fail(err, SPL_E_CANCELLED, "the queue was closed");
@@ -103,7 +85,7 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
     void *item = NULL;
     pthread_mutex_lock(&queue->mutex);
     while (!queue->closed && !queue->length && !queue->interrupted)
-        if (!wait_until(&queue->filled, &queue->mutex, deadline_ns))
+        if (!spl_condition_wait(&queue->filled, &queue->mutex, deadline_ns))
             break;
     if (queue->length) {
         item = queue->items[queue->first];

@@ -15,7 +15,7 @@
 #include <sys/queue.h>
 #include <time.h>
 
-#include "base/clock.h"
+#include "base/condition.h"
 #include "base/memory.h"
 #include "base/work.h"
 #include "dataset/remote_counts.h"
@@ -247,13 +247,11 @@ static void fetch_own(struct remote *remote, struct claim *claim)
 static int wait_for(struct remote *remote, struct block *block, uint64_t deadline_ns, struct spl_error *err)
 {
     while (block->state == WANTED) {
-        uint64_t until_ns = spl_now_ns() + 100 * SPL_NS_PER_MS;
-        struct timespec t = {.tv_sec = (time_t)(until_ns / SPL_NS_PER_S), .tv_nsec = (long)(until_ns % SPL_NS_PER_S)};
         if (spl_is_cancelled(remote->origin.cancelled))
             return spl_fail(err, SPL_E_CANCELLED, "%s: nobody waits for it any more", remote->origin.name);
         if (!spl_remaining_ns(deadline_ns))
             return spl_fail(err, SPL_E_TIMEOUT, "cannot read %s: nothing came in time", remote->origin.name);
-        pthread_cond_timedwait(&remote->ended, &remote->mutex, &t);
+        spl_condition_wait(&remote->ended, &remote->mutex, spl_now_ns() + 100 * SPL_NS_PER_MS);
     }
     return block->state == FAILED ? spl_fail(err, block->err.code, "%s", block->err.message) : SPL_OK;
 }
@@ -425,12 +423,8 @@ int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, 
     if (!remote)
         return SPL_E_NOMEM;
     struct spl_remote_origin *origin = &remote->origin;
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&remote->mutex, NULL);
-    pthread_cond_init(&remote->ended, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    spl_condition_init(&remote->ended);
     TAILQ_INIT(&remote->blocks);
     origin->link = *link;
     origin->shown = strdup(shown);

@@ -6,7 +6,6 @@
 #include "base/memory.h"
 #include "dataset/chunk.h"
 #include "dataset/panels.h"
-#include "dataset/relief.h"
 #include "dataset/values.h"
 #include "dataset/writer_parts.h"
 
@@ -17,26 +16,6 @@ static uint64_t weight_of(const struct spl_chunk *chunk, uint32_t i)
         return 1;
     const uint64_t points = spl_panels_get_points(chunk);
     return points * (i + 1) / chunk->count - points * i / chunk->count;
-}
-
-/* The height of item `i` above its node's origin; of a panel that of its middle. */
-static double height_of(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i)
-{
-    if (!spl_kind_has_panels(spl_chunk_kind(chunk))) {
-        struct spl_splat splat;
-        spl_chunk_decode(chunk, page, i, &splat);
-        return (double)splat.position[2];
-    }
-    const float middle = 0.5f * SPL_PANEL_SIDE;
-    struct spl_panel_frame frame;
-    struct spl_panel panel;
-    struct spl_relief relief;
-    float at[3], normal[3];
-    spl_panels_get_frame(chunk, &frame);
-    spl_panels_decode(chunk, page, i, &panel);
-    spl_panels_get_relief(chunk, page, i, &relief);
-    spl_panels_place(&frame, &panel, &relief, middle, middle, at, normal);
-    return (double)at[2];
 }
 
 static int add_chunk(const struct spl_dataset_writer *writer, const struct spl_tables *tables, uint32_t index,
@@ -51,8 +30,11 @@ static int add_chunk(const struct spl_dataset_writer *writer, const struct spl_t
         return SPL_OK;
     if (first + spl_tables_get_stream_words(tables, writer->stream_count, index) + SPL_PAGE_TAIL_WORDS > page_words)
         return SPL_OK; /* no chunk of that page: whoever opens the file refuses it */
-    for (uint32_t i = 0; i < chunk->count && !rc; i++)
-        rc = spl_values_add(heights, origin + height_of(chunk, page, i), weight_of(chunk, i), err);
+    for (uint32_t i = 0; i < chunk->count && !rc; i++) {
+        struct spl_splat splat; /* of a panel the one that it is from afar */
+        spl_chunk_decode(chunk, page, i, &splat);
+        rc = spl_values_add(heights, origin + (double)splat.position[2], weight_of(chunk, i), err);
+    }
     for (uint32_t s = 0; s < writer->stream_count && !rc; s++) {
         const struct spl_stream_code code = {tables->base[s][index], tables->width[s][index]};
         for (uint32_t i = 0; i < chunk->count && !rc; i++)

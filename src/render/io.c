@@ -13,7 +13,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-#include "base/clock.h"
+#include "base/condition.h"
 #include "base/memory.h"
 #include "render/spares.h"
 
@@ -272,13 +272,9 @@ int spl_io_create(void (*wake)(void *context), void *wake_context, struct spl_io
     TAILQ_INIT(&io->ended);
     for (size_t i = 0; i < READS; i++)
         TAILQ_INSERT_TAIL(&io->free, &io->reads[i], link);
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&io->mutex, NULL);
     pthread_cond_init(&io->work, NULL);
-    pthread_cond_init(&io->ended_one, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    spl_condition_init(&io->ended_one);
     pthread_mutex_lock(&io->mutex);
     int code = start_thread(io);
     pthread_mutex_unlock(&io->mutex);
@@ -397,24 +393,11 @@ void spl_io_end(struct spl_io *io, struct spl_io_read *read)
     pthread_mutex_unlock(&io->mutex);
 }
 
-/* False once the deadline has passed. */
-static bool wait_until(struct spl_io *io, uint64_t deadline_ns)
-{
-    if (!spl_remaining_ns(deadline_ns))
-        return false;
-    struct timespec t = {.tv_sec = (time_t)(deadline_ns / SPL_NS_PER_S), .tv_nsec = (long)(deadline_ns % SPL_NS_PER_S)};
-    if (deadline_ns == SPL_NEVER)
-        pthread_cond_wait(&io->ended_one, &io->mutex);
-    else
-        pthread_cond_timedwait(&io->ended_one, &io->mutex, &t);
-    return true;
-}
-
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns)
 {
     pthread_mutex_lock(&io->mutex);
     while (TAILQ_EMPTY(&io->ended) && io->under_way)
-        if (!wait_until(io, deadline_ns))
+        if (!spl_condition_wait(&io->ended_one, &io->mutex, deadline_ns))
             break;
     bool ended = !TAILQ_EMPTY(&io->ended);
     pthread_mutex_unlock(&io->mutex);

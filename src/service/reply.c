@@ -1,5 +1,5 @@
-/* Replies: JSON, RFC 9457 problems, text, long bodies, and what has no length yet. A problem's status and Retry-After follow from
- * its error. Owned by the loop's thread. */
+/* Replies: JSON, RFC 9457 problems, text, long bodies, and what has no length yet. A problem's status and Retry-After
+ * follow from its error. Owned by the loop's thread. */
 #include "service/reply.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* The encode threads, `encoders` for small images and one for large ones, so that no small one waits for these: one
- * frame in, bytes of a format out: an image, several in a container, or what a pick found in a dataset on disk. Each frame's pixels are
- * released as soon as they are encoded, so that what waits for slow clients is compressed. */
+ * frame in, bytes of a format out: an image, several in a container, or what a pick found in a dataset on disk. Each
+ * frame's pixels are released as soon as they are encoded, so that what waits for slow clients is compressed. */
 #include "base/clock.h"
 #include "service/view/bundle.h"
 #include "service/view/pick.h"

@@ -6,7 +6,7 @@
  *
  * Invariant: a job in `waiting` or counted in `reading` is this file's, and ends in spl_pipeline_finish_job(). The threads
  * begin with the first job. take() is the gpu thread's. */
-#include "base/clock.h"
+#include "base/condition.h"
 #include "service/view/stages.h"
 
 enum { of_one_most = 2 /* read at a time */, of_one_inside_most = 16 };
@@ -14,12 +14,8 @@ static const uint64_t look_around_ns = 100 * SPL_NS_PER_MS;
 
 void spl_far_picks_init(struct spl_far_picks *far)
 {
-    pthread_condattr_t monotonic;
-    pthread_condattr_init(&monotonic);
-    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
     pthread_mutex_init(&far->mutex, NULL);
-    pthread_cond_init(&far->changed, &monotonic);
-    pthread_condattr_destroy(&monotonic);
+    spl_condition_init(&far->changed);
     TAILQ_INIT(&far->waiting);
 }
 
@@ -82,10 +78,8 @@ static void *run(void *argument)
         if (job) {
             perform(pipeline, job);
         } else if (far->inside) {
-            const uint64_t until_ns = spl_now_ns() + look_around_ns;
-            struct timespec t = {.tv_sec = (time_t)(until_ns / SPL_NS_PER_S), .tv_nsec = (long)(until_ns % SPL_NS_PER_S)};
             spl_pipeline_touch(pipeline); // a read has its deadline: it does not hang for good
-            pthread_cond_timedwait(&far->changed, &far->mutex, &t);
+            spl_condition_wait(&far->changed, &far->mutex, spl_now_ns() + look_around_ns);
         } else {
             pthread_cond_wait(&far->changed, &far->mutex);
         }

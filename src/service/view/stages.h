@@ -1,5 +1,5 @@
-/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c,
- * encode_thread.c and far_picks.c include it. */
+/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c, encode_thread.c and far_picks.c include
+ * it. */
 #ifndef SPL_SERVICE_STAGES_H
 #define SPL_SERVICE_STAGES_H
 
