@@ -51,30 +51,36 @@ float light_of(ivec2 at, uint index)
     return kept;
 }
 
-/* Inverse depth of a sample of the tile that lies in the image, or depth where rays are parallel; 0 where there is
- * nothing. */
-float linear_at(ivec2 at)
+/* By how much a sample at depth z lies deeper than the mean of a pair, `apart` words before and behind it; less `rough`,
+ * and more of that as the pair is slanted. Of inverses of a and b only (a + b) / ab and |a - b| / ab are asked: one
+ * quotient. */
+float deeper_than(int index, int apart, float z, float rough, float across)
 {
-    bool inside = at.x >= int(frame.fill_level) && at.y >= int(frame.fill_from) && at.x < int(frame.fill_to) &&
-                  at.y < int(frame.fill_stride);
-    uint bits = depth_word(sample_index(inside ? at : ivec2(frame.fill_level, frame.fill_from)));
-    float z = uintBitsToFloat(bits);
-    return inside && bits != SPL_NOTHING ? (PARALLEL != 0u ? z : 1.0 / z) : 0.0;
+    float one = uintBitsToFloat(depth_word(uint(index - apart)));
+    float other = uintBitsToFloat(depth_word(uint(index + apart)));
+    precise float half_share = PARALLEL != 0u ? 0.5 : 0.5 * z / (one * other);
+    precise float mean = (one + other) * half_share, slant = abs(one - other) * half_share * across;
+    precise float deeper = PARALLEL != 0u ? (z - mean) * (1.0 / depth_slack(z, 1.0)) : mean - 1.0;
+    precise float past = deeper - rough * (1.0 + slant);
+    return one > 0.0 && other > 0.0 ? max(past, 0.0) : 0.0; /* SPL_NOTHING is no number: compares as false */
 }
 
-float edl_of(ivec2 at, float z)
+/* Pairs reach as far on either side: whether they lie in the image is judged for all that reach as far at once. */
+float edl_of(ivec2 at, uint index, float z)
 {
     int far = int(frame.map_sides), corner = int(0.7071068 * float(far) + 0.5);
-    float deeper = 0.0, far_off = depth_slack(z, 1.0), scale = ray_scale(z), across = frame.fx / float(far);
-    precise float rough = max(frame.map_pose[3], frame.map_pose[4] * scale) / (PARALLEL != 0u ? far_off : z);
-    for (int i = 0; i < 4; i++) { /* of fixed length: it is unrolled */
-        ivec2 step = i == 0 ? ivec2(far, 0) : i == 1 ? ivec2(corner, corner) : i == 2 ? ivec2(0, far) : ivec2(corner, -corner);
-        float one = linear_at(at - step), other = linear_at(at + step);
-        precise float nearer = 0.5 * (one + other) * z - 1.0, before = (z - 0.5 * (one + other)) / far_off;
-        precise float slant = 0.5 * abs(one - other) * (PARALLEL != 0u ? 1.0 : z) * across;
-        precise float past = (PARALLEL != 0u ? before : nearer) - rough * (1.0 + slant);
-        deeper += one > 0.0 && other > 0.0 ? max(past, 0.0) : 0.0;
-    }
+    int row = int(frame.width), here = int(index);
+    ivec2 low = ivec2(int(frame.fill_level), int(frame.fill_from));
+    ivec2 end = ivec2(int(frame.fill_to), int(frame.fill_stride));
+    bool wide = at.x - far >= low.x && at.x + far < end.x, tall = at.y - far >= low.y && at.y + far < end.y;
+    bool both = at.x - corner >= low.x && at.x + corner < end.x && at.y - corner >= low.y && at.y + corner < end.y;
+    float across = frame.fx / float(far);
+    precise float rough =
+        max(frame.map_pose[3], frame.map_pose[4] * ray_scale(z)) / (PARALLEL != 0u ? depth_slack(z, 1.0) : z);
+    float deeper = wide ? deeper_than(here, far, z, rough, across) : 0.0;
+    deeper += both ? deeper_than(here, corner * (row + 1), z, rough, across) : 0.0;
+    deeper += tall ? deeper_than(here, far * row, z, rough, across) : 0.0;
+    deeper += both ? deeper_than(here, corner * (row - 1), z, rough, across) : 0.0;
     precise float scaled = SPL_SHADE_DEPTH * deeper;
     precise float kept = 1.0 - frame.map_near * (scaled / (1.0 + scaled));
     return kept;
@@ -92,7 +98,8 @@ void main()
     float kept = 1.0;
     if (bits != SPL_NOTHING) {
         if ((KINDS & SPL_SHADES_EDL) != 0u)
-            kept = edl_of(at, uintBitsToFloat(bits)) * (LIT != 0u ? float(shades[index]) * (1.0 / float(SPL_SHADE_WHOLE)) : 1.0);
+            kept = edl_of(at, index, uintBitsToFloat(bits)) *
+                   (LIT != 0u ? float(shades[index]) * (1.0 / float(SPL_SHADE_WHOLE)) : 1.0);
         else
             kept = light_of(at, index);
     }
