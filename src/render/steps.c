@@ -15,13 +15,12 @@
 #include "base/sized.h"
 #include "geom/size.h"
 #include "image/enlarge.h"
-#include "image/rows.h"
 #include "render/advance.h"
 #include "render/around.h"
+#include "render/borrowed.h"
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
-#include "render/readback.h"
 #include "render/turns.h"
 #include "render/view.h"
 
@@ -56,54 +55,6 @@ static bool is_enlarged(const struct spl_frame_steps *steps)
 static struct spl_frame *get_made(struct spl_frame_steps *steps)
 {
     return is_enlarged(steps) ? &steps->enlarged : &steps->frame;
-}
-
-static int check_image(const struct spl_image *image, const struct spl_view *view, struct spl_error *err)
-{
-    const uint32_t unit = sizeof(uint32_t); /* pixels are stored as words */
-    if ((unsigned)image->layer >= SPL_LAYER_COUNT || !(view->layers >> image->layer & 1))
-        return spl_fail_field(err, SPL_E_USAGE, "images", "an image is of layer %d, which the view does not have",
-                              (int)image->layer);
-    if (image->type != spl_readback_type(image->layer) || image->width != view->camera.width ||
-        image->height != view->camera.height)
-        return spl_fail_field(err, SPL_E_USAGE, "images",
-                              "the image of layer %s has another type or size than the view",
-                              spl_layer_name(image->layer));
-    if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
-        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type) ||
-        image->row_bytes > SIZE_MAX / 2 / image->height)
-        return spl_fail_field(err, SPL_E_USAGE, "images",
-                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, "
-                              "or rows that overlap or do not fit into memory",
-                              spl_layer_name(image->layer), unit);
-    return SPL_OK;
-}
-
-static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
-                         struct spl_error *err)
-{
-    if (options->image_count && !options->images)
-        return spl_fail_field(err, SPL_E_USAGE, "images", "there are %zu images, but images is NULL",
-                              options->image_count);
-    for (size_t i = 0; i < options->image_count; i++) {
-        const struct spl_image *image = &options->images[i];
-        int rc = check_image(image, &steps->wanted, err);
-        if (rc)
-            return rc;
-        if (steps->borrowed >> image->layer & 1)
-            return spl_fail_field(err, SPL_E_USAGE, "images", "there are two images of layer %s",
-                                  spl_layer_name(image->layer));
-        get_made(steps)->images[image->layer] = *image;
-        steps->borrowed |= 1u << image->layer;
-    }
-    return SPL_OK;
-}
-
-static void give_images_back(struct spl_frame_steps *steps)
-{
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
-        if (steps->borrowed >> layer & 1)
-            get_made(steps)->images[layer] = (struct spl_image){0};
 }
 
 /* A share of the size, to be enlarged. */
@@ -183,7 +134,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc && steps->around && spl_around_is_empty(steps->around))
         steps->y = steps->view.camera.height; // there is nothing to draw
     if (!rc && options)
-        rc = borrow_images(steps, options, err);
+        rc = spl_frame_borrow_images(get_made(steps), &steps->wanted, options, &steps->borrowed, err);
     if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
         rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
                             steps->wanted.layers & ~steps->borrowed);
@@ -390,7 +341,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
     if (!steps)
         return;
     struct spl_frame *made = get_made(steps);
-    give_images_back(steps);
+    spl_frame_give_images_back(made, steps->borrowed);
     if (frame && !spl_frame_get_samples_left(steps)) {
         steps->enlarged.stats = steps->frame.stats;
         *frame = *made;
