@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "dataset/format.h" /* enum spl_chunk_kind */
 
@@ -22,19 +23,6 @@ static uint64_t with_cut(const struct spl_draw_list *list, uint32_t cut, uint64_
     const struct spl_draw_cut *found = cut ? spl_draw_list_find_cut(list, cut) : NULL;
     looks = looks < UINT32_MAX ? looks : UINT32_MAX;
     return looks + (found ? looks * found->words / cut_words : 0);
-}
-
-static int grow(void **array, size_t *capacity, size_t wanted, size_t size, struct spl_error *err)
-{
-    if (wanted <= *capacity)
-        return SPL_OK;
-    size_t larger = *capacity * 2 > wanted ? *capacity * 2 : wanted + 256;
-    void *p = spl_realloc(*array, larger, size, err);
-    if (!p)
-        return SPL_E_NOMEM;
-    *array = p;
-    *capacity = larger;
-    return SPL_OK;
 }
 
 static uint32_t splats(const struct spl_draw_chunk *chunk)
@@ -107,10 +95,8 @@ static int reserve_chunks(struct spl_draw_list *list, size_t wanted, struct spl_
     size_t a = list->chunk_capacity, b = a, c = a, d = a;
     if (wanted <= list->chunk_capacity)
         return SPL_OK;
-    if (grow((void **)&list->chunks, &a, wanted, sizeof *list->chunks, err) ||
-        grow((void **)&list->bounds, &b, wanted, sizeof *list->bounds, err) ||
-        grow((void **)&list->key_of_chunk, &c, wanted, sizeof *list->key_of_chunk, err) ||
-        grow((void **)&list->work_of_chunk, &d, wanted, sizeof *list->work_of_chunk, err))
+    if (spl_array_reserve(list->chunks, a, wanted, err) || spl_array_reserve(list->bounds, b, wanted, err) ||
+        spl_array_reserve(list->key_of_chunk, c, wanted, err) || spl_array_reserve(list->work_of_chunk, d, wanted, err))
         return SPL_E_NOMEM;
     list->chunk_capacity = d;
     return SPL_OK;
@@ -164,7 +150,7 @@ int spl_draw_list_append(struct spl_draw_list *list, const struct spl_draw_list 
 int spl_draw_list_add_tests(struct spl_draw_list *list, const uint32_t *words, uint32_t count, uint32_t *first,
                             struct spl_error *err)
 {
-    int rc = grow((void **)&list->tests, &list->test_capacity, list->test_count + count, sizeof *words, err);
+    int rc = spl_array_reserve(list->tests, list->test_capacity, list->test_count + count, err);
     if (rc)
         return rc;
     if (count)
@@ -186,7 +172,7 @@ int spl_draw_list_add_cut(struct spl_draw_list *list, uint32_t cut, const uint32
                           struct spl_error *err)
 {
     struct spl_draw_cut added = {.cut = cut, .words = count};
-    int rc = grow((void **)&list->cuts, &list->cut_capacity, list->cut_count + 1, sizeof *list->cuts, err);
+    int rc = spl_array_reserve(list->cuts, list->cut_capacity, list->cut_count + 1, err);
     rc = rc ? rc : spl_draw_list_add_tests(list, words, count, &added.word, err);
     if (!rc)
         list->cuts[list->cut_count++] = added;
@@ -233,7 +219,7 @@ static int get_batch(struct spl_draw_list *list, struct table *table, const stru
     int rc = grow_table(table, list, err);
     uint32_t *place = rc ? NULL : find(table, list, key);
     if (!rc && (!*place || !has_room(&list->batches[*place - 1], work))) {
-        rc = grow((void **)&list->batches, &list->batch_capacity, list->batch_count + 1, sizeof *list->batches, err);
+        rc = spl_array_reserve(list->batches, list->batch_capacity, list->batch_count + 1, err);
         if (rc)
             return rc;
         list->batches[list->batch_count++] = (struct spl_draw_batch){.key = *key};
@@ -329,9 +315,8 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
     if (sorted)
         return sorted;
     uint32_t *batch_of_chunk = spl_alloc_raw(list->chunk_count + 1, sizeof *batch_of_chunk, err);
-    int rc = batch_of_chunk
-                 ? grow((void **)&list->entries, &list->entry_capacity, list->entry_count, sizeof *list->entries, err)
-                 : SPL_E_NOMEM;
+    int rc = batch_of_chunk ? spl_array_reserve(list->entries, list->entry_capacity, list->entry_count, err)
+                            : SPL_E_NOMEM;
     if (!rc)
         rc = count_batches(list, batch_of_chunk, err);
     uint32_t first = 0;
@@ -352,9 +337,8 @@ int spl_draw_list_lay_out(struct spl_draw_list *list, struct spl_error *err)
 int spl_draw_list_add_map(struct spl_draw_list *list, uint32_t station, uint32_t cells, struct spl_error *err)
 {
     int rc = check_entries(list, cells, err);
-    rc = rc ? rc : grow((void **)&list->maps, &list->map_capacity, list->map_count + 1, sizeof *list->maps, err);
-    rc = rc ? rc : grow((void **)&list->entries, &list->entry_capacity, list->entry_count + cells,
-                        sizeof *list->entries, err);
+    rc = rc ? rc : spl_array_reserve(list->maps, list->map_capacity, list->map_count + 1, err);
+    rc = rc ? rc : spl_array_reserve(list->entries, list->entry_capacity, list->entry_count + cells, err);
     if (!rc)
         list->maps[list->map_count++] = (struct spl_draw_map){station, (uint32_t)list->entry_count, cells};
     return rc;

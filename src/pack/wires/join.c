@@ -12,6 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "pack/wires/grid.h"
 
@@ -191,14 +192,8 @@ static int find_pairs(struct join *j, double reach, uint64_t share, struct spl_e
                 double cost = cost_of(j, a, b);
                 if (cost == INFINITY)
                     continue;
-                if (j->pair_count == j->pair_capacity) {
-                    size_t larger = 2 * j->pair_capacity + 1024;
-                    struct pair *pairs = spl_realloc(j->pairs, larger, sizeof *pairs, err);
-                    if (!pairs)
-                        return SPL_E_NOMEM;
-                    j->pairs = pairs;
-                    j->pair_capacity = larger;
-                }
+                if (spl_array_reserve(j->pairs, j->pair_capacity, j->pair_count + 1, err))
+                    return SPL_E_NOMEM;
                 j->pairs[j->pair_count++] = (struct pair){cost, a, b};
                 take(j->work, pair_steps);
             }
