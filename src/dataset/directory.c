@@ -79,11 +79,6 @@ uint32_t spl_dataset_find_page_of_node(const struct spl_dataset *dataset, uint64
     return find(dataset, offsetof(struct spl_page_row, first_node), node);
 }
 
-uint32_t spl_dataset_find_page_of_chunk(const struct spl_dataset *dataset, uint64_t chunk)
-{
-    return find(dataset, offsetof(struct spl_page_row, first_chunk), chunk);
-}
-
 uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t id)
 {
     return find(dataset, offsetof(struct spl_page_row, first_id), id);

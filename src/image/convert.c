@@ -77,8 +77,10 @@ static int robust_range(const float *values, size_t count, float *near, float *f
     return SPL_OK;
 }
 
-int spl_convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
-                         struct spl_error *err)
+/* Depth or range through the colour map, nothing = black. near and far get the values at the map's ends: the 1st and
+ * 99th percentile to within 1 % of their value, 0 and 0 where nothing is. */
+static int convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
+                            struct spl_error *err)
 {
     int rc = robust_range(values, count, near, far, err);
     if (rc)
@@ -110,7 +112,8 @@ void spl_convert_normal(const float *normals, size_t count, uint8_t *rgb)
     }
 }
 
-void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb)
+/* A colour by hash of the id, never black; nothing = black. */
+static void convert_id(const uint32_t *ids, size_t count, uint8_t *rgb)
 {
     for (size_t i = 0; i < count; i++) {
         uint32_t h = ids[i];
@@ -170,11 +173,11 @@ int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl
     } else if (image->layer == SPL_LAYER_NORMAL) {
         spl_convert_normal(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_ID) {
-        spl_convert_id(image->pixels, count, picture);
+        convert_id(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_PRIMITIVE) {
         spl_convert_primitive(image->pixels, count, picture);
     } else {
-        return spl_convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
+        return convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
     }
     return SPL_OK;
 }

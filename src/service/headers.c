@@ -98,7 +98,8 @@ static void write_lens(const struct spl_camera *camera, char *out, size_t bytes)
                  camera->fx, camera->fy, camera->cx, camera->cy, k[0], k[1], p[0], p[1], k[2], k[3], k[4], k[5]);
 }
 
-void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
+/* The camera that was used, as JSON. */
+static void add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
     char far[32] = "null", lens[1024], text[2048]; // JSON has no infinity
@@ -168,7 +169,7 @@ void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_req
     else
         spl_headers_add_layer(headers, request, request->layer, encoded);
     spl_headers_add(headers, "Splatd-Unit", "%s", request->encode.unit);
-    spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
+    add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
     if (request->view.soft.what.count)
         add_soft(headers, &request->view.soft);
     if (request->view.clip.count)

@@ -19,10 +19,6 @@ int spl_ranges_init(struct spl_ranges *ranges, struct spl_hits *hits, uint32_t s
                     struct spl_error *err);
 void spl_ranges_finish(struct spl_ranges *ranges);
 
-/* The side at which nine texels of ten within what was scanned are hit, a multiple of 4 of at most `side_max`. */
-int spl_ranges_find_side(struct spl_hits *hits, uint32_t side_max, unsigned threads, uint32_t *side,
-                         struct spl_error *err);
-
 /* 1 / range in that direction (unit, the station's frame), between texels; 0 where nothing came back. What was not
  * scanned is as far as the nearest that was. */
 struct spl_inverse_ranges {

@@ -133,8 +133,10 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
         eye[c] = axes[0][c] * local[0] + axes[1][c] * local[1] + axes[2][c] * local[2];
 }
 
-int spl_view_fit(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
-                 double share, double least, double most, double fit[2], struct spl_error *err)
+/* The angles that the sample takes up around `target` from `eye`, in the frame, but for what `share` of it may lie
+ * beyond; with a margin, within [least, most] degrees. SPL_E_NOMEM. */
+static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3],
+                      const double up[3], double share, double least, double most, double fit[2], struct spl_error *err)
 {
     struct spl_camera camera = {0};
     int rc = spl_camera_look_at(&camera, eye, target, up, err);
@@ -193,7 +195,7 @@ int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_vi
             eye[c] -= (depth_of - at) * axes[2][c];
             target[c] = eye[c] + depth_of * axes[2][c];
         }
-        rc = spl_view_fit(s, eye, target, up, beyond, 20, 90, view->fit, err);
+        rc = fit_sample(s, eye, target, up, beyond, 20, 90, view->fit, err);
     }
     if (!rc) {
         spl_view_to_world(s, eye, view->eye);
