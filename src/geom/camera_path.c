@@ -6,9 +6,9 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/array.h"
+#include "geom/distortion.h"
 
 const char *const spl_path_positions_names[] = {"centripetal", "uniform", "linear", NULL};
 const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
@@ -50,7 +50,7 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
     if (path->count && camera->projection != first->projection)
         return spl_fail_field(err, SPL_E_INPUT, "projection", "%s after cameras that are %s",
                               spl_projection_name(camera->projection), spl_projection_name(first->projection));
-    if (path->count && memcmp(&camera->lens, &first->lens, sizeof first->lens))
+    if (path->count && !spl_distortion_is_same(&camera->lens, &first->lens))
         return spl_fail_field(err, SPL_E_INPUT, "params", "the lens of a path's cameras is one");
     const bool scans = camera->projection == SPL_EQUIRECTANGULAR; // whose rays nothing lies between
     if (path->count && scans && (camera->fx != first->fx || camera->cx != first->cx))

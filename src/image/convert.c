@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "base/memory.h"
 #include "image/encode.h"
 
@@ -32,20 +33,6 @@ static void make_map(uint8_t map[MAP_STEPS][3])
  * wide: enough for a robust range, in one pass. */
 enum { BINS = 0x7f80, BIN_SHIFT = 16 };
 
-static uint32_t float_bits(float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-static float bits_float(uint32_t bits)
-{
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
 static int robust_range(const float *values, size_t count, float *near, float *far, struct spl_error *err)
 {
     size_t *histogram = spl_alloc(BINS, sizeof *histogram, err);
@@ -57,7 +44,7 @@ static int robust_range(const float *values, size_t count, float *near, float *f
         float value = values[i];
         if (!(value > 0 && value < INFINITY))
             continue;
-        histogram[float_bits(value) >> BIN_SHIFT]++;
+        histogram[spl_float_to_bits(value) >> BIN_SHIFT]++;
         total++;
         least = value < least ? value : least;
         most = value > most ? value : most;
@@ -70,8 +57,8 @@ static int robust_range(const float *values, size_t count, float *near, float *f
             first++;
         for (seen = 0; (seen += histogram[last]) <= skip;)
             last--;
-        *near = fmaxf(bits_float(first << BIN_SHIFT), least);
-        *far = fminf(bits_float((last + 1) << BIN_SHIFT), most);
+        *near = fmaxf(spl_float_of_bits(first << BIN_SHIFT), least);
+        *far = fminf(spl_float_of_bits((last + 1) << BIN_SHIFT), most);
     }
     free(histogram);
     return SPL_OK;

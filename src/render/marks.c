@@ -10,15 +10,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "dataset/chunk.h"
 #include "render/terms.h"
-
-static uint32_t word_of(float value)
-{
-    uint32_t word;
-    memcpy(&word, &value, sizeof word);
-    return word;
-}
 
 static float share_at(const struct spl_marks_term *term, uint32_t past)
 {
@@ -53,10 +47,10 @@ static enum spl_marks_verdict judge_numbers(const struct spl_marks_term *term, e
     test[3] = start;
     test[4] = term->span;
     test[5] = term->shift;
-    test[6] = word_of(term->share_low);
-    test[7] = word_of(term->share_step);
-    test[8] = word_of(term->share_high);
-    test[9] = word_of(term->share_step_high);
+    test[6] = spl_float_to_bits(term->share_low);
+    test[7] = spl_float_to_bits(term->share_step);
+    test[8] = spl_float_to_bits(term->share_high);
+    test[9] = spl_float_to_bits(term->share_step_high);
     if (start > term->span || most > term->span - start || (none && !term->complete))
         return SPL_VERDICT_SOME;
     return share_at(term, start) >= 1 && share_at(term, start + (uint32_t)most) >= 1 ? SPL_VERDICT_ALL : SPL_VERDICT_BLENDED;
@@ -311,7 +305,7 @@ static void place_shape(const struct spl_marks *marks, const struct spl_marks_te
 
 static uint32_t float_word(double value)
 {
-    return word_of((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
+    return spl_float_to_bits((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
 }
 
 static uint32_t kind_of(const struct spl_marks_term *term)

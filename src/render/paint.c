@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "dataset/streams.h"
 #include "render/marks.h"
 
@@ -15,10 +16,7 @@ enum { unknown_gray = 0x606060 };
 
 static uint32_t word_of(double value)
 {
-    const float f = (float)fmax(fmin(value, (double)FLT_MAX), -(double)FLT_MAX);
-    uint32_t word;
-    memcpy(&word, &f, sizeof word);
-    return word;
+    return spl_float_to_bits((float)fmax(fmin(value, (double)FLT_MAX), -(double)FLT_MAX));
 }
 
 static uint32_t pack(const uint8_t rgb[3])

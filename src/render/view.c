@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/sized.h"
+#include "geom/distortion.h"
 #include "geom/faces.h"
 #include "geom/ray_list.h"
 #include "geom/size.h"
@@ -39,8 +40,7 @@ static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
 {
     return a->projection == b->projection && a->width == b->width && a->height == b->height && a->fx == b->fx &&
            a->fy == b->fy && a->cx == b->cx && a->cy == b->cy && a->near == b->near && a->far == b->far &&
-           a->lens.kind == b->lens.kind && a->lens.reach == b->lens.reach &&
-           !memcmp(a->lens.k, b->lens.k, sizeof a->lens.k) && !memcmp(a->lens.p, b->lens.p, sizeof a->lens.p);
+           spl_distortion_is_same(&a->lens, &b->lens);
 }
 
 /* What samples are taken of. */

@@ -63,14 +63,6 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
     return PARAM_COUNT;
 }
 
-int spl_hex_digit(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
 static int parse_color(struct spl_value *value, const char *name, const char *text, struct spl_error *err)
 {
     uint8_t rgba[4];

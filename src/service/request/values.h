@@ -69,9 +69,6 @@ int spl_ray_frame_from_name(const char *name); /* -1: unknown */
 /* JSON where a list of rays is sent, in place of a format. */
 enum { SPL_FORMAT_LISTED = SPL_FORMAT_COUNT };
 
-/* 0..15, -1 for anything else. */
-int spl_hex_digit(char c);
-
 /* The parameter called `name` in `place`; PARAM_COUNT and a filled `err` for one that is unknown there. */
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err);
 
