@@ -144,9 +144,10 @@ static int parse_view(const char *option, char *text, struct spl_saved_view *vie
         while (key < count && (strlen(names[key]) != length || strncmp(at, names[key], length)))
             key++;
         if (key == count || at[length] != '=' || given[key])
-            return spl_fail_field(err, SPL_E_USAGE, option + 2,
-                                  "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z, fov=DEG and view_height=UNITS, each once, not '%.60s'",
-                                  option, at);
+            return spl_fail_field(
+                err, SPL_E_USAGE, option + 2,
+                "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z, fov=DEG and view_height=UNITS, each once, not '%.60s'",
+                option, at);
         given[key] = true;
         char *value = at + length + 1;
         for (next = value; *next && !(*next == ',' && isalpha((unsigned char)next[1]));)
@@ -182,10 +183,11 @@ static int take_view(void *arguments, const char *option, char *text, struct spl
     struct spl_saved_view *view = &a->views[a->pack.view_count];
     *view = (struct spl_saved_view){0};
     if (text[length] != '=' || !length || length >= sizeof view->name)
-        return spl_fail_field(err, SPL_E_USAGE, "view",
-                              "%s takes NAME=eye=X,Y,Z,target=X,Y,Z, the name of at most 63 letters, digits, '.', '_' and "
-                              "'-', not '%.60s'",
-                              option, text);
+        return spl_fail_field(
+            err, SPL_E_USAGE, "view",
+            "%s takes NAME=eye=X,Y,Z,target=X,Y,Z, the name of at most 63 letters, digits, '.', '_' and "
+            "'-', not '%.60s'",
+            option, text);
     memcpy(view->name, text, length);
     a->pack.views = a->views;
     a->pack.view_count++;
@@ -215,10 +217,12 @@ static const struct spl_cmd_option options[] = {
     {"title", "TEXT", "what people call the dataset, a line", SPL_CMD_TEXT(struct arguments, pack.title)},
     {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct arguments, pack.description)},
     {"default-view", "VIEW",
-     "eye=X,Y,Z,target=X,Y,Z[,up=X,Y,Z][,fov=DEG]: what is shown where nobody says a camera; fov is vertical, of images "
-     "narrower than high across",
+     "eye=X,Y,Z,target=X,Y,Z[,up=X,Y,Z][,fov=DEG]: what is shown where nobody says a camera; fov is vertical, of "
+     "images narrower than high across",
      .otherwise = "one that shows all of it, or a room from inside", .take = take_default_view},
-    {"view", "NAME=VIEW", "the same under a name, for view=NAME; up to 64 times; view_height=UNITS: orthographic, so high", .take = take_view},
+    {"view", "NAME=VIEW",
+     "the same under a name, for view=NAME; up to 64 times; view_height=UNITS: orthographic, so high",
+     .take = take_view},
     {"neighbours", "K", "nearest points that a normal and a radius are made from", .otherwise = "12",
      SPL_CMD_COUNT_32(struct arguments, pack.neighbours, 3, 64)},
     {"position-error", "X", "mean, as a share of the splat radius", .otherwise = "0.016",
@@ -274,8 +278,8 @@ static const struct spl_cmd_option options[] = {
      "their sag: a name that ends in .ply, .obj or .dxf, with --primitives all",
      SPL_CMD_TEXT(struct arguments, pack.export_primitives)},
     {"memory", "MIB",
-     "that the pack may take, or 4G and such: what is beyond lies on disk beside the output meanwhile; the file does not "
-     "depend on it. Of photographs their pass's alone, where it is 2048 unless it is said",
+     "that the pack may take, or 4G and such: what is beyond lies on disk beside the output meanwhile; the file does "
+     "not depend on it. Of photographs their pass's alone, where it is 2048 unless it is said",
      .otherwise = "as much as there is need", SPL_CMD_MIB(struct arguments, pack.memory_bytes, 64, 1 << 20)},
     {"device", "D", "that draws the splats' depth: auto, vulkan, egl, vulkan:1, a UUID, part of a name",
      SPL_CMD_TEXT(struct arguments, photos.device)},

@@ -49,10 +49,11 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
         return wrong(dataset, err, info->pages, "closes it with nodes that are no node's child, or with too few nodes");
     if (info->splats > last->first_id || info->pieces > last->first_id || info->panels > last->first_id ||
         info->meshes > last->first_id)
-        return spl_fail_field(err, SPL_E_CORRUPT, "counts",
-                              "%s: section META: \"counts\" has more splats, pieces, panels or meshes than PDIR has ids; pack "
-                              "the dataset again",
-                              dataset->name);
+        return spl_fail_field(
+            err, SPL_E_CORRUPT, "counts",
+            "%s: section META: \"counts\" has more splats, pieces, panels or meshes than PDIR has ids; pack "
+            "the dataset again",
+            dataset->name);
     dataset->rows = rows;
     info->nodes = last->first_node;
     info->chunks = last->first_chunk;

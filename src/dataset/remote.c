@@ -1,6 +1,7 @@
-/* A remote file by blocks of 1 MiB: what is asked for small, as tables are, comes as the blocks that it lies in, and what
- * is asked for large, as pages are, as one range of all its blocks that are missing. Blocks that somebody is fetching are
- * waited for, not fetched again. Some stay in memory (remote_blocks.h), and all go to the page cache, if there is one.
+/* A remote file by blocks of 1 MiB: what is asked for small, as tables are, comes as the blocks that it lies in, and
+ * what is asked for large, as pages are, as one range of all its blocks that are missing. Blocks that somebody is
+ * fetching are waited for, not fetched again. Some stay in memory (remote_blocks.h), and all go to the page cache, if
+ * there is one.
  *
  * Invariant: who has the claim of some blocks fetches them before it waits for those of others, so nobody waits in a
  * circle. */
@@ -19,7 +20,7 @@
 #include "dataset/remote_counts.h"
 #include "dataset/remote_run.h"
 
-enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of one request */, forgotten_most = 1 << 16 /* on disk */ };
+enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of a request */, forgotten_most = 1 << 16 /* on disk */ };
 
 struct spl_remote_counts spl_remote_counts;
 
@@ -56,7 +57,8 @@ static int add_to_claim(struct remote *remote, struct claim *claim, uint64_t ind
     return SPL_OK;
 }
 
-/* The blocks of a read, and where something of it is missing those behind it that are expected too. The mutex is held. */
+/* The blocks of a read, and where something of it is missing those behind it that are expected too. The mutex is
+ * held. */
 static int make_claim(struct remote *remote, struct claim *claim, uint64_t last, struct spl_error *err)
 {
     bool missing = false;
@@ -162,7 +164,8 @@ static int fetch_window(struct remote *remote, uint64_t offset, char *out, size_
 {
     struct claim claim = {.first = offset / BLOCK};
     const uint64_t last = (offset + bytes - 1) / BLOCK;
-    const uint64_t deadline_ns = spl_now_ns() + 2 * spl_remote_get_patience_ns(&remote->origin, (uint64_t)window * BLOCK);
+    const uint64_t deadline_ns =
+        spl_now_ns() + 2 * spl_remote_get_patience_ns(&remote->origin, (uint64_t)window * BLOCK);
     pthread_mutex_lock(&remote->blocks.mutex);
     int rc = make_claim(remote, &claim, last, err);
     pthread_mutex_unlock(&remote->blocks.mutex);

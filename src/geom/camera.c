@@ -240,7 +240,8 @@ static int check_focal(enum spl_projection projection, double focal, const char 
 {
     if (projection == SPL_ORTHOGRAPHIC && focal > 0 && !(focal >= 1e-12 && focal <= 1e14))
         return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not within 1e-12 and 1e14", focal);
-    if (isfinite(focal) && (focal > 0 || (projection == SPL_EQUIRECTANGULAR && focal < 0))) /* which may go the other way */
+    const bool reverses = projection == SPL_EQUIRECTANGULAR; // which may go the other way
+    if (isfinite(focal) && (focal > 0 || (reverses && focal < 0)))
         return SPL_OK;
     if (projection == SPL_ORTHOGRAPHIC)
         return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not a positive number", focal);

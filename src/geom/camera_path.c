@@ -54,9 +54,11 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
         return spl_fail_field(err, SPL_E_INPUT, "params", "the lens of a path's cameras is one");
     const bool scans = camera->projection == SPL_EQUIRECTANGULAR; // whose rays nothing lies between
     if (path->count && scans && (camera->fx != first->fx || camera->cx != first->cx))
-        return spl_fail_field(err, SPL_E_INPUT, "azimuth", "the azimuths of a path's scans are one, as of its first camera");
+        return spl_fail_field(err, SPL_E_INPUT, "azimuth",
+                              "the azimuths of a path's scans are one, as of its first camera");
     if (path->count && scans && (camera->fy != first->fy || camera->cy != first->cy))
-        return spl_fail_field(err, SPL_E_INPUT, "elevation", "the elevations of a path's scans are one, as of its first camera");
+        return spl_fail_field(err, SPL_E_INPUT, "elevation",
+                              "the elevations of a path's scans are one, as of its first camera");
     if (path->count == path->capacity && grow(path, err))
         return SPL_E_NOMEM;
     if (!path->count && isnan(time)) {
@@ -102,8 +104,8 @@ int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, dou
         seconds *= (double)path->count / (double)(path->count - 1);
     double count = each ? (double)path->count : frames ? (double)frames : floor(seconds * *fps_out + 0.5);
     if (count > (double)most && !frames && !each && !given)
-        return spl_fail_field(err, SPL_E_LIMIT, "time", "the times are %.6g s long, %.6g frames; the limit is %zu", seconds,
-                              count, most);
+        return spl_fail_field(err, SPL_E_LIMIT, "time", "the times are %.6g s long, %.6g frames; the limit is %zu",
+                              seconds, count, most);
     if (count > (double)most)
         return spl_fail_field(err, SPL_E_LIMIT, frames || each ? "frames" : "seconds", "%.0f frames; the limit is %zu",
                               count, most);

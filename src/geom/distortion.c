@@ -89,8 +89,8 @@ void spl_distortion_widen(struct spl_distortion *d)
     find_reach(d, d->kind == SPL_DISTORTION_FISHEYE ? M_PI : radial_reach);
 }
 
-/* The r, or the angle, whose image has the radius `image`, from a guess. Newton's steps, halving where they would leave what
- * is known to hold it. */
+/* The r, or the angle, whose image has the radius `image`, from a guess. Newton's steps, halving where they would leave
+ * what is known to hold it. */
 static double find_radius(const struct spl_distortion *d, double image, double guess)
 {
     double low = 0, high = d->reach, r = fmin(guess, d->reach), growth;

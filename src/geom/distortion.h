@@ -1,5 +1,5 @@
-/* What real lenses add to a pinhole (struct spl_distortion), both ways. Photographs are sampled through lenses, and views
- * drawn through them. Pure functions; any thread. */
+/* What real lenses add to a pinhole (struct spl_distortion), both ways. Photographs are sampled through lenses, and
+ * views drawn through them. Pure functions; any thread. */
 #ifndef SPL_GEOM_DISTORTION_H
 #define SPL_GEOM_DISTORTION_H
 

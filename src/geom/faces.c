@@ -102,9 +102,10 @@ static void add_image_edges(struct parts *parts, const struct spl_camera *camera
     for (int i = 0; i < 4 * (edge_steps + 1); i++) {
         const double t = (double)(i % (edge_steps + 1)) / edge_steps, w = camera->width, h = camera->height;
         const int edge = i / (edge_steps + 1);
+        const double x = edge < 2 ? t * w : edge == 2 ? 0 : w, y = edge < 2 ? (edge ? h : 0) : t * h;
         if (camera->projection == SPL_EQUIRECTANGULAR)
-            get_ring_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray);
-        else if (!spl_camera_get_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray))
+            get_ring_ray(camera, x, y, ray);
+        else if (!spl_camera_get_ray(camera, x, y, ray))
             continue;
         add_ray(parts, ray);
     }
@@ -156,9 +157,9 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
     }
 }
 
-/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its own.
- * A face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by what is
- * left of it to 90 degrees. */
+/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its
+ * own. A face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by
+ * what is left of it to 90 degrees. */
 static double find_focal(const struct spl_camera *camera, double widest)
 {
     const double focal = fmax(fabs(camera->fx), fabs(camera->fy)), end = fmin(widest, M_PI_2);
@@ -226,9 +227,11 @@ int spl_faces_init_of(struct spl_faces *faces, const struct spl_camera *camera, 
             from[k] = floor(parts.low[i][k] * focal + middle) - SPL_FACE_MARGIN;
             size[k] = ceil(parts.high[i][k] * focal + middle) + SPL_FACE_MARGIN - from[k];
             if (!(size[k] <= side_px))
-                return spl_fail_field(err, SPL_E_LIMIT, blame(camera),
-                                      "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
-                                      "%u are drawn", size[k], side_px);
+                return spl_fail_field(
+                    err, SPL_E_LIMIT, blame(camera),
+                    "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
+                    "%u are drawn",
+                    size[k], side_px);
         }
         *face = *camera;
         face->projection = SPL_PERSPECTIVE;

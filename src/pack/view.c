@@ -1,4 +1,5 @@
-/* The default view: a camera's own, one from inside, one from outside. The caller's thread; equal points, equal view. */
+/* The default view: a camera's own, one from inside, one from outside. The caller's thread; equal points, equal
+ * view. */
 #include "pack/view.h"
 
 #include <math.h>

@@ -10,7 +10,7 @@
 
 enum {
     base_work = 8, /* of what covers no sample */
-    cut_words = 48 /* of shapes that a sample is asked of, as much work as it: 64 corners, 15 boxes are nine times that */
+    cut_words = 48 /* of shapes that a sample is asked of, as much work as it; 64 corners and 15 boxes: nine times so */
 };
 
 /* Samples, with the time that shapes take which cut them. */

@@ -51,7 +51,8 @@ static void bound_distance(const struct spl_paint *paint, const struct spl_datas
     }
 }
 
-/* All the heights that there are, but for those of few points far off the others: a bird, an echo from below the ground. */
+/* All the heights that there are, but for those of few points far off the others: a bird, an echo from below the
+ * ground. */
 static void bound_heights(const struct spl_stream_values *heights, double range[2])
 {
     static const double far = 0.5; /* of what most lie within */
@@ -64,9 +65,10 @@ static int find_ends(struct spl_paint *paint, const struct spl_color_params *col
                      struct spl_error *err)
 {
     const bool of_heights = color->by == SPL_COLOR_BY_HEIGHT;
-    const struct spl_stream_values *values = of_heights           ? info->heights
-                                             : paint->stream >= 0 ? spl_dataset_info_get_values(info, (uint32_t)paint->stream)
-                                                                  : NULL;
+    const struct spl_stream_values *values = of_heights ? info->heights
+                                             : paint->stream >= 0
+                                                 ? spl_dataset_info_get_values(info, (uint32_t)paint->stream)
+                                                 : NULL;
     double range[2] = {color->range[0], color->range[1]};
     const bool shares[2] = {color->has_range ? color->shares[0] : paint->stream >= 0,
                             color->has_range ? color->shares[1] : paint->stream >= 0};

@@ -1,11 +1,11 @@
 /* A frame from its first tile to its last, one tile a step, or a piece of one that is too much work for a step.
  *
- * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of the
- * next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill plan, which
- * is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was drawn before
- * it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for its first pages
- * has none. A camera that is no one pinhole is drawn face by face, each as a frame of its own, and looked up in them at the
- * end (around.h). Belongs to the renderer's thread. */
+ * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of
+ * the next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill
+ * plan, which is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was
+ * drawn before it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for
+ * its first pages has none. A camera that is no one pinhole is drawn face by face, each as a frame of its own, and
+ * looked up in them at the end (around.h). Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,8 @@
 #include "render/turns.h"
 #include "render/view.h"
 
-enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 }; /* a step; 10 ms of a core or two */
+/* A step: 10 ms of a core or two. */
+enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 };
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
 enum { mapped_samples = 1 << 19 };

@@ -108,7 +108,8 @@ int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key,
     return rc;
 }
 
-/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks or cuts. */
+/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks or
+ * cuts. */
 static struct spl_gpu_kernel *kernel_of(const struct spl_disc_kernels *kernels, uint32_t ends)
 {
     if (!kernels->of[ends])

@@ -110,8 +110,8 @@ static int run(struct spl_training *t, uint64_t begin_ns, spl_train_report *repo
 }
 
 /* The unit in which atom a's coefficients are stored. Rounding by steps of Δ adds Δ²/12 a coefficient to the error of
- * each use, times its squared weight; with a further bit a coefficient 3/4 of that go. With lambda the step is where that
- * is worth its bits, d(error)/d(bits) = 2 ln 2 · power · Δ²/12 = lambda. */
+ * each use, times its squared weight; with a further bit a coefficient 3/4 of that go. With lambda the step is where
+ * that is worth its bits, d(error)/d(bits) = 2 ln 2 · power · Δ²/12 = lambda. */
 static float get_step(const struct spl_training *t, uint32_t a)
 {
     const double finest = 0.002, coarsest = 0.1; /* of an atom's norm */

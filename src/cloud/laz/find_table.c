@@ -1,8 +1,8 @@
 /* The table of chunks where it lies: its offset stands before the first chunk, or, of writers that could not go back,
  * in the file's last eight bytes. A writer that was interrupted left none.
  *
- * Nothing of the file is trusted: no more is read of a table than its chunks can need, each of which has a point that is
- * stored as it is. The cloud's thread. */
+ * Nothing of the file is trusted: no more is read of a table than its chunks can need, each of which has a point that
+ * is stored as it is. The cloud's thread. */
 #include "cloud/laz/find_table.h"
 
 #include <stdlib.h>

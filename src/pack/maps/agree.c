@@ -247,9 +247,9 @@ static void find_other(struct spl_agreement *agreement, const struct work *w)
     }
 }
 
-int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas, const struct spl_station *station,
-                       uint32_t index, bool scanned, const struct spl_map_sight *map, const struct spl_samples *samples,
-                       struct spl_error *err)
+int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas,
+                       const struct spl_station *station, uint32_t index, bool scanned, const struct spl_map_sight *map,
+                       const struct spl_samples *samples, struct spl_error *err)
 {
     struct work w;
     double shift[3] = {0}, turn[3] = {0}, errors[2];

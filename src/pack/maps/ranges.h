@@ -13,8 +13,8 @@ struct spl_ranges {
     double near; /* as of struct spl_map_row: one hit of some thousands is nearer */
 };
 
-/* Of `side_max` texels (>= 4) at most, fewer where the hits are too far apart for it: nine texels of ten within what was
- * scanned are hit. Parallel; blocks. Uses hits->texel. On failure nothing is held. */
+/* Of `side_max` texels (>= 4) at most, fewer where the hits are too far apart for it: nine texels of ten within what
+ * was scanned are hit. Parallel; blocks. Uses hits->texel. On failure nothing is held. */
 int spl_ranges_init(struct spl_ranges *ranges, struct spl_hits *hits, uint32_t side_max, unsigned threads,
                     struct spl_error *err);
 void spl_ranges_finish(struct spl_ranges *ranges);

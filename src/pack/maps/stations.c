@@ -286,11 +286,12 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_splats *sp
     *stations = (struct spl_stations){.scanned = json_array_size(known) == 1 || (json_array_size(known) && scan >= 0)};
     rc = json_array_size(known) ? take_scanned(stations, known, err) : take_eyes(stations, views, metre, err);
     if (!rc && !stations->count)
-        rc = spl_fail_field(err, SPL_E_INPUT, "panoramas",
-                            "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
-                            "is no panorama; name one by --panoramas, or a panoramas.json that says the place alone: "
-                            "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
-                            "\"quaternion\": [1, 0, 0, 0]}]}");
+        rc =
+            spl_fail_field(err, SPL_E_INPUT, "panoramas",
+                           "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
+                           "is no panorama; name one by --panoramas, or a panoramas.json that says the place alone: "
+                           "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
+                           "\"quaternion\": [1, 0, 0, 0]}]}");
     if (!rc)
         rc = place_views(stations, views, metre, nowhere, context, err);
     if (!rc)

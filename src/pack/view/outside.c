@@ -1,6 +1,7 @@
-/* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much of
- * its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it, a
- * street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal view. */
+/* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much
+ * of its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it,
+ * a street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal
+ * view. */
 #include "pack/view/outside.h"
 
 #include <float.h>
@@ -51,7 +52,8 @@ static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
 enum { rows = raster * 9 / 16 + 2 };
 
 /* The nearest depth of each cell. */
-static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame, double depth[rows][raster])
+static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame,
+                 double depth[rows][raster])
 {
     for (int y = 0; y < rows; y++)
         for (int x = 0; x < raster; x++)
@@ -112,8 +114,8 @@ static double most_of(double *values, size_t count, double share)
     return values[count - 1 - (size_t)(share * (double)count)];
 }
 
-/* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and the
- * eye is where the narrower pair meets, in the middle of the other. */
+/* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and
+ * the eye is where the narrower pair meets, in the middle of the other. */
 static void find_eye(const struct spl_view_sample *s, double axes[3][3], const double tangent[2], double *values,
                      double eye[3])
 {
@@ -158,7 +160,8 @@ static int fit_sample(const struct spl_view_sample *s, const double eye[3], cons
     return 0;
 }
 
-/* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from before. */
+/* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from
+ * before. */
 static double first_elevation(const struct spl_view_sample *s)
 {
     double height = s->high[2] - s->low[2], width = spl_view_sample_width(s);
@@ -168,7 +171,8 @@ static double first_elevation(const struct spl_view_sample *s)
 int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_view *view, struct spl_error *err)
 {
     static const double tangent[2] = {0.41421356237309503 * 16 / 9, 0.41421356237309503}; /* of 45 degrees upright */
-    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err), *values = spl_alloc_raw(s->count, sizeof *values, err);
+    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err),
+    *values = spl_alloc_raw(s->count, sizeof *values, err);
     double best = -1, axes[3][3], eye[3], target[3], up[3] = {0, 0, 1};
     double azimuth = 0, elevation = 0;
     int rc = depth && values ? 0 : SPL_E_NOMEM;

@@ -1,6 +1,6 @@
 /* Where the points are, by quantiles: the box begins at a hundredth of them from either end and goes on outwards as
- * long as there is no gap, so that a mast or a wire that few points show belongs to it, and a bird or noise far off does
- * not. One thread; the outcome depends on the points alone. */
+ * long as there is no gap, so that a mast or a wire that few points show belongs to it, and a bird or noise far off
+ * does not. One thread; the outcome depends on the points alone. */
 #include "pack/view/sample.h"
 
 #include <math.h>
@@ -116,8 +116,9 @@ int spl_view_sample_init(struct spl_view_sample *s, const struct spl_points *p, 
         spl_view_to_frame(s, (double[]){p->axis[0][i], p->axis[1][i], p->axis[2][i]}, s->at[k]);
         s->area[k] = p->radius[i] * p->radius[i];
         for (int a = 0; s->normal && a < 3; a++)
-            s->normal[k][a] = (float)(s->frame[a][0] * (double)p->normal[i][0] + s->frame[a][1] * (double)p->normal[i][1] +
-                                      s->frame[a][2] * (double)p->normal[i][2]);
+            s->normal[k][a] =
+                (float)(s->frame[a][0] * (double)p->normal[i][0] + s->frame[a][1] * (double)p->normal[i][1] +
+                        s->frame[a][2] * (double)p->normal[i][2]);
     }
     int rc = find_box(s, p, count, err);
     if (!rc)

@@ -1,12 +1,11 @@
 /* The axes of chains, and how thick what they run along is. A scan has points of a wire's surface, off by its noise; a
  * chain of them zigzags. Each point is moved to where a parabola through those before and behind it in its stretch has
- * it, over windows that are several times as long as the chain is wide. Then all points that belong to the chain, also those
- * that lie beside it, say by how far they are spread across: along the direction in which they are most, between the
- * quantiles at 5 and 95 %. Of a cylinder that is seen from one side these are 0.90 of its diameter apart, from all
- * sides 0.99. What the scan's noise adds is taken off: it lies along
- * the rays, so where it is about as large as the spread, which may then be either's, it is taken off those of both
- * directions together. Chains that are not long beside their width are no lines.
- * Owned by the thread that joins. */
+ * it, over windows that are several times as long as the chain is wide. Then all points that belong to the chain, also
+ * those that lie beside it, say by how far they are spread across: along the direction in which they are most, between
+ * the quantiles at 5 and 95 %. Of a cylinder that is seen from one side these are 0.90 of its diameter apart, from all
+ * sides 0.99. What the scan's noise adds is taken off: it lies along the rays, so where it is about as large as the
+ * spread, which may then be either's, it is taken off those of both directions together. Chains that are not long
+ * beside their width are no lines. Owned by the thread that joins. */
 #include "pack/wires/axis.h"
 
 #include <math.h>
@@ -18,7 +17,7 @@
 static const double share_seen = 0.945;     /* of the diameter, between the quantiles */
 static const double quantile = 0.05, noise_span = 3.29; /* between them, of a normal distribution: sigma */
 static const double noise_small = 0.4;      /* of the square of the spread: what the noise adds there */
-static const double share_both = 0.93;      /* the sum of both spreads' squares, of the diameter's, seen from one side */
+static const double share_both = 0.93;      /* both spreads' squares in sum, of the diameter's, seen from one side */
 static const double break_at = 6;           /* spacings: beyond, another stretch begins */
 static const double window_wide = 8;        /* a window is so many times as long as the chain is spread */
 static const double length_least = 4;       /* widths, of a line */

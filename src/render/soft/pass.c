@@ -182,8 +182,8 @@ static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float
     return rc;
 }
 
-/* Gives walks back that were kept. What they are of follows from what is to be drawn: where pages have come or gone since,
- * it is drawn anew. */
+/* Gives walks back that were kept. What they are of follows from what is to be drawn: where pages have come or gone
+ * since, it is drawn anew. */
 static int go_on(struct pass *pass, const struct spl_soft_counted *sum, struct spl_error *err)
 {
     struct spl_tile *tile = pass->tile;

@@ -40,8 +40,8 @@ static double share_of_values(const struct spl_marks_term *term, const struct sp
     return fmax(share, 0.5 / SPL_VALUES_QUANTILES); /* some are there: less than a quantile tells */
 }
 
-/* How far the bounds lie from a shape, as its term measures it: of a box that they reach, of one that is turned and of a
- * polygon, anything. Coordinates are measured from a plane through the origin. */
+/* How far the bounds lie from a shape, as its term measures it: of a box that they reach, of one that is turned and of
+ * a polygon, anything. Coordinates are measured from a plane through the origin. */
 static void measure_bounds(const struct spl_marks_term *term, const struct spl_dataset_info *info, double *low,
                            double *high)
 {

@@ -132,9 +132,9 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
                          struct spl_error *err);
 int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
                         size_t *length, struct spl_error *err); /* the caller frees *bytes */
-/* One that is read piece by piece, since a frame may have hundreds of megabytes. The kernel by itself reads ahead as far
- * as its disk says, 8 MiB at some, and a hole's zeros it writes at once: 20 ms of the loop for a block. Of this one it
- * reads what is asked, and half a MiB behind it in its own time. */
+/* One that is read piece by piece, since a frame may have hundreds of megabytes. The kernel by itself reads ahead as
+ * far as its disk says, 8 MiB at some, and a hole's zeros it writes at once: 20 ms of the loop for a block. Of this one
+ * it reads what is asked, and half a MiB behind it in its own time. */
 struct spl_tour_file {
     int fd; /* -1 = none */
     uint64_t offset, left;
