@@ -43,19 +43,6 @@ static void on_free(void *context)
     free(reading);
 }
 
-static void header(struct request *request, const char *name, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-static void header(struct request *request, const char *name, const char *format, ...)
-{
-    char text[256];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    MHD_add_response_header(request->response, name, text);
-}
-
 /* A range counts only while the file is the one that the client has a part of. */
 static enum spl_range wanted(struct request *request, const char *tag, uint64_t size, uint64_t *first, uint64_t *length)
 {
@@ -66,9 +53,9 @@ static enum spl_range wanted(struct request *request, const char *tag, uint64_t 
 
 static void add_cache_headers(struct request *request, const char *tag)
 {
-    header(request, MHD_HTTP_HEADER_ETAG, "%s", tag);
-    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "private, max-age=31536000, immutable");
-    header(request, MHD_HTTP_HEADER_ACCEPT_RANGES, "bytes");
+    spl_reply_add_header(request, MHD_HTTP_HEADER_ETAG, "%s", tag);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "private, max-age=31536000, immutable");
+    spl_reply_add_header(request, MHD_HTTP_HEADER_ACCEPT_RANGES, "bytes");
 }
 
 static void refuse_range(struct request *request, uint64_t size)
@@ -77,7 +64,7 @@ static void refuse_range(struct request *request, uint64_t size)
     snprintf(detail, sizeof detail, "the range begins behind the file's %llu bytes", (unsigned long long)size);
     spl_reply_problem(request, MHD_HTTP_RANGE_NOT_SATISFIABLE, "range", "Range", detail);
     if (request->response)
-        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes */%llu", (unsigned long long)size);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes */%llu", (unsigned long long)size);
 }
 
 void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *name, const char *type,
@@ -116,11 +103,11 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
     }
     tour->readers++;
     request->status = range == SPL_RANGE_PART ? MHD_HTTP_PARTIAL_CONTENT : MHD_HTTP_OK;
-    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
     add_cache_headers(request, tag);
     if (range == SPL_RANGE_PART)
-        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes %" PRIu64 "-%" PRIu64 "/%" PRIu64, file.offset,
-               file.offset + length - 1, size);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes %" PRIu64 "-%" PRIu64 "/%" PRIu64,
+                             file.offset, file.offset + length - 1, size);
     return;
 close_file:
     spl_tour_file_close(&file);
