@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "geom/distortion.h"
 #include "geom/ray_list.h"
+#include "geom/vector.h"
 
 const double spl_face_axes[SPL_FACES][9] = {
     {0, 0, -1, 0, 1, 0, 1, 0, 0}, {0, 0, 1, 0, 1, 0, -1, 0, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0},
@@ -15,11 +16,6 @@ const double spl_face_axes[SPL_FACES][9] = {
 };
 
 enum { edge_steps = 32, grow_steps = 128, FRONT = 4 };
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static unsigned find_face(const double ray[3])
 {
@@ -32,9 +28,9 @@ static unsigned find_face(const double ray[3])
 unsigned spl_face_of(const double ray[3], double place[2])
 {
     const unsigned face = find_face(ray);
-    const double *axes = spl_face_axes[face], along = dot(axes + 6, ray);
-    place[0] = dot(axes, ray) / along;
-    place[1] = dot(axes + 3, ray) / along;
+    const double *axes = spl_face_axes[face], along = dot3(axes + 6, ray);
+    place[0] = dot3(axes, ray) / along;
+    place[1] = dot3(axes + 3, ray) / along;
     return face;
 }
 
@@ -42,7 +38,7 @@ unsigned spl_faces_place(const struct spl_faces *faces, const double ray[3], dou
 {
     const unsigned face = spl_face_of(ray, pixel);
     const struct spl_camera *c = &faces->cameras[face];
-    *along = dot(spl_face_axes[face] + 6, ray);
+    *along = dot3(spl_face_axes[face] + 6, ray);
     pixel[0] = c->cx + c->fx * pixel[0];
     pixel[1] = c->cy + c->fy * pixel[1];
     return face;
@@ -145,15 +141,15 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
         if (!is_inside(camera, ray))
             continue;
         for (unsigned face = 0; face < SPL_FACES; face++) {
-            const double *axes = spl_face_axes[face], place[2] = {dot(axes, ray), dot(axes + 3, ray)};
-            if (axes[6 + along] != 0 || dot(axes + 6, ray) < 0)
+            const double *axes = spl_face_axes[face], place[2] = {dot3(axes, ray), dot3(axes + 3, ray)};
+            if (axes[6 + along] != 0 || dot3(axes + 6, ray) < 0)
                 continue;
             for (int side = -1; side <= 1; side++) {
                 const double moved = fmin(fmax(t + side * step, -1), 1) - t;
                 grow(parts, face, (double[]){place[0] + axes[along] * moved, place[1] + axes[3 + along] * moved});
             }
         }
-        parts->least = fmin(parts->least, ray[2] / sqrt(dot(ray, ray)));
+        parts->least = fmin(parts->least, ray[2] / sqrt(dot3(ray, ray)));
     }
 }
 

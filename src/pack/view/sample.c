@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 #include "pack/up.h"
 
 enum { sample_max = 200000, tail = 100 };
@@ -19,11 +20,6 @@ static int compare_doubles(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 void spl_view_to_world(const struct spl_view_sample *s, const double local[3], double world[3])
 {
     for (int c = 0; c < 3; c++)
@@ -33,7 +29,7 @@ void spl_view_to_world(const struct spl_view_sample *s, const double local[3], d
 void spl_view_to_frame(const struct spl_view_sample *s, const double world[3], double local[3])
 {
     for (int a = 0; a < 3; a++)
-        local[a] = dot(s->frame[a], world);
+        local[a] = dot3(s->frame[a], world);
 }
 
 double spl_view_sample_width(const struct spl_view_sample *s)

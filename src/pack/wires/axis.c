@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 
 static const double share_seen = 0.945;     /* of the diameter, between the quantiles */
 static const double quantile = 0.05, noise_span = 3.29; /* between them, of a normal distribution: sigma */
@@ -31,11 +32,6 @@ struct chain {
     uint32_t count, off_count;
 };
 
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 /* Does the chain go on without a gap from its point `i` to the next? */
 static bool goes_on(const struct chain *c, uint32_t i)
 {
@@ -43,7 +39,7 @@ static bool goes_on(const struct chain *c, uint32_t i)
     if (i + 1 == c->count)
         return false;
     b = &c->points[c->order[i + 1]];
-    return distance(a->position, b->position) <= break_at * fmax(a->spacing, b->spacing);
+    return distance3(a->position, b->position) <= break_at * fmax(a->spacing, b->spacing);
 }
 
 /* Points [*first, *last] around `i` of its stretch: `half` on either side, more on one where the other has fewer. */
@@ -100,7 +96,7 @@ static void fit(const struct chain *c, uint32_t i, uint32_t half, double at[3], 
     if (last - first < 4 || !(length > 0))
         return;
     for (uint32_t j = first; j <= last; j++)
-        most = fmax(most, distance(c->points[c->order[j]].position, own));
+        most = fmax(most, distance3(c->points[c->order[j]].position, own));
     for (uint32_t j = first; j <= last; j++) {
         const double *p = c->points[c->order[j]].position;
         double t = 0, power = 1;

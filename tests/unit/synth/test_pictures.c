@@ -22,7 +22,7 @@
 #include "synth/photos.h"
 #include "synth/pictures.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))
 

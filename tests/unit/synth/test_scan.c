@@ -21,7 +21,7 @@
 #include "synth/light.h"
 #include "synth/scene.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 
 static char *read_all(const char *path, size_t *bytes)
