@@ -14,8 +14,8 @@ int spl_write_all(int fd, const void *bytes, size_t length);
  * Permissions are those of a new file (0666 less the umask). Errors name `path`. Any thread; blocks on disk. */
 int spl_file_replace(const char *path, const void *bytes, size_t length, struct spl_error *err);
 
-/* Removes what killed writers left under the names `begin` and then the pattern `end`, of glob(7): files on which nobody
- * holds a lock. What cannot be opened stays. Any thread; blocks on disk. */
+/* Removes what killed writers left under the names `begin` and then the pattern `end`, of glob(7): files on which
+ * nobody holds a lock. What cannot be opened stays. Any thread; blocks on disk. */
 void spl_file_sweep(const char *begin, const char *end);
 /* The same of spl_file_replace() at `path`. Not part of it: it looks through the whole folder. */
 void spl_file_sweep_beside(const char *path);

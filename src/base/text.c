@@ -61,3 +61,11 @@ void spl_text_clean(char *text)
 {
     spl_text_show(text, text, strlen(text) + 1);
 }
+
+int spl_text_get_hex(char c)
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}

@@ -16,4 +16,7 @@ void spl_text_clean(char *text);
 /* `text` the same way in `out`, cut to fit between two characters. Returns `out`. */
 const char *spl_text_show(const char *text, char *out, size_t size);
 
+/* 0..15, -1 for anything else. */
+int spl_text_get_hex(char c);
+
 #endif

@@ -47,8 +47,8 @@ static const struct spl_laz_chunk *find_chunk(const struct spl_laz_table *table,
 
 static int take_node(struct walk *w, const uint8_t *entry, uint64_t at)
 {
-    uint32_t level = spl_laz_get32(entry), bytes = spl_laz_get32(entry + 24), points = spl_laz_get32(entry + 28);
-    uint64_t offset = spl_laz_get64(entry + 16);
+    uint32_t level = spl_le_get32(entry), bytes = spl_le_get32(entry + 24), points = spl_le_get32(entry + 28);
+    uint64_t offset = spl_le_get64(entry + 16);
     const struct spl_laz_chunk *chunk = find_chunk(w->table, offset);
     if (level >= SPL_COPC_LEVELS)
         return spl_laz_fail(w->fault, SPL_E_INPUT, at, "COPC hierarchy", "a node of level %d; 0 to %d are known",
@@ -90,14 +90,14 @@ static int take_page(struct walk *w, struct page page, struct spl_error *err)
     int code = bytes ? spl_source_read_at(w->source, page.at, bytes, (size_t)page.bytes, err) : SPL_E_NOMEM;
     for (size_t i = 0; code == SPL_OK && i < page.bytes; i += entry_bytes) {
         const uint8_t *entry = bytes + i;
-        int32_t points = (int32_t)spl_laz_get32(entry + 28);
+        int32_t points = (int32_t)spl_le_get32(entry + 28);
         uint64_t at = page.at + i;
         if (points < -1)
             code = spl_laz_fail(w->fault, SPL_E_INPUT, at + 28, "COPC hierarchy", "a node of %d points", points);
         else if (points > 0)
             code = take_node(w, entry, at);
         else if (points == -1)
-            code = add_page(w, spl_laz_get64(entry + 16), spl_laz_get32(entry + 24), at + 16, err);
+            code = add_page(w, spl_le_get64(entry + 16), spl_le_get32(entry + 24), at + 16, err);
     }
     free(bytes);
     return code;
@@ -118,7 +118,7 @@ int spl_copc_read_levels(struct spl_copc_levels *levels, const struct spl_source
     memset(levels->level, no_level, table->count);
     for (size_t i = 0; i < table->count; i++)
         w.chunks_left += table->chunks[i].points > 0;
-    int code = add_page(&w, spl_laz_get64(info + root_at), spl_laz_get64(info + root_at + 8), info_at + root_at, err);
+    int code = add_page(&w, spl_le_get64(info + root_at), spl_le_get64(info + root_at + 8), info_at + root_at, err);
     while (code == SPL_OK && w.count > 0)
         code = take_page(&w, w.pages[--w.count], err);
     if (code == SPL_OK && w.chunks_left > 0)

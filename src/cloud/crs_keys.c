@@ -1,13 +1,13 @@
 /* GeoTIFF's keys, in the records of LAS files: entries of 8 bytes behind a head of 8, each a number, where its value
  * lies (0: in the entry itself), how many there are, and the value or its place. Nothing that is odd refuses points: it
  * counts as not said. Pure functions; any thread. */
-#include <endian.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/text.h"
 #include "cloud/crs.h"
+#include "cloud/little.h"
 
 enum { head_bytes = 8, entry_bytes = 8, user_defined = 32767 };
 enum { in_doubles = 34736, in_text = 34737 };
@@ -27,20 +27,13 @@ enum { model_projected = 1, model_geographic = 2, model_geocentric = 3 };
 /* GeoTIFF's first edition had numbers of its own for heights, which are none of EPSG's. */
 enum { old_heights_first = 5001, old_heights_last = 5106 };
 
-static uint16_t get16(const uint8_t *p)
-{
-    uint16_t v;
-    memcpy(&v, p, sizeof v);
-    return le16toh(v);
-}
-
 /* The entry of a key whose value lies at `place`; NULL: there is none. */
 static const uint8_t *find(const struct spl_crs_keys *k, uint16_t key, uint16_t place)
 {
-    size_t count = k->keys_bytes >= head_bytes ? get16(k->keys + 6) : 0;
+    size_t count = k->keys_bytes >= head_bytes ? spl_le_get16(k->keys + 6) : 0;
     for (size_t i = 0; i < count && head_bytes + (i + 1) * entry_bytes <= k->keys_bytes; i++) {
         const uint8_t *entry = k->keys + head_bytes + i * entry_bytes;
-        if (get16(entry) == key && get16(entry + 2) == place)
+        if (spl_le_get16(entry) == key && spl_le_get16(entry + 2) == place)
             return entry;
     }
     return NULL;
@@ -50,7 +43,7 @@ static const uint8_t *find(const struct spl_crs_keys *k, uint16_t key, uint16_t 
 static uint16_t get_number(const struct spl_crs_keys *k, uint16_t key)
 {
     const uint8_t *entry = find(k, key, 0);
-    return entry ? get16(entry + 6) : 0;
+    return entry ? spl_le_get16(entry + 6) : 0;
 }
 
 static uint32_t get_system(const struct spl_crs_keys *k, uint16_t key)
@@ -62,21 +55,15 @@ static uint32_t get_system(const struct spl_crs_keys *k, uint16_t key)
 static double get_double(const struct spl_crs_keys *k, uint16_t key)
 {
     const uint8_t *entry = find(k, key, in_doubles);
-    uint64_t bits;
-    double value;
-    if (!entry || ((size_t)get16(entry + 6) + 1) * sizeof bits > k->doubles_bytes)
-        return 0;
-    memcpy(&bits, k->doubles + (size_t)get16(entry + 6) * sizeof bits, sizeof bits);
-    bits = le64toh(bits);
-    memcpy(&value, &bits, sizeof value);
-    return value;
+    const size_t at = entry ? sizeof(double) * spl_le_get16(entry + 6) : 0;
+    return entry && at + sizeof(double) <= k->doubles_bytes ? spl_le_get_double(k->doubles + at) : 0;
 }
 
 /* Texts end with '|'. */
 static void get_text(const struct spl_crs_keys *k, uint16_t key, char *out, size_t size)
 {
     const uint8_t *entry = find(k, key, in_text);
-    size_t at = entry ? get16(entry + 6) : 0, length = entry ? get16(entry + 4) : 0, i = 0;
+    size_t at = entry ? spl_le_get16(entry + 6) : 0, length = entry ? spl_le_get16(entry + 4) : 0, i = 0;
     char text[256];
     if (!entry || at > k->text_bytes)
         return;

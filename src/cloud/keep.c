@@ -32,7 +32,8 @@ static int take_name(struct spl_keep *keep, const char *name, size_t length, str
         if (!printable)
             break;
     if (!printable)
-        return spl_fail_field(err, SPL_E_USAGE, "keep", "keep: a name has a control character, or another that cannot be shown");
+        return spl_fail_field(err, SPL_E_USAGE, "keep",
+                              "keep: a name has a control character, or another that cannot be shown");
     if (length == 0)
         return spl_fail_field(err, SPL_E_USAGE, "keep",
                               "keep: a name is empty; names lie between commas, as in \"gps_time,user_data\"");

@@ -4,7 +4,6 @@
  *
  * Invariant: the source's cursor is at the start of a record between calls, in a file that is not compressed. Owned by
  * the cloud's thread. */
-#include <endian.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,6 +14,7 @@
 #include "cloud/copc.h"
 #include "cloud/las_fields.h"
 #include "cloud/laz/stream.h"
+#include "cloud/little.h"
 
 enum { format_mask = 0x3f, wkt_bit = 1 << 4 };
 /* The most symbols without surprise that a byte can hold are far more than a point has; less than this at any rate. */
@@ -32,28 +32,6 @@ struct las {
 static const struct {
     uint8_t bytes, color;
 } formats[] = {{20, 0}, {28, 0}, {26, 20}, {34, 28}, {57, 0}, {63, 28}, {30, 0}, {36, 30}, {38, 30}, {59, 0}, {67, 30}};
-
-static uint32_t get32(const uint8_t *p)
-{
-    uint32_t v;
-    memcpy(&v, p, sizeof v);
-    return le32toh(v);
-}
-
-static uint64_t get64(const uint8_t *p)
-{
-    uint64_t v;
-    memcpy(&v, p, sizeof v);
-    return le64toh(v);
-}
-
-static double get_double(const uint8_t *p)
-{
-    uint64_t bits = get64(p);
-    double v;
-    memcpy(&v, &bits, sizeof v);
-    return v;
-}
 
 /* How the records are coded, if they are: the LASzip record says so, and the two high bits of the point format. */
 static int find_compression(struct spl_cloud *cloud, const struct spl_las_record *records, unsigned format_byte,
@@ -103,7 +81,7 @@ static int check_transform(struct spl_cloud *cloud, const uint8_t *h, struct spl
     struct las *las = cloud->state;
     static const char *const names[] = {"x scale", "y scale", "z scale", "x offset", "y offset", "z offset"};
     for (unsigned k = 0; k < 6; k++) {
-        double v = get_double(h + 131 + 8 * k);
+        double v = spl_le_get_double(h + 131 + 8 * k);
         if (!isfinite(v) || (k < 3 && v <= 0))
             return spl_source_fail_at(&cloud->source, 131 + 8 * k, names[k], err, "%g is not a %s number", v,
                                       k < 3 ? "positive, finite" : "finite");
@@ -135,8 +113,8 @@ static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
 {
     info->has_bounds = true;
     for (unsigned k = 0; k < 3; k++) {
-        info->bounds[1][k] = get_double(h + 179 + 16 * k);
-        info->bounds[0][k] = get_double(h + 187 + 16 * k);
+        info->bounds[1][k] = spl_le_get_double(h + 179 + 16 * k);
+        info->bounds[0][k] = spl_le_get_double(h + 187 + 16 * k);
         info->has_bounds &= isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) &&
                             info->bounds[0][k] <= info->bounds[1][k];
     }
@@ -158,12 +136,12 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     memcpy(h, bytes, available < sizeof h ? available : sizeof h);
     if (available < 227)
         return spl_source_fail_at(source, available, "", err, "the file ends inside the LAS header of 227 bytes");
-    unsigned major = h[24], minor = h[25], header_bytes = spl_las_get16(h + 94),
+    unsigned major = h[24], minor = h[25], header_bytes = spl_le_get16(h + 94),
              least = minor >= 4   ? 375
                      : minor == 3 ? 235
                                   : 227;
-    uint64_t points_at = get32(h + 96), size = source->size;
-    uint32_t vlrs = get32(h + 100);
+    uint64_t points_at = spl_le_get32(h + 96), size = source->size;
+    uint32_t vlrs = spl_le_get32(h + 100);
 
     if (major != 1 || minor > 5)
         return spl_source_fail_at(source, 24, "version", err, "%u.%u is no LAS version known here (1.0 to 1.5)", major,
@@ -176,13 +154,13 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
                                   "%llu lies outside the file's %u header and %llu total bytes",
                                   (unsigned long long)points_at, header_bytes, (unsigned long long)size);
     las->format = h[104] & format_mask;
-    las->record_bytes = spl_las_get16(h + 105);
+    las->record_bytes = spl_le_get16(h + 105);
     if (las->format >= sizeof formats / sizeof *formats)
         return spl_source_fail_at(source, 104, "point data record format", err, "%u is not one of 0 to 10", h[104]);
     if (las->record_bytes < formats[las->format].bytes)
         return spl_source_fail_at(source, 105, "point data record length", err, "%u bytes; format %u needs %u",
                                   las->record_bytes, las->format, formats[las->format].bytes);
-    uint64_t legacy = get32(h + 107), large = minor >= 4 ? get64(h + 247) : 0;
+    uint64_t legacy = spl_le_get32(h + 107), large = minor >= 4 ? spl_le_get64(h + 247) : 0;
     las->count = large ? large : legacy;
     las->start = points_at;
     cloud->info.points_total = las->count;
@@ -198,10 +176,10 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     struct spl_las_record all[2] = {records, {.extended = true, .end = size}};
     if (minor >= 4) {
-        all[1].at = get64(h + 235);
-        all[1].count = get32(h + 243);
+        all[1].at = spl_le_get64(h + 235);
+        all[1].count = spl_le_get32(h + 243);
     }
-    if ((code = spl_las_read_coordinates(cloud, all, spl_las_get16(h + 6) & wkt_bit, err)) < 0)
+    if ((code = spl_las_read_coordinates(cloud, all, spl_le_get16(h + 6) & wkt_bit, err)) < 0)
         return code;
     code = spl_las_find_fields(&las->fields, cloud, records, las->format, formats[las->format].bytes, las->record_bytes,
                                err);
@@ -275,9 +253,9 @@ static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
                                rows->value[las->fields.list[i].column]);
     for (size_t r = 0; r < count; r++, p += las->record_bytes) {
         for (unsigned k = 0; k < 3; k++)
-            rows->value[SPL_COLUMN_X + k][r] = (int32_t)get32(p + 4 * k) * las->scale[k] + las->offset[k];
+            rows->value[SPL_COLUMN_X + k][r] = (int32_t)spl_le_get32(p + 4 * k) * las->scale[k] + las->offset[k];
         for (unsigned k = 0; color && k < 3; k++)
-            rows->value[SPL_COLUMN_RED + k][r] = spl_las_get16(p + color + 2 * k);
+            rows->value[SPL_COLUMN_RED + k][r] = spl_le_get16(p + color + 2 * k);
     }
     if (!las->stream)
         spl_source_take(&cloud->source, count * las->record_bytes);

@@ -25,11 +25,11 @@ int spl_las_find(struct spl_cloud *cloud, struct spl_las_record *record, const c
             return code;
         if (available < heads)
             break;
-        uint64_t length = spl_las_get16(head + 20);
+        uint64_t length = spl_le_get16(head + 20);
         if (record->extended)
             memcpy(&length, head + 20, sizeof length);
         length = record->extended ? le64toh(length) : length;
-        *found = memcmp(head + 2, user, strlen(user)) == 0 && (!id || spl_las_get16(head + 18) == id);
+        *found = memcmp(head + 2, user, strlen(user)) == 0 && (!id || spl_le_get16(head + 18) == id);
         record->content = record->at + heads;
         uint64_t left = record->end - record->content;
         record->bytes = length < left ? length : left;

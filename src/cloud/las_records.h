@@ -2,17 +2,8 @@
 #ifndef SPL_CLOUD_LAS_RECORDS_H
 #define SPL_CLOUD_LAS_RECORDS_H
 
-#include <endian.h>
-#include <string.h>
-
+#include "cloud/little.h"
 #include "cloud/reader.h"
-
-static inline uint16_t spl_las_get16(const uint8_t *p)
-{
-    uint16_t v;
-    memcpy(&v, p, sizeof v);
-    return le16toh(v);
-}
 
 /* Records that are left to look at: `count` at most from `at` on, none past `end`. */
 struct spl_las_record {

@@ -19,7 +19,8 @@ static int get_list(struct spl_path_reader *reader, const json_t *json, const ch
     return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array; it is %s", name, spl_json_type_name(*list));
 }
 
-static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *frame, bool around, struct spl_error *err)
+static int read_nerfstudio_frame(struct spl_path_reader *reader, const json_t *frame, bool around,
+                                 struct spl_error *err)
 {
     double matrix[16], fov = NAN;
     struct spl_camera camera;

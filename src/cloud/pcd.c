@@ -9,7 +9,6 @@
  * cloud's thread. */
 #include "cloud/pcd.h"
 
-#include <endian.h>
 #include <lzf.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,6 +18,7 @@
 
 #include "base/memory.h"
 #include "cloud/fields.h"
+#include "cloud/little.h"
 
 enum { sizes_bytes = 8 };
 enum { lzf_most = 88 }; /* bytes that a byte gives: the longest match is 264 from 3 */
@@ -92,13 +92,6 @@ static bool leave_out_padding(struct spl_pcd_header *h, uint32_t raw)
     return true;
 }
 
-static uint32_t get32(const uint8_t *p)
-{
-    uint32_t v;
-    memcpy(&v, p, sizeof v);
-    return le32toh(v);
-}
-
 static int check_compressed(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct pcd *pcd = cloud->state;
@@ -112,8 +105,8 @@ static int check_compressed(struct spl_cloud *cloud, struct spl_error *err)
         return spl_source_fail_at(&cloud->source, pcd->start, "DATA", err,
                                   "the file ends before the sizes of its compressed data (truncated?)");
     uint64_t left = spl_source_left(&cloud->source) - sizes_bytes;
-    pcd->compressed = get32(sizes);
-    pcd->raw = get32(sizes + 4);
+    pcd->compressed = spl_le_get32(sizes);
+    pcd->raw = spl_le_get32(sizes + 4);
     if (pcd->compressed > left)
         return spl_source_fail_at(&cloud->source, pcd->start, "compressed size", err,
                                   "%u bytes, of which the file has %llu (truncated?)", pcd->compressed,
@@ -215,7 +208,7 @@ static void decode(const struct spl_pcd_field *field, const uint8_t *p, size_t s
     if (!field->packed)
         spl_numbers_decode(field->type, false, p, stride, rows->count, rows->value[field->column]);
     for (size_t r = 0; field->packed && r < rows->count; r++)
-        unpack(get32(p + r * stride), rows, r);
+        unpack(spl_le_get32(p + r * stride), rows, r);
 }
 
 /* A colour as text is a number of its type: of a float, the bits are the colour. */

@@ -45,8 +45,8 @@ int spl_layout_lacks(const struct spl_layout *layout)
     return SPL_COLUMN_SKIP;
 }
 
-/* What surveyors call x, y and z, also in German and French; so only where no column has the name itself. Longitudes and
- * latitudes are neither. */
+/* What surveyors call x, y and z, also in German and French; so only where no column has the name itself. Longitudes
+ * and latitudes are neither. */
 static int column_from_synonym(const char *name, size_t length)
 {
     static const struct {

@@ -42,7 +42,8 @@ static int add_own(struct spl_view_list *list, const char *path, json_t *view,
                               list->count + 1, spl_json_type_name(photograph));
     int rc = spl_camera_from_json(view, others, NULL, &spl_view_list_limits, &camera, &why);
     if (!rc && (camera.projection != SPL_PERSPECTIVE || spl_camera_is_bent(&camera)))
-        rc = spl_fail_field(&why, SPL_E_INPUT, camera.lens.kind ? "params" : "projection", "a list's views are those of pinholes");
+        rc = spl_fail_field(&why, SPL_E_INPUT, camera.lens.kind ? "params" : "projection",
+                            "a list's views are those of pinholes");
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s: view %zu%s%.100s%s: %s", path, list->count + 1,
                               name ? " ('" : "", name ? json_string_value(name) : "", name ? "')" : "", why.message);

@@ -232,11 +232,12 @@ static int refuse_height(const char *file, const uint32_t size[2], const double 
                               "is it two of them, of a stereo camera, or stretched? Cut or scale it",
                               file, size[0], size[1], size[0], height);
     double span = 180 * size[1] / height;
-    return spl_fail_field(err, SPL_E_INPUT, "height",
-                          "%s has %u x %u pixels; a whole equirectangular panorama is twice as wide as high, "
-                          "%u x %.0f. Of one that is cut above or below say which degrees its rows reach over, "
-                          "\"elevation\": [lowest, highest]: %.4g degrees in all, [%.4g, %.4g] where both are cut alike",
-                          file, size[0], size[1], size[0], height, span, -span / 2, span / 2);
+    return spl_fail_field(
+        err, SPL_E_INPUT, "height",
+        "%s has %u x %u pixels; a whole equirectangular panorama is twice as wide as high, "
+        "%u x %.0f. Of one that is cut above or below say which degrees its rows reach over, "
+        "\"elevation\": [lowest, highest]: %.4g degrees in all, [%.4g, %.4g] where both are cut alike",
+        file, size[0], size[1], size[0], height, span, -span / 2, span / 2);
 }
 
 static int add_sphere(const struct entry *e, const json_t *color, char **file, struct spl_error *err)
@@ -249,8 +250,8 @@ static int add_sphere(const struct entry *e, const json_t *color, char **file, s
     double span = degrees[1] - degrees[0], height = size[0] * span / 360, off = fabs(size[1] - height);
     bool whole = span == 180;
     if (height < 1)
-        return spl_fail_field(err, SPL_E_INPUT, "width", "%s has %u x %u pixels, too few for a panorama", *file, size[0],
-                              size[1]);
+        return spl_fail_field(err, SPL_E_INPUT, "width", "%s has %u x %u pixels, too few for a panorama", *file,
+                              size[0], size[1]);
     if (off > off_px && (whole || off > off_share * height))
         return refuse_height(*file, size, degrees, height, err);
     struct spl_inner_photograph inner = {.path = *file, .is_panorama = true, .width = size[0], .height = size[1]};

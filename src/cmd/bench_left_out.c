@@ -22,15 +22,6 @@ struct arguments {
     double lod;
 };
 
-static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
-{
-    struct spl_image_info info = {0};
-    int rc = spl_image_get_info(path, &info, err);
-    *width = info.width;
-    *height = info.height;
-    return rc;
-}
-
 static int write_picture(const struct arguments *a, const char *view, const char *what, const struct spl_image *image,
                          struct spl_error *err)
 {
@@ -117,7 +108,7 @@ static int compare_view(const struct arguments *a, struct spl_renderer *renderer
 
 static int run(const struct arguments *a, struct spl_error *err)
 {
-    const struct spl_photograph_options how = {.images = a->images, .get_size = get_size};
+    const struct spl_photograph_options how = {.images = a->images, .get_size = spl_image_get_size};
     struct spl_view_list list = {0};
     struct spl_dataset *dataset = NULL;
     struct spl_renderer *renderer = NULL;

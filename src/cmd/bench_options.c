@@ -204,8 +204,8 @@ static const struct spl_cmd_option options[] = {
      .take = take_maps},
     {"clip", "TERMS", "what is drawn, as of 'splatd render': of frame times alone, without -o", .take = take_clip},
     {"soft", "TERMS",
-     "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is solid; "
-     "with -o the first model is the reference of all of them",
+     "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is "
+     "solid; with -o the first model is the reference of all of them",
      .take = take_soft},
     {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express", .take = take_soft_models},
     {"soft-opacity", "X", "of a soft sphere at its centre", .fallback = "0.3",
@@ -323,8 +323,9 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
     if (!a->soft.what.count && a->soft_model_count)
         return spl_fail(err, SPL_E_USAGE, "--soft-model is of what is soft: give it with --soft 'class:3-5'");
     if (!a->soft.what.count && (a->soft.opacity != usual.opacity || a->soft.cover != usual.cover || a->soft.blend != 0))
-        return spl_fail(err, SPL_E_USAGE, "--soft-opacity, --soft-cover and --soft-blend are of what is soft: give them "
-                                          "with --soft 'class:3-5'");
+        return spl_fail(err, SPL_E_USAGE,
+                        "--soft-opacity, --soft-cover and --soft-blend are of what is soft: give them "
+                        "with --soft 'class:3-5'");
     if (a->soft.what.count && a->sweep.output && a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF)
         return spl_fail(err, SPL_E_USAGE,
                         "--reference and --photographs show nothing soft: with --soft the reference is the dataset's "

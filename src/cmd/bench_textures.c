@@ -29,15 +29,6 @@ static void show_photograph(void *context, const char *photograph)
     fprintf(stderr, " onto the splats\n");
 }
 
-static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
-{
-    struct spl_image_info info = {0};
-    int rc = spl_image_get_info(path, &info, err);
-    *width = info.width;
-    *height = info.height;
-    return rc;
-}
-
 struct arguments {
     const char *textures, *dataset, *folder, *cameras, *images, *device;
     uint64_t sample, memory_bytes;
@@ -176,7 +167,7 @@ static int render(struct bench *b, struct spl_error *err)
 
 static int open_inputs(struct bench *b, struct spl_error *err)
 {
-    const struct spl_photograph_options photographs = {.images = b->a.images, .get_size = get_size};
+    const struct spl_photograph_options photographs = {.images = b->a.images, .get_size = spl_image_get_size};
     int rc = spl_texture_file_open(b->a.textures, &b->file, err);
     if (!rc && b->a.dataset)
         rc = spl_dataset_open_whole(b->a.dataset, true, &b->dataset, err);

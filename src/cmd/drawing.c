@@ -146,9 +146,10 @@ int spl_cmd_check_drawing(const struct spl_cmd_drawing *drawing, struct spl_erro
 {
     const enum spl_color_by by = drawing->view.color.by;
     if (*drawing->ramp_option && (by == SPL_COLOR_BY_RGB || by == SPL_COLOR_BY_NORMAL || by == SPL_COLOR_BY_FLAT))
-        return spl_fail_field(err, SPL_E_USAGE, drawing->ramp_option + 2,
-                              "%s is of values, and colours show none: say which with --color-by, as in --color-by height",
-                              drawing->ramp_option);
+        return spl_fail_field(
+            err, SPL_E_USAGE, drawing->ramp_option + 2,
+            "%s is of values, and colours show none: say which with --color-by, as in --color-by height",
+            drawing->ramp_option);
     if (!*drawing->soft_option || drawing->view.soft.what.count)
         return SPL_OK;
     return spl_fail_field(err, SPL_E_USAGE, "soft",
@@ -238,10 +239,11 @@ void spl_cmd_print_methods(FILE *out, size_t column)
 
 void spl_cmd_print_clip(FILE *out, size_t column)
 {
-    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --clip TERMS"), column,
-                          "what is drawn: 'z<2.5', 'z:1.2..1.3', 'box:x0,y0,z0,x1,y1,z1' (and degrees it is turned), "
-                          "'polygon:x,y,x,y,x,y' ('@0..2.5': its heights), 'plane:x,y,z,nx,ny,nz>0', 'intensity>0.2', any "
-                          "term of --soft; '!' before a term: what is not in it; ' or ' joins; of several --clip all hold");
+    spl_cmd_print_wrapped(
+        out, (size_t)fprintf(out, "      --clip TERMS"), column,
+        "what is drawn: 'z<2.5', 'z:1.2..1.3', 'box:x0,y0,z0,x1,y1,z1' (and degrees it is turned), "
+        "'polygon:x,y,x,y,x,y' ('@0..2.5': its heights), 'plane:x,y,z,nx,ny,nz>0', 'intensity>0.2', any "
+        "term of --soft; '!' before a term: what is not in it; ' or ' joins; of several --clip all hold");
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --class LIST"), column,
                           "the classes that are drawn: 2,6 or 3-5; '!7': all others");
 }
@@ -256,10 +258,11 @@ static void print_changing(FILE *out, enum spl_param_changes changes, size_t col
 
 void spl_cmd_print_soft(FILE *out, size_t column)
 {
-    spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --soft TERMS"), column,
-                          "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
-                          "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
-                          "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
+    spl_cmd_print_wrapped(
+        out, (size_t)fprintf(out, "      --soft TERMS"), column,
+        "what is drawn as soft spheres, through which one sees the rest: 'class:3-5', "
+        "'intensity>q0.95', any attribute that 'splatd info' shows; 'axis:x,y,z,dx,dy,dz<4', 'plane:x,y,z,nx,ny,nz>0', "
+        "'box:x0,y0,z0,x1,y1,z1'; joined by ' or ', or given several times");
     print_changing(out, SPL_CHANGES_SOFT, column);
 }
 
@@ -274,6 +277,7 @@ void spl_cmd_print_colors(FILE *out, size_t column)
     print_changing(out, SPL_CHANGES_COLORS, column);
     spl_cmd_print_wrapped(out, (size_t)fprintf(out, "      --shade KINDS"), column,
                           "for shape: none, edl (darker where what lies around is nearer), headlight, "
-                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, or classes in their place, else none)");
+                          "sun:AZIMUTH,ELEVATION, several joined by + (edl where a dataset has no colours, or classes "
+                          "in their place, else none)");
     print_changing(out, SPL_CHANGES_SHADE, column);
 }

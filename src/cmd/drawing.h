@@ -28,7 +28,8 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
 /* What a depth PNG says that its steps are of. */
 void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
 
-/* SPL_E_USAGE where an option says how soft spheres are drawn, and none what is soft; or how values look, and none which. */
+/* SPL_E_USAGE where an option says how soft spheres are drawn, and none what is soft; or how values look, and none
+ * which. */
 int spl_cmd_check_drawing(const struct spl_cmd_drawing *drawing, struct spl_error *err);
 
 /* Says on stderr which terms select nothing of the dataset, or, if `stats` (may be NULL) has it, that no soft sphere of
@@ -60,8 +61,8 @@ void spl_cmd_print_methods(FILE *out, size_t column);
      SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
         {"supersample", "N", "samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
          .otherwise = "1", SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                           \
-        {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent", .otherwise = "black, of a GeoTIFF transparent", \
-         .take = spl_cmd_take_background},                                                                             \
+        {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent",                              \
+         .otherwise = "black, of a GeoTIFF transparent", .take = spl_cmd_take_background},                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
         {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \
         {"clip", "TERMS", NULL, .take = spl_cmd_take_clip},                                                            \

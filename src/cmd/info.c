@@ -219,8 +219,8 @@ static void print_stations(const struct spl_dataset_info *info)
     char text[32];
     for (uint32_t i = 0; i < info->station_count && i < shown; i++) {
         const double *pose = info->stations[i];
-        printf("%s--station %u at %.10g %.10g %.10g%s\n", i ? "                " : "  stations      ", i, pose[3], pose[7],
-               pose[11], !i && info->stations_of_maps ? ", of panoramas" : "");
+        printf("%s--station %u at %.10g %.10g %.10g%s\n", i ? "                " : "  stations      ", i, pose[3],
+               pose[7], pose[11], !i && info->stations_of_maps ? ", of panoramas" : "");
     }
     if (info->station_count > shown)
         printf("                and %s more\n", spl_cmd_group(info->station_count - shown, text));

@@ -302,8 +302,7 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_get(spl_dataset_get_meta(report->dataset), "crs"), "part_of",
         json_object_get(spl_dataset_get_meta(report->dataset), "part_of"), "pruned",
         json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "up",
-        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report), "title", info->title,
-        "description", info->description, "views", spl_saved_views_to_json(info->views, info->view_count),
-        "classes", classes_to_json(info), "soft", suggestions_to_json(info), "stations",
-        stations_to_json(info));
+        json_object_get(spl_dataset_get_meta(report->dataset), "up"), "primitives", primitives_to_json(report), "title",
+        info->title, "description", info->description, "views", spl_saved_views_to_json(info->views, info->view_count),
+        "classes", classes_to_json(info), "soft", suggestions_to_json(info), "stations", stations_to_json(info));
 }

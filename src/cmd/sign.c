@@ -47,7 +47,8 @@ static const struct spl_cmd_table table = {
         "usage: splatd sign URL --key FILE [--expires TIME]\n\n"
         "Prints URL with a signature that lets anybody GET it, and nothing else, until it expires: for an <img> in a\n"
         "page of yours, a report, a mail. The service needs the same key, 'splatd serve --url-key FILE'. Reading a\n"
-        "dataset, its profile, views, picks, places, legend and thumbnail can be signed, all of its map tiles at once, and the\n"
+        "dataset, its profile, views, picks, places, legend and thumbnail can be signed, all of its map tiles at once, "
+        "and the\n"
         "page /embed/ID: who has that URL may look at this dataset from wherever they like until it expires, and do\n"
         "nothing else.\n\n"
         "Make a key, once:\n"
@@ -59,13 +60,13 @@ static const struct spl_cmd_table table = {
         "  splatd sign '/v1/datasets/vault/view?width=640' --key url.key\n"
         "A view to move in, for an <iframe>; camera and settings stand behind '#' and may be changed:\n"
         "  splatd sign 'https://scans.example/embed/vault#eye=8,0,2&target=0,0,1' --key url.key --expires 7d\n"
-        "All tiles of a map, drawn as the parameters say, for Leaflet, QGIS, Grafana; tiles.json for what reads TileJSON:\n"
+        "All tiles of a map, drawn as the parameters say, for Leaflet, QGIS, Grafana; tiles.json for what reads "
+        "TileJSON:\n"
         "  splatd sign 'https://scans.example/v1/datasets/vault/tiles/{z}/{x}/{y}.png?class=!3-5' --key url.key "
         "--expires 7d\n\n",
-    .after =
-        "\nThe signature is base64url(HMAC-SHA-256(key, path?query&exp=UNIX-SECONDS)), without padding, so any\n"
-        "program that knows the key can make such URLs; of a page it is /embed/ID?exp=UNIX-SECONDS, without the\n"
-        "fragment, of tiles and tiles.json the path is /v1/datasets/ID/tiles/, whichever tile is asked for.\n",
+    .after = "\nThe signature is base64url(HMAC-SHA-256(key, path?query&exp=UNIX-SECONDS)), without padding, so any\n"
+             "program that knows the key can make such URLs; of a page it is /embed/ID?exp=UNIX-SECONDS, without the\n"
+             "fragment, of tiles and tiles.json the path is /v1/datasets/ID/tiles/, whichever tile is asked for.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };

@@ -112,7 +112,8 @@ static int resolve_output(struct arguments *a, struct spl_error *err)
     if (a->video && (a->drawing.format >= 0 || a->drawing.layer != SPL_LAYER_COLOR))
         return spl_fail(err, SPL_E_USAGE, "a video is of color and takes no --format; give a folder for images");
     if (a->drawing.format == SPL_FORMAT_TIFF)
-        return spl_fail(err, SPL_E_USAGE, "tiff is for maps, of 'splatd render'; a tour takes jpeg, png, npy, raw or webp");
+        return spl_fail(err, SPL_E_USAGE,
+                        "tiff is for maps, of 'splatd render'; a tour takes jpeg, png, npy, raw or webp");
     a->drawing.encode.format = a->drawing.format < 0 ? SPL_FORMAT_JPEG : (enum spl_format)a->drawing.format;
     return SPL_OK;
 }

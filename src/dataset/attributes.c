@@ -110,8 +110,8 @@ int spl_dataset_read_values(struct spl_dataset *dataset, struct spl_error *err)
     const json_t *heights = json_object_get(dataset->meta, "heights");
     const char *what = heights ? spl_values_from_json(heights, info->leaf_splats, &dataset->heights) : NULL;
     if (what)
-        return spl_fail_field(err, SPL_E_CORRUPT, "heights", "%s: section META: of \"heights\" %s; pack the dataset again",
-                              dataset->name, what);
+        return spl_fail_field(err, SPL_E_CORRUPT, "heights",
+                              "%s: section META: of \"heights\" %s; pack the dataset again", dataset->name, what);
     info->heights = heights ? &dataset->heights : NULL;
     return SPL_OK;
 }

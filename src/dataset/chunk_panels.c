@@ -309,7 +309,7 @@ static bool positive(float value)
 static const char *judge(const struct spl_chunk *c)
 {
     uint32_t known = 255u << SPL_PANEL_COLUMNS | 255u << SPL_PANEL_ROWS | 7u << SPL_GEOMETRY_AXIS;
-    const float most = 2 * 256; /* columns and rows: of a page that is forged those of a panel may be beyond the header's */
+    const float most = 2 * 256; /* columns and rows: a forged page's panel may have more than the header says */
     uint32_t heights = relief_words(c);
     if (c->count == 0 || c->count > SPL_PANELS_MAX)
         return "has no panels, or more than 32";

@@ -1,5 +1,6 @@
 /* What a chunk holds: a row for each kind. Whoever adds a kind adds its row here, a value of enum spl_chunk_kind, and
- * how a method draws it (src/render/select_draw.c). All kinds share the chunk's header; a row says what of it they use. */
+ * how a method draws it (src/render/select_draw.c). All kinds share the chunk's header; a row says what of it they
+ * use. */
 #ifndef SPL_DATASET_CODEC_H
 #define SPL_DATASET_CODEC_H
 

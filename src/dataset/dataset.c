@@ -79,7 +79,8 @@ int spl_dataset_open_with(const char *path, const struct spl_open_options *optio
     return spl_dataset_open_source_as(&source, path, &how, out, err);
 }
 
-/* What describes a dataset may have been spoilt on its way, or been so before it was kept: then it is asked for anew. */
+/* What describes a dataset may have been spoilt on its way, or been so before it was kept: then it is asked for
+ * anew. */
 static int open_remote(const char *url, const struct spl_dataset_opening *how, struct spl_dataset **out,
                        struct spl_error *err)
 {
@@ -92,7 +93,8 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
         return spl_fail(err, rc, "%s", why.message);
     spl_remote_show(url, shown, sizeof shown);
     rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
-    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) && !source.far->has_changed(source.context)) {
+    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) &&
+        !source.far->has_changed(source.context)) {
         why = (struct spl_error){0};
         source.far->forget(source.context, 0, source.size);
         rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
@@ -127,9 +129,11 @@ int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **o
     char shown[300];
     *out = NULL;
     if (spl_remote_is_url(path))
-        return spl_fail(err, SPL_E_USAGE, "%s: this goes through all of a dataset, and needs it in a file: fetch it first",
+        return spl_fail(err, SPL_E_USAGE,
+                        "%s: this goes through all of a dataset, and needs it in a file: fetch it first",
                         spl_remote_show(path, shown, sizeof shown));
-    return spl_dataset_open_as(path, &(struct spl_dataset_opening){.verify = verify, .tables_bytes = UINT64_MAX}, out, err);
+    return spl_dataset_open_as(path, &(struct spl_dataset_opening){.verify = verify, .tables_bytes = UINT64_MAX}, out,
+                               err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
@@ -285,30 +289,34 @@ bool spl_dataset_forget(const struct spl_dataset *dataset, const struct spl_sect
     return dataset->remote;
 }
 
-void spl_dataset_expect(const struct spl_dataset *dataset, const struct spl_section *first, const struct spl_section *last)
+void spl_dataset_expect(const struct spl_dataset *dataset, const struct spl_section *first,
+                        const struct spl_section *last)
 {
     if (dataset->remote)
         dataset->source.far->expect(dataset->source.context, first->offset, last->offset + last->bytes - first->offset);
 }
 
-int spl_dataset_read_section(const struct spl_dataset *dataset, const struct spl_section *section, void *out, bool *sound,
-                             struct spl_error *err)
+int spl_dataset_read_section(const struct spl_dataset *dataset, const struct spl_section *section, void *out,
+                             bool *sound, struct spl_error *err)
 {
     int rc = SPL_OK;
     *sound = false;
-    for (int attempt = 0; !rc && !*sound && (!attempt || (attempt == 1 && spl_dataset_forget(dataset, section))); attempt++)
+    for (int attempt = 0; !rc && !*sound && (!attempt || (attempt == 1 && spl_dataset_forget(dataset, section)));
+         attempt++)
         if (!(rc = spl_dataset_read(dataset, section->offset, out, section->bytes, err)))
             *sound = !dataset->verified || XXH3_64bits(out, section->bytes) == section->hash;
     return rc;
 }
 
-int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *what, uint32_t index, struct spl_error *err)
+int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *what, uint32_t index,
+                              struct spl_error *err)
 {
     return spl_fail(err, SPL_E_CORRUPT,
-                    dataset->remote ? "%s: %s %u fails its checksum, fetched twice: it is damaged at its server; upload the "
-                                      "dataset again under another name"
-                                    : "%s: %s %u was overwritten while in use; put the dataset back under another name "
-                                      "and rename it",
+                    dataset->remote
+                        ? "%s: %s %u fails its checksum, fetched twice: it is damaged at its server; upload the "
+                          "dataset again under another name"
+                        : "%s: %s %u was overwritten while in use; put the dataset back under another name "
+                          "and rename it",
                     spl_dataset_get_name(dataset), what, index);
 }
 

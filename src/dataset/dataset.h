@@ -58,8 +58,8 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
 /* Does it lie elsewhere, so that reading takes long and is paid for? */
 bool spl_dataset_is_remote(const struct spl_dataset *dataset);
 
-/* Of one that does: when a read of it last came on (0 = it lies here), and whether it has been found to be another one by
- * now. Any thread. */
+/* Of one that does: when a read of it last came on (0 = it lies here), and whether it has been found to be another one
+ * by now. Any thread. */
 uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset);
 bool spl_dataset_has_changed(const struct spl_dataset *dataset);
 

@@ -49,10 +49,11 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
         return wrong(dataset, err, info->pages, "closes it with nodes that are no node's child, or with too few nodes");
     if (info->splats > last->first_id || info->pieces > last->first_id || info->panels > last->first_id ||
         info->meshes > last->first_id)
-        return spl_fail_field(err, SPL_E_CORRUPT, "counts",
-                              "%s: section META: \"counts\" has more splats, pieces, panels or meshes than PDIR has ids; pack "
-                              "the dataset again",
-                              dataset->name);
+        return spl_fail_field(
+            err, SPL_E_CORRUPT, "counts",
+            "%s: section META: \"counts\" has more splats, pieces, panels or meshes than PDIR has ids; pack "
+            "the dataset again",
+            dataset->name);
     dataset->rows = rows;
     info->nodes = last->first_node;
     info->chunks = last->first_chunk;
@@ -77,11 +78,6 @@ static uint32_t find(const struct spl_dataset *dataset, size_t offset, uint64_t 
 uint32_t spl_dataset_find_page_of_node(const struct spl_dataset *dataset, uint64_t node)
 {
     return find(dataset, offsetof(struct spl_page_row, first_node), node);
-}
-
-uint32_t spl_dataset_find_page_of_chunk(const struct spl_dataset *dataset, uint64_t chunk)
-{
-    return find(dataset, offsetof(struct spl_page_row, first_chunk), chunk);
 }
 
 uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t id)

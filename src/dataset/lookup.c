@@ -1,6 +1,6 @@
-/* One splat, panel, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves. Pages
- * and chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a map,
- * so that a file that was cut short in place is no SIGBUS. Any thread. */
+/* One splat, panel, or vertex of a line, by its id: which page and chunk hold it; and the linear splats of all leaves.
+ * Pages and chunks continue each other's ids, so binary searches find them. Words are read from the file, not through a
+ * map, so that a file that was cut short in place is no SIGBUS. Any thread. */
 #include "dataset/dataset.h"
 
 #include <stdlib.h>
@@ -67,7 +67,7 @@ bool spl_dataset_find_chunk(const struct spl_dataset *dataset, uint64_t id, stru
     if (found) {
         uint64_t number = tables->first_chunk + (uint64_t)(place.chunk - tables->chunks);
         uint32_t n = 0;
-        while (number >= tables->nodes[n].first_chunk + tables->nodes[n].chunk_count) // the tables' chunks are all nodes'
+        while (number >= tables->nodes[n].first_chunk + tables->nodes[n].chunk_count) // all chunks are nodes'
             n++;
         memcpy(origin, tables->nodes[n].origin, 3 * sizeof *origin);
         *chunk = *place.chunk;

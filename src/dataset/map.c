@@ -47,7 +47,8 @@ const char *spl_map_judge(const struct spl_map_row *row)
     if (!(turned < 1e-6))
         return "has a rotation that is none";
     const double *r = row->rotation;
-    if (r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]) < 0)
+    if (r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]) <
+        0)
         return "has a rotation that mirrors";
     if (!row->side || row->side > SPL_MAP_SIDE_MAX || row->side % SPL_MAP_SIDE_STEP || !row->levels ||
         row->levels > SPL_MAP_LEVELS_MAX || !row->range_side || row->range_side > SPL_MAP_RANGE_SIDE_MAX)

@@ -9,7 +9,8 @@
 #include "dataset/open.h"
 
 /* Where no scan says where it was taken from, the places of panoramas are what is known of it. */
-static int take_places(struct spl_dataset *dataset, const struct spl_map_row *rows, uint32_t count, struct spl_error *err)
+static int take_places(struct spl_dataset *dataset, const struct spl_map_row *rows, uint32_t count,
+                       struct spl_error *err)
 {
     if (dataset->info.station_count)
         return SPL_OK;

@@ -1,6 +1,6 @@
 /* Texts of META: titles, names of sources, units, colours' origins. A file is anybody's, and its texts go to terminals,
- * pages and JSON of others; so what cannot be shown in them becomes '?' once, before anybody reads one, and a line of the
- * log says which it was. Texts that have lines (a description, WKT) keep their ends. The opener's thread. */
+ * pages and JSON of others; so what cannot be shown in them becomes '?' once, before anybody reads one, and a line of
+ * the log says which it was. Texts that have lines (a description, WKT) keep their ends. The opener's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,7 +68,7 @@ int spl_dataset_clean_meta(struct spl_dataset *dataset, struct spl_error *err)
     struct cleaning cleaning = {.err = err};
     int rc = clean(dataset->meta, "", &cleaning);
     if (!rc && cleaning.path[0])
-        spl_log_warn("%s: section META: \"%s\" holds characters that cannot be shown; they are read as '?'", dataset->name,
-                     cleaning.path);
+        spl_log_warn("%s: section META: \"%s\" holds characters that cannot be shown; they are read as '?'",
+                     dataset->name, cleaning.path);
     return rc;
 }

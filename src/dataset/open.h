@@ -34,7 +34,7 @@ struct spl_dataset {
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
-    bool verified;                /* every page had its checksum when the dataset was opened, or has it when it is read */
+    bool verified;                /* every page had its checksum when it was opened, or has it when it is read */
     bool remote;                  /* what is wrong may have come so, and is asked for once more */
     bool lazily;                  /* it is remote, and what is large is held against checksums when it is read alone */
     bool opened;                  /* all is checked; what is read from here on is read while in use */
@@ -80,18 +80,20 @@ const char *spl_dataset_get_name(const struct spl_dataset *dataset);
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,
                      struct spl_error *err);
 
-/* Reads all of a section, held against its checksum where the dataset is: *sound says how that went. What comes from afar
- * is fetched from its server once more where it did not hold. */
-int spl_dataset_read_section(const struct spl_dataset *dataset, const struct spl_section *section, void *out, bool *sound,
-                             struct spl_error *err);
+/* Reads all of a section, held against its checksum where the dataset is: *sound says how that went. What comes from
+ * afar is fetched from its server once more where it did not hold. */
+int spl_dataset_read_section(const struct spl_dataset *dataset, const struct spl_section *section, void *out,
+                             bool *sound, struct spl_error *err);
 
 /* SPL_E_CORRUPT of what passed when the dataset was opened, or was fetched twice: `what`, number `index`. */
-int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *what, uint32_t index, struct spl_error *err);
+int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *what, uint32_t index,
+                              struct spl_error *err);
 
-/* Of one from afar: what was read of the section is not used again, true; the sections from `first` to `last` will be read
- * one after the other, or side by side. */
+/* Of one from afar: what was read of the section is not used again, true; the sections from `first` to `last` will be
+ * read one after the other, or side by side. */
 bool spl_dataset_forget(const struct spl_dataset *dataset, const struct spl_section *section);
-void spl_dataset_expect(const struct spl_dataset *dataset, const struct spl_section *first, const struct spl_section *last);
+void spl_dataset_expect(const struct spl_dataset *dataset, const struct spl_section *first,
+                        const struct spl_section *last);
 
 /* Where a splat, or the vertex of a line, lies. */
 struct spl_place {

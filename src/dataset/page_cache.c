@@ -1,6 +1,6 @@
-/* FOLDER/KEY/BLOCK, numbers in hexadecimal: a header that says which block of what it is, and its checksum, then its bytes.
- * Written under a name of its own and renamed, so that a reader sees all of a block or none, whoever writes the same one
- * beside it. A file's time of change is when it was last used.
+/* FOLDER/KEY/BLOCK, numbers in hexadecimal: a header that says which block of what it is, and its checksum, then its
+ * bytes. Written under a name of its own and renamed, so that a reader sees all of a block or none, whoever writes the
+ * same one beside it. A file's time of change is when it was last used.
  *
  * Invariant: what read() gives is what write() was given under the same key and number. Nothing is synced: after a
  * power failure a file may have lost bytes, and its checksum says so.
@@ -60,7 +60,8 @@ struct spl_page_key spl_page_key_of(const char *shown, const char *state, uint64
 }
 
 /* Of a block, of its folder where `block` is NULL. False where it is too long to be a name of a file. */
-static bool name_of(const struct spl_page_cache *cache, struct spl_page_key key, const uint64_t *block, char out[PATH_MAX])
+static bool name_of(const struct spl_page_cache *cache, struct spl_page_key key, const uint64_t *block,
+                    char out[PATH_MAX])
 {
     int used = snprintf(out, PATH_MAX, "%s/%016" PRIx64 "%016" PRIx64, cache->folder, key.high, key.low);
     if (block && used > 0 && used < PATH_MAX)
@@ -92,7 +93,8 @@ static int compare(const void *a, const void *b)
 static bool is_block(const char *name)
 {
     size_t digits = strspn(name, "0123456789abcdef");
-    return digits >= 10 && (!name[digits] || (name[digits] == '-' && strspn(name + digits, "-0123456789") == strlen(name + digits)));
+    return digits >= 10 &&
+           (!name[digits] || (name[digits] == '-' && strspn(name + digits, "-0123456789") == strlen(name + digits)));
 }
 
 static void list_blocks(int folder, const char *name, struct listing *list)
@@ -103,8 +105,8 @@ static void list_blocks(int folder, const char *name, struct listing *list)
         close(fd);
     for (struct dirent *item; dir && (item = readdir(dir));) {
         struct stat status;
-        if (item->d_name[0] == '.' || fstatat(fd, item->d_name, &status, AT_SYMLINK_NOFOLLOW) || !S_ISREG(status.st_mode) ||
-            strlen(name) + strlen(item->d_name) + 2 > sizeof list->items->name)
+        if (item->d_name[0] == '.' || fstatat(fd, item->d_name, &status, AT_SYMLINK_NOFOLLOW) ||
+            !S_ISREG(status.st_mode) || strlen(name) + strlen(item->d_name) + 2 > sizeof list->items->name)
             continue;
         if (!is_block(item->d_name)) // not ours
             continue;
@@ -179,14 +181,16 @@ int spl_page_cache_open(const char *folder, uint64_t bytes_max, struct spl_page_
     if (!code && !S_ISDIR(status.st_mode))
         code = ENOTDIR;
     if (!code && (status.st_uid != geteuid() || (status.st_mode & 022))) { // who writes there says what is shown
-        spl_fail_field(err, SPL_E_USAGE, "page-cache",
-                       "page-cache: %s belongs to others, or others may write to it; it has to be the service's alone (chmod 700)",
-                       cache->folder);
+        spl_fail_field(
+            err, SPL_E_USAGE, "page-cache",
+            "page-cache: %s belongs to others, or others may write to it; it has to be the service's alone (chmod 700)",
+            cache->folder);
         spl_page_cache_let_go(cache);
         return SPL_E_USAGE;
     }
     if (code) {
-        spl_fail_field(err, SPL_E_USAGE, "page-cache", "page-cache: cannot keep pages in %s: %s", cache->folder, strerror(code));
+        spl_fail_field(err, SPL_E_USAGE, "page-cache", "page-cache: cannot keep pages in %s: %s", cache->folder,
+                       strerror(code));
         spl_page_cache_let_go(cache);
         return SPL_E_USAGE;
     }
@@ -233,7 +237,8 @@ bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, 
 {
     char name[PATH_MAX], more;
     struct header header = {0};
-    int fd = cache && name_of(cache, key, &block, name) ? open(name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK) : -1;
+    int fd =
+        cache && name_of(cache, key, &block, name) ? open(name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK) : -1;
     if (fd < 0)
         return false;
     bool sound = read_all(fd, &header, sizeof header) && !memcmp(header.magic, magic, sizeof magic) &&

@@ -30,7 +30,8 @@ void spl_page_cache_let_go(struct spl_page_cache *cache);
 
 /* Block `block`, of exactly `bytes` bytes, to `out`: false (*out undefined) where it is not there or not what was
  * written, after which it is gone. Any thread, as all below; blocks on disk. `cache` may be NULL. */
-bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block, void *out, size_t bytes);
+bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block, void *out,
+                         size_t bytes);
 void spl_page_cache_write(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block, const void *data,
                           size_t bytes);
 void spl_page_cache_drop(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block);

@@ -16,13 +16,14 @@ struct spl_remote_how {
 };
 
 /* Asks for the beginning of the file at `url` (remote_url.h), which says how long it is and which state of it is there:
- * only that one is read from here on. Errors have the URL without user and query, the status and what to do: SPL_E_USAGE,
- * SPL_E_UNSUPPORTED, SPL_E_NOT_FOUND, SPL_E_IO. Any thread; blocks, for the deadline and once more at most. */
+ * only that one is read from here on. Errors have the URL without user and query, the status and what to do:
+ * SPL_E_USAGE, SPL_E_UNSUPPORTED, SPL_E_NOT_FOUND, SPL_E_IO. Any thread; blocks, for the deadline and once more at
+ * most. */
 int spl_remote_open(const char *url, const struct spl_remote_how *how, struct spl_dataset_source *out,
                     struct spl_error *err);
 
-/* Waits until no read from a server is under way in this process; false where one still was at the deadline. For who has
- * cancelled them all and is about to free the flag. */
+/* Waits until no read from a server is under way in this process; false where one still was at the deadline. For who
+ * has cancelled them all and is about to free the flag. */
 bool spl_remote_wait_idle(uint64_t deadline_ns);
 
 /* The same through any link, which is taken on success. */

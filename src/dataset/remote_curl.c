@@ -1,10 +1,10 @@
-/* Requests over HTTP/1.1 and 2, through libcurl. Handles are lent to one request at a time and kept with their connections,
- * so that neighbours in time need no new one: some of a server, and of all some that were used last.
+/* Requests over HTTP/1.1 and 2, through libcurl. Handles are lent to one request at a time and kept with their
+ * connections, so that neighbours in time need no new one: some of a server, and of all some that were used last.
  *
- * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http. Bytes
- * of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password, query, keys)
- * is in no message: those are made here, of curl's words for a code, never of its own texts. S3's signature covers each
- * request anew, so it follows no redirect. */
+ * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http.
+ * Bytes of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password,
+ * query, keys) is in no message: those are made here, of curl's words for a code, never of its own texts. S3's
+ * signature covers each request anew, so it follows no redirect. */
 #include "dataset/remote_link.h"
 
 #include <inttypes.h>
@@ -20,7 +20,8 @@
 #include "base/work.h"
 #include "dataset/remote_curl.h"
 
-enum { handles_kept = 8, handles_kept_of_all = 64, redirects_most = 5, refusal_bytes = 1024, swallowed_most = 64 << 10 };
+enum { handles_kept = 8, handles_kept_of_all = 64, redirects_most = 5 };
+enum { refusal_bytes = 1024, swallowed_most = 64 << 10 };
 
 struct server {
     const struct spl_curl *curl;
@@ -79,7 +80,8 @@ static void read_range(struct spl_remote_reply *reply, const char *value, size_t
     int end = 0;
     snprintf(text, sizeof text, "%.*s", bytes < sizeof text ? (int)bytes : 0, value);
     reply->ranged = sscanf(text, "bytes %" SCNu64 "-%" SCNu64 "/%" SCNu64 "%n", &reply->first, &reply->last,
-                           &reply->total, &end) == 3 && end > 0 && !text[end] && !strchr(text, '+') && !strstr(text, "--");
+                           &reply->total, &end) == 3 &&
+                    end > 0 && !text[end] && !strchr(text, '+') && !strstr(text, "--");
 }
 
 static size_t on_header(char *line, size_t one, size_t length, void *context)
@@ -91,7 +93,8 @@ static size_t on_header(char *line, size_t one, size_t length, void *context)
     if (length > 5 && !strncmp(line, "HTTP/", 5)) { // of each answer on the way, redirects too
         *reply = (struct spl_remote_reply){0};
         const char *blank = memchr(line, ' ', length);
-        for (const char *c = blank ? blank + 1 : line + length; c < line + length && *c >= '0' && *c <= '9' && reply->status < 100; c++)
+        for (const char *c = blank ? blank + 1 : line + length;
+             c < line + length && *c >= '0' && *c <= '9' && reply->status < 100; c++)
             reply->status = 10 * reply->status + (*c - '0');
     } else if ((value = value_of(line, length, "content-range", &bytes))) {
         read_range(reply, value, bytes);
@@ -212,7 +215,8 @@ static bool set_up(const struct server *server, CURL *handle, struct exchange *e
     SET(CURLOPT_CONNECTTIMEOUT_MS, (long)ask->connect_ms);
     SET(CURLOPT_TIMEOUT_MS, left_ms < 86400000 ? (long)left_ms : 86400000L);
 #if LIBCURL_VERSION_NUM >= 0x075700
-    /* a name that is still looked up at the deadline goes on without us; a library that is older than its header refuses */
+    /* a name that is still looked up at the deadline goes on without us; a library that is older than its header
+     * refuses */
     curl->curl_easy_setopt(handle, CURLOPT_QUICK_EXIT, 1L);
 #endif
     curl->curl_easy_setopt(handle, CURLOPT_BUFFERSIZE, 256L << 10); // refused where a handle still has its buffer
@@ -289,7 +293,8 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
         if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
             bool partly = reply->status == 206;
             reply->may_pass = may_pass(code) || e.stalled;
-            snprintf(reply->why, sizeof reply->why, "%s", e.stalled ? "nothing came any more" : server->curl->curl_easy_strerror(code));
+            snprintf(reply->why, sizeof reply->why, "%s",
+                     e.stalled ? "nothing came any more" : server->curl->curl_easy_strerror(code));
             if (!partly || !reply->may_pass)
                 reply->status = 0;
         }

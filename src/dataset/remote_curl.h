@@ -1,5 +1,5 @@
-/* libcurl behind dlopen: forty libraries come with it, which only who reads from afar has to wait for. A file that includes
- * this calls its functions by their names, after spl_curl_open(). */
+/* libcurl behind dlopen: forty libraries come with it, which only who reads from afar has to wait for. A file that
+ * includes this calls its functions by their names, after spl_curl_open(). */
 #ifndef SPL_DATASET_REMOTE_CURL_H
 #define SPL_DATASET_REMOTE_CURL_H
 

@@ -35,6 +35,7 @@ const struct spl_curl *spl_curl_open(struct spl_error *err)
     pthread_once(&once, load);
     if (!missing)
         return &curl;
-    spl_fail(err, SPL_E_UNSUPPORTED, "reading from servers needs libcurl, of which %s is missing; install libcurl4", missing);
+    spl_fail(err, SPL_E_UNSUPPORTED, "reading from servers needs libcurl, of which %s is missing; install libcurl4",
+             missing);
     return NULL;
 }

@@ -1,8 +1,8 @@
 /* The one place that decides what an answer is good for: whether it is of the file that was opened, whether it is asked
  * for again, and what is said where it is not.
  *
- * Invariant: put() is given bytes of the state that the origin is held to, in order, each once. A head that says another
- * state, length or range is refused before a byte of it is taken. */
+ * Invariant: put() is given bytes of the state that the origin is held to, in order, each once. A head that says
+ * another state, length or range is refused before a byte of it is taken. */
 #include "dataset/remote_run.h"
 
 #include <inttypes.h>
@@ -17,7 +17,8 @@
 #include "dataset/remote_retry.h"
 
 static const uint64_t connect_most_ms = 5000, stall_most_ms = 10000, per_mib_ns = 10 * SPL_NS_PER_S;
-static const uint64_t rest_ms = 2000, rest_most_s = 60; /* of a server that was given up: many reads do not each wait for it */
+/* Of a server that was given up: many reads do not each wait for it. */
+static const uint64_t rest_ms = 2000, rest_most_s = 60;
 
 /* One answer, while it comes. */
 struct taking {
@@ -91,7 +92,8 @@ static const char *name_of(const struct spl_remote_origin *origin)
 static int fail_changed(struct spl_remote_origin *origin, struct spl_error *err)
 {
     if (!atomic_exchange(&origin->changed, true))
-        spl_log_warn("%s has changed since it was opened: what is not here yet of it can no longer be read", origin->shown);
+        spl_log_warn("%s has changed since it was opened: what is not here yet of it can no longer be read",
+                     origin->shown);
     return spl_fail(err, SPL_E_CORRUPT, "%s changed while it was served; open it anew", name_of(origin));
 }
 
@@ -104,7 +106,8 @@ static int refuse(const struct spl_remote_origin *origin, const struct spl_remot
     if (!reply->status)
         return spl_fail(err, code, "cannot read %s: %s", name_of(origin), reply->why);
     return spl_fail(err, code, "cannot read %s: its server answers %ld%s%s%s: %s", name_of(origin), reply->status,
-                    *reply->code ? " (" : "", reply->code, *reply->code ? ")" : "", spl_remote_get_advice(reply->status));
+                    *reply->code ? " (" : "", reply->code, *reply->code ? ")" : "",
+                    spl_remote_get_advice(reply->status));
 }
 
 static uint64_t least(uint64_t a, uint64_t b)
@@ -116,7 +119,8 @@ static int give_up(struct spl_remote_origin *origin, const struct spl_remote_rep
                    struct spl_error *err)
 {
     char status[40];
-    uint64_t rest_ns = least(rest_ms, origin->deadline_ms) * SPL_NS_PER_MS, wish_s = least(reply->retry_after_s, rest_most_s);
+    uint64_t rest_ns = least(rest_ms, origin->deadline_ms) * SPL_NS_PER_MS,
+             wish_s = least(reply->retry_after_s, rest_most_s);
     atomic_store(&origin->rests_until_ns, spl_now_ns() + (wish_s ? wish_s * SPL_NS_PER_S : rest_ns));
     snprintf(status, sizeof status, "it answers %ld", reply->status);
     return spl_fail(err, SPL_E_TIMEOUT, "cannot read %s: given up after %u attempts, at the last %s", name_of(origin),

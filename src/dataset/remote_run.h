@@ -34,8 +34,8 @@ struct spl_remote_run {
 
 /* Asks for the run, and for what is still missing of it where an answer breaks off, fails or bids to come back: until
  * nothing has come for the deadline. While the file is being opened the first answer says what it is held to, and what
- * comes is cut at its end. Blocks; any thread. SPL_E_TIMEOUT, SPL_E_CORRUPT (it has changed), SPL_E_CANCELLED, SPL_E_IO;
- * opening: SPL_E_NOT_FOUND, SPL_E_INPUT too. */
+ * comes is cut at its end. Blocks; any thread. SPL_E_TIMEOUT, SPL_E_CORRUPT (it has changed), SPL_E_CANCELLED,
+ * SPL_E_IO; opening: SPL_E_NOT_FOUND, SPL_E_INPUT too. */
 int spl_remote_run(struct spl_remote_origin *origin, struct spl_remote_run *run, struct spl_error *err);
 
 /* The longest that takes. */

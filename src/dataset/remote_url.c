@@ -1,5 +1,5 @@
-/* URLs of datasets, taken apart by hand as far as we have to know them: which scheme, what may be shown, which name. The
- * rest is the transport's (remote_curl.c), which judges hosts and ports anew.
+/* URLs of datasets, taken apart by hand as far as we have to know them: which scheme, what may be shown, which name.
+ * The rest is the transport's (remote_curl.c), which judges hosts and ports anew.
  *
  * Invariant: no message and nothing that is shown has what stands before an '@' of the host or behind a '?'. */
 #include "dataset/remote_url.h"
@@ -85,19 +85,23 @@ static int locate_key(const char *text, const struct spl_s3_account *account, ch
                       struct spl_error *err)
 {
     static const char in_buckets[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-_";
-    const char *bucket = text + strlen("s3://"), *region = account->region && *account->region ? account->region : "us-east-1";
+    const char *bucket = text + strlen("s3://"),
+               *region = account->region && *account->region ? account->region : "us-east-1";
     size_t length = strspn(bucket, in_buckets);
     if (!length || bucket[length] != '/' || !bucket[length + 1])
-        return spl_fail(err, SPL_E_USAGE, "a dataset in S3 is s3://BUCKET/KEY, a bucket's name of letters, digits, '.', '-' "
-                                          "and '_'; keys of who asks come from the environment"); // not the text: it may have them
+        return spl_fail(err, SPL_E_USAGE,
+                        "a dataset in S3 is s3://BUCKET/KEY, a bucket's name of letters, digits, '.', '-' "
+                        "and '_'; keys of who asks come from the environment"); // not the text: it may have them
     if (strspn(region, "abcdefghijklmnopqrstuvwxyz0123456789-") < strlen(region))
-        return spl_fail(err, SPL_E_USAGE, "AWS_REGION is lower case letters, digits and '-', say eu-central-1, not '%.60s'", region);
+        return spl_fail(err, SPL_E_USAGE,
+                        "AWS_REGION is lower case letters, digits and '-', say eu-central-1, not '%.60s'", region);
     int used;
     if (account->endpoint && *account->endpoint) {
         size_t scheme = scheme_length(account->endpoint), end = strlen(account->endpoint);
         bool known = has_scheme(account->endpoint, "https") || has_scheme(account->endpoint, "http");
         if (!known || !account->endpoint[scheme] || strpbrk(account->endpoint, "?#@ "))
-            return spl_fail(err, SPL_E_USAGE, "AWS_ENDPOINT_URL is https://HOST[:PORT] or http://HOST[:PORT], without user and query");
+            return spl_fail(err, SPL_E_USAGE,
+                            "AWS_ENDPOINT_URL is https://HOST[:PORT] or http://HOST[:PORT], without user and query");
         while (end && account->endpoint[end - 1] == '/')
             end--;
         used = snprintf(out, size, "%.*s/%.*s", (int)end, account->endpoint, (int)length, bucket);
@@ -105,7 +109,8 @@ static int locate_key(const char *text, const struct spl_s3_account *account, ch
         used = snprintf(out, size, "https://s3.%s.amazonaws.com/%.*s", region, (int)length, bucket);
     }
     for (const char *key = bucket + length; *key && used > 0 && (size_t)used + 4 < size; key++)
-        used += snprintf(out + used, size - (size_t)used, strchr(unreserved, *key) ? "%c" : "%%%02X", (unsigned char)*key);
+        used +=
+            snprintf(out + used, size - (size_t)used, strchr(unreserved, *key) ? "%c" : "%%%02X", (unsigned char)*key);
     return SPL_OK;
 }
 

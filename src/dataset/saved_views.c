@@ -29,7 +29,9 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
                 return spl_fail_field(err, SPL_E_INPUT, names[v], "%s holds %g; finite numbers up to 1e12 are taken",
                                       names[v], vectors[v][c]);
     if (view->settings[0]) { // a library's caller may say anything
-        json_t *settings = memchr(view->settings, 0, sizeof view->settings) ? json_loads(view->settings, JSON_REJECT_DUPLICATES, NULL) : NULL;
+        json_t *settings = memchr(view->settings, 0, sizeof view->settings)
+                               ? json_loads(view->settings, JSON_REJECT_DUPLICATES, NULL)
+                               : NULL;
         const bool good = json_is_object(settings);
         json_decref(settings);
         if (!good)
@@ -82,9 +84,11 @@ static int get_height(const json_t *json, struct spl_saved_view *view, struct sp
     const bool flat = name && !strcmp(name, "orthographic");
     double square = 0;
     if (!flat && (!name || strcmp(name, "perspective")))
-        return spl_fail_field(err, SPL_E_INPUT, "projection", "a saved view's projection is perspective or orthographic");
+        return spl_fail_field(err, SPL_E_INPUT, "projection",
+                              "a saved view's projection is perspective or orthographic");
     if (height && (!flat || !json_is_number(height) || !(json_number_value(height) > 0)))
-        return spl_fail_field(err, SPL_E_INPUT, "view_height", "view_height must be a number above 0, with projection orthographic");
+        return spl_fail_field(err, SPL_E_INPUT, "view_height",
+                              "view_height must be a number above 0, with projection orthographic");
     for (int c = 0; c < 3; c++)
         square += (view->target[c] - view->eye[c]) * (view->target[c] - view->eye[c]);
     if (flat)
@@ -104,11 +108,14 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
     json_object_foreach((json_t *)json, key, value)
     {
         bool known = !strcmp(key, "eye") || !strcmp(key, "target") || !strcmp(key, "up") || !strcmp(key, "fov") ||
-                     !strcmp(key, "projection") || !strcmp(key, "view_height") || !strcmp(key, "settings") || (named && !strcmp(key, "name"));
+                     !strcmp(key, "projection") || !strcmp(key, "view_height") || !strcmp(key, "settings") ||
+                     (named && !strcmp(key, "name"));
         if (strict && !known)
-            return spl_fail_field(err, SPL_E_INPUT, key,
-                                  "unknown field '%.60s' of a saved view; known are eye, target, up, fov, projection, view_height "
-                                  "and settings", key);
+            return spl_fail_field(
+                err, SPL_E_INPUT, key,
+                "unknown field '%.60s' of a saved view; known are eye, target, up, fov, projection, view_height "
+                "and settings",
+                key);
     }
     const json_t *fov = json_object_get(json, "fov"), *name = json_object_get(json, "name");
     if (named && (!json_is_string(name) || json_string_length(name) >= sizeof view->name))

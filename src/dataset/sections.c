@@ -38,11 +38,14 @@ static const struct kind {
                        .bytes_max = SPL_META_BYTES_MAX, .wrong_size = "is larger than 8 MiB",
                        .check = spl_dataset_check_meta},
     [SPL_KIND_DIRECTORY] = {SPL_SECTION_DIRECTORY, .kept = true, .alignment = 64,
-                            .item_bytes = sizeof(struct spl_page_row), .bytes_max = (SPL_SECTIONS_MAX + 1ull) * sizeof(struct spl_page_row),
-                            .wrong_size = "is not a whole number of rows, or has too many", .check = spl_dataset_check_directory},
+                            .item_bytes = sizeof(struct spl_page_row),
+                            .bytes_max = (SPL_SECTIONS_MAX + 1ull) * sizeof(struct spl_page_row),
+                            .wrong_size = "is not a whole number of rows, or has too many",
+                            .check = spl_dataset_check_directory},
     [SPL_KIND_ATOMS] = {SPL_SECTION_ATOMS, .group = TEXTURES, .kept = true, .alignment = 64, .item_bytes = 1,
                         .bytes_min = sizeof(struct spl_atoms_header), .bytes_max = ATOMS_BYTES_MAX,
-                        .wrong_size = "is shorter than its header, or longer than a dictionary can be", .check = spl_dataset_check_dictionary},
+                        .wrong_size = "is shorter than its header, or longer than a dictionary can be",
+                        .check = spl_dataset_check_dictionary},
     [SPL_KIND_STATIONS] = {SPL_SECTION_STATIONS, .group = MAPS, .kept = true, .alignment = 64,
                            .item_bytes = sizeof(struct spl_map_row), .bytes_min = sizeof(struct spl_map_row),
                            .bytes_max = SPL_MAPS_MAX * sizeof(struct spl_map_row),
@@ -151,8 +154,8 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
     return SPL_OK;
 }
 
-/* Bytes of the source, malloc'd; NULL and `err` when they cannot be read. From a server memory is taken as they come: how
- * many there are is only said until then. */
+/* Bytes of the source, malloc'd; NULL and `err` when they cannot be read. From a server memory is taken as they come:
+ * how many there are is only said until then. */
 static void *copy_bytes(const struct spl_dataset *dataset, uint64_t offset, uint64_t bytes, struct spl_error *err)
 {
     const uint64_t block = 16 << 20;
@@ -299,7 +302,8 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
     for (uint32_t i = 0; i < dataset->section_count; i++) {
         const struct kind *kind = kind_of(&dataset->sections[i]);
         struct spl_error why = {0};
-        if (kind && kind->kept && !(dataset->copies[i] = copy_bytes(dataset, dataset->sections[i].offset, dataset->sections[i].bytes, &why)))
+        if (kind && kind->kept &&
+            !(dataset->copies[i] = copy_bytes(dataset, dataset->sections[i].offset, dataset->sections[i].bytes, &why)))
             return spl_fail(err, why.code, "%s", why.message);
     }
     dataset->pages = dataset->found[SPL_KIND_PAGES].at;

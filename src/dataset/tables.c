@@ -292,7 +292,8 @@ int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
     bool whole = spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
     if (whole && dataset->info.pages)
-        spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0], dataset->found[SPL_KIND_HEADS].at[dataset->info.pages - 1]);
+        spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0],
+                           dataset->found[SPL_KIND_HEADS].at[dataset->info.pages - 1]);
     if (!rc && (whole || (dataset->verified && !dataset->lazily)))
         rc = read_all(dataset, err);
     return rc || !whole ? rc : spl_dataset_check_children(dataset, err);

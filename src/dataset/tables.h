@@ -47,9 +47,8 @@ int spl_dataset_read_tables(const struct spl_dataset *dataset, uint32_t page, vo
 const struct spl_tables *spl_dataset_borrow_tables(const struct spl_dataset *dataset, uint32_t page,
                                                    struct spl_tables **read, struct spl_error *err);
 
-/* The page that has node `node`, chunk `chunk` or the splat of `id`, each below the number that the dataset has. */
+/* The page that has node `node` or the splat of `id`, each below the number that the dataset has. */
 uint32_t spl_dataset_find_page_of_node(const struct spl_dataset *dataset, uint64_t node);
-uint32_t spl_dataset_find_page_of_chunk(const struct spl_dataset *dataset, uint64_t chunk);
 uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t id);
 
 /* The node behind the last one of a page. */

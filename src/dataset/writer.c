@@ -9,6 +9,7 @@
 
 #include <xxhash.h>
 
+#include "base/array.h"
 #include "base/memory.h"
 #include "dataset/dictionary.h"
 #include "dataset/head.h"
@@ -16,14 +17,8 @@
 int spl_writer_add_section(struct spl_dataset_writer *writer, uint32_t type, uint32_t index, const void *data,
                            size_t bytes, struct spl_error *err)
 {
-    if (writer->section_count == writer->section_capacity) {
-        size_t capacity = writer->section_capacity ? 2 * writer->section_capacity : 16;
-        struct spl_section *grown = spl_realloc(writer->sections, capacity, sizeof *grown, err);
-        if (!grown)
-            return SPL_E_NOMEM;
-        writer->sections = grown;
-        writer->section_capacity = capacity;
-    }
+    if (spl_array_reserve(writer->sections, writer->section_capacity, writer->section_count + 1, err))
+        return SPL_E_NOMEM;
     struct spl_section section = {
         .type = type,
         .index = index,
@@ -69,15 +64,7 @@ int spl_writer_flush_page(struct spl_dataset_writer *writer, struct spl_error *e
 static int reserve(struct spl_words *words, size_t count, struct spl_error *err)
 {
     size_t wanted = page_bytes(words->used + count, SPL_TEXTURE_TAIL_WORDS) / sizeof *words->at;
-    if (wanted <= words->capacity)
-        return SPL_OK;
-    wanted = wanted > 2 * words->capacity ? wanted : 2 * words->capacity;
-    uint32_t *grown = spl_realloc(words->at, wanted, sizeof *grown, err);
-    if (!grown)
-        return SPL_E_NOMEM;
-    words->at = grown;
-    words->capacity = wanted;
-    return SPL_OK;
+    return spl_array_reserve(words->at, words->capacity, wanted, err);
 }
 
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err)

@@ -1,6 +1,6 @@
-/* What META says of the values of optional attributes, and of heights, from the codes of the leaves as they were written:
- * they are read again page by page, so whoever writes a file, of whatever was packed, pruned or coloured, has them right.
- * Owned by the writer's thread. */
+/* What META says of the values of optional attributes, and of heights, from the codes of the leaves as they were
+ * written: they are read again page by page, so whoever writes a file, of whatever was packed, pruned or coloured, has
+ * them right. Owned by the writer's thread. */
 #include <stdlib.h>
 
 #include "base/memory.h"

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "geom/faces.h"
 #include "geom/size.h"
+#include "geom/vector.h"
 
 static const double coordinate_max = SPL_CAMERA_COORDINATE_MAX;
 /* An orthographic image is so high at least: below, doubles of coordinates in kilometres end. */
@@ -19,18 +20,6 @@ static const double view_height_min = 1e-9;
 static const double parallel_sine = 1e-6;
 /* What matrices written with few digits, or as floats, are off by. */
 static const double matrix_tolerance = 1e-3, stored_tolerance = 1e-9;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
 
 /* Scales to unit length without over- or underflow; false for the zero vector. */
 static bool normalize(double *v, int n)
@@ -145,13 +134,13 @@ int spl_camera_look_at(struct spl_camera *camera, const double eye[3], const dou
     if (!normalize(upward, 3))
         return spl_fail_field(err, SPL_E_INPUT, "up", "up is the zero vector");
     double right[3], down[3];
-    cross(forward, upward, right);
-    if (sqrt(dot(right, right)) < parallel_sine)
+    cross3(forward, upward, right);
+    if (sqrt(dot3(right, right)) < parallel_sine)
         return spl_fail_field(err, SPL_E_INPUT, "up",
                               "up is parallel to the direction of view; give another, such as up=%s",
                               fabs(forward[2]) > 0.5 ? "0,1,0" : "0,0,1");
     normalize(right, 3);
-    cross(forward, right, down);
+    cross3(forward, right, down);
     memcpy(camera->eye, eye, sizeof camera->eye);
     memcpy(camera->rotation, right, sizeof right);
     memcpy(camera->rotation + 3, down, sizeof down);
@@ -165,9 +154,9 @@ static double rotation_error(const double m[9])
     double largest = 0, normal[3];
     for (int i = 0; i < 3; i++)
         for (int j = i; j < 3; j++)
-            largest = fmax(largest, fabs(dot(m + 3 * i, m + 3 * j) - (i == j)));
-    cross(m, m + 3, normal);
-    return dot(normal, m + 6) > 0 ? largest : INFINITY;
+            largest = fmax(largest, fabs(dot3(m + 3 * i, m + 3 * j) - (i == j)));
+    cross3(m, m + 3, normal);
+    return dot3(normal, m + 6) > 0 ? largest : INFINITY;
 }
 
 /* The nearest rotation: Newton's iteration for the polar factor, M <- (M + M^-T) / 2. It squares the error each time,
@@ -176,10 +165,10 @@ static void orthonormalize(double m[9])
 {
     for (int step = 0; step < 4; step++) {
         double cofactor[9];
-        cross(m + 3, m + 6, cofactor);
-        cross(m + 6, m, cofactor + 3);
-        cross(m, m + 3, cofactor + 6);
-        double determinant = dot(m, cofactor);
+        cross3(m + 3, m + 6, cofactor);
+        cross3(m + 6, m, cofactor + 3);
+        cross3(m, m + 3, cofactor + 6);
+        double determinant = dot3(m, cofactor);
         for (int i = 0; i < 9; i++)
             m[i] = (m[i] + cofactor[i] / determinant) / 2;
     }
@@ -240,7 +229,8 @@ static int check_focal(enum spl_projection projection, double focal, const char 
 {
     if (projection == SPL_ORTHOGRAPHIC && focal > 0 && !(focal >= 1e-12 && focal <= 1e14))
         return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not within 1e-12 and 1e14", focal);
-    if (isfinite(focal) && (focal > 0 || (projection == SPL_EQUIRECTANGULAR && focal < 0))) /* which may go the other way */
+    const bool reverses = projection == SPL_EQUIRECTANGULAR; // which may go the other way
+    if (isfinite(focal) && (focal > 0 || (reverses && focal < 0)))
         return SPL_OK;
     if (projection == SPL_ORTHOGRAPHIC)
         return spl_fail_field(err, SPL_E_INPUT, field, "%g pixels a unit are not a positive number", focal);
@@ -284,19 +274,19 @@ bool spl_camera_project(const struct spl_camera *camera, const double p[3], doub
 {
     const double *r = camera->rotation;
     double ray[3] = {p[0] - camera->eye[0], p[1] - camera->eye[1], p[2] - camera->eye[2]};
-    double z = dot(r + 6, ray);
+    double z = dot3(r + 6, ray);
     if (spl_camera_is_bent(camera)) {
-        const double c[3] = {dot(r, ray), dot(r + 3, ray), z};
+        const double c[3] = {dot3(r, ray), dot3(r + 3, ray), z};
         if (!spl_camera_place(camera, c, pixel))
             return false;
-        *depth = sqrt(dot(ray, ray));
+        *depth = sqrt(dot3(ray, ray));
         return true;
     }
     if (!(z > 0))
         return false;
     double scale = camera->projection == SPL_ORTHOGRAPHIC ? 1 : z;
-    pixel[0] = camera->fx * dot(r, ray) / scale + camera->cx;
-    pixel[1] = camera->fy * dot(r + 3, ray) / scale + camera->cy;
+    pixel[0] = camera->fx * dot3(r, ray) / scale + camera->cx;
+    pixel[1] = camera->fy * dot3(r + 3, ray) / scale + camera->cy;
     *depth = z;
     return true;
 }

@@ -3,9 +3,8 @@
  *
  * A form is turned into values of camera_params.def, each of which keeps the name of the member that said it; what
  * they mean together, and whether they can be, is camera_values.c's business, as for values that are given one by
- * one. A lens is COLMAP's of the same polynomial. What no camera of ours has (skew, a stereo baseline) is refused here, by
- * name.
- * Pure functions, any thread. */
+ * one. A lens is COLMAP's of the same polynomial. What no camera of ours has (skew, a stereo baseline) is refused here,
+ * by name. Pure functions, any thread. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -194,7 +193,8 @@ static int read_orthographic(const json_t *json, struct spl_value *values, struc
                                   mag[i]);
     const double view[2] = {2 * mag[1], mag[0] / mag[1]};
     if (!(view[1] >= 1e-4 && view[1] <= 1e4))
-        return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_XMAG, "xmag over ymag is %g, outside 0.0001 to 10000", view[1]);
+        return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_XMAG, "xmag over ymag is %g, outside 0.0001 to 10000",
+                              view[1]);
     if ((rc = spl_form_set_number(values, SPL_CAMERA_projection, path, SPL_ORTHOGRAPHIC, err)) ||
         (rc = spl_form_set(values, SPL_CAMERA_view_height, ymag_name, view, 2, err)) ||
         (rc = spl_form_set_number(values, SPL_CAMERA_near, near_name, near, err)))
@@ -216,7 +216,8 @@ static int read_lens(const json_t *json, struct spl_value *values, struct spl_er
         return spl_fail_field(err, SPL_E_INPUT, "gltf.type", "gltf is %s and holds %s", kind,
                               pinhole ? "perspective" : "orthographic");
     if (type && projection == SPL_ORTHOGRAPHIC && !parallel)
-        return spl_fail_field(err, SPL_E_INPUT, "gltf.orthographic", "gltf.type is orthographic, and gltf.orthographic missing");
+        return spl_fail_field(err, SPL_E_INPUT, "gltf.orthographic",
+                              "gltf.type is orthographic, and gltf.orthographic missing");
     return parallel ? read_orthographic(parallel, values, err) : pinhole ? read_perspective(pinhole, values, err) : 0;
 }
 

@@ -54,7 +54,7 @@ enum { SPL_VALUE_NUMBERS = 16, SPL_VALUE_WORD = 64 };
 struct spl_value {
     bool given;
     unsigned count;
-    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov and view_height: glTF's aspect ratio in n[1] */
+    double n[SPL_VALUE_NUMBERS]; /* choices: the enum's number in n[0]; fov, view_height: glTF's aspect ratio in n[1] */
     const char *source;          /* the member of a form that said it, a literal; NULL: the parameter itself */
     char word[SPL_VALUE_WORD];   /* of a name */
 };
@@ -70,7 +70,8 @@ struct spl_camera_places {
 /* Who knows a dataset's views by name. */
 struct spl_camera_defaults;
 struct spl_camera_names {
-    /* Puts the view into eye, target, up, fov, fit, view_height and settings of `out`. SPL_E_INPUT, field "view", where there is none. */
+    /* Puts the view into eye, target, up, fov, fit, view_height and settings of `out`. SPL_E_INPUT, field "view", where
+     * there is none. */
     int (*find)(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
                 struct spl_error *err);
 };
@@ -143,8 +144,8 @@ const char *spl_json_show_shape(const json_t *json, char text[40]);
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
                            const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
-/* Of a view by its name that is orthographic, `view_height` high (0: it is not): so are the values, unless they say how high,
- * or through which lens. */
+/* Of a view by its name that is orthographic, `view_height` high (0: it is not): so are the values, unless they say how
+ * high, or through which lens. */
 void spl_camera_inherit_projection(struct spl_value values[SPL_CAMERA_PARAMS], double view_height);
 
 /* One view of a list: an object with "camera" (parameters of place SPL_CAMERA) and beside it parameters of place

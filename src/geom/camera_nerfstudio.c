@@ -30,8 +30,8 @@ static int read_bend(const json_t *json, bool fisheye, bool pinhole, double bend
         if (rc)
             return rc;
         if (value != 0 && (place < 0 || pinhole))
-            return spl_fail_field(err, SPL_E_INPUT, field, "%s must be 0: nerfstudio.camera_model has no such coefficient",
-                                  field);
+            return spl_fail_field(err, SPL_E_INPUT, field,
+                                  "%s must be 0: nerfstudio.camera_model has no such coefficient", field);
         if (place >= 0)
             bend[place] = value;
         *bends = *bends || value != 0;

@@ -6,9 +6,9 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/array.h"
+#include "geom/distortion.h"
 
 const char *const spl_path_positions_names[] = {"centripetal", "uniform", "linear", NULL};
 const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
@@ -50,13 +50,15 @@ int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *c
     if (path->count && camera->projection != first->projection)
         return spl_fail_field(err, SPL_E_INPUT, "projection", "%s after cameras that are %s",
                               spl_projection_name(camera->projection), spl_projection_name(first->projection));
-    if (path->count && memcmp(&camera->lens, &first->lens, sizeof first->lens))
+    if (path->count && !spl_distortion_is_same(&camera->lens, &first->lens))
         return spl_fail_field(err, SPL_E_INPUT, "params", "the lens of a path's cameras is one");
     const bool scans = camera->projection == SPL_EQUIRECTANGULAR; // whose rays nothing lies between
     if (path->count && scans && (camera->fx != first->fx || camera->cx != first->cx))
-        return spl_fail_field(err, SPL_E_INPUT, "azimuth", "the azimuths of a path's scans are one, as of its first camera");
+        return spl_fail_field(err, SPL_E_INPUT, "azimuth",
+                              "the azimuths of a path's scans are one, as of its first camera");
     if (path->count && scans && (camera->fy != first->fy || camera->cy != first->cy))
-        return spl_fail_field(err, SPL_E_INPUT, "elevation", "the elevations of a path's scans are one, as of its first camera");
+        return spl_fail_field(err, SPL_E_INPUT, "elevation",
+                              "the elevations of a path's scans are one, as of its first camera");
     if (path->count == path->capacity && grow(path, err))
         return SPL_E_NOMEM;
     if (!path->count && isnan(time)) {
@@ -102,8 +104,8 @@ int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, dou
         seconds *= (double)path->count / (double)(path->count - 1);
     double count = each ? (double)path->count : frames ? (double)frames : floor(seconds * *fps_out + 0.5);
     if (count > (double)most && !frames && !each && !given)
-        return spl_fail_field(err, SPL_E_LIMIT, "time", "the times are %.6g s long, %.6g frames; the limit is %zu", seconds,
-                              count, most);
+        return spl_fail_field(err, SPL_E_LIMIT, "time", "the times are %.6g s long, %.6g frames; the limit is %zu",
+                              seconds, count, most);
     if (count > (double)most)
         return spl_fail_field(err, SPL_E_LIMIT, frames || each ? "frames" : "seconds", "%.0f frames; the limit is %zu",
                               count, most);

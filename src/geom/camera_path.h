@@ -33,8 +33,8 @@ struct spl_camera_path {
 /* Takes NULL and zeroed paths. */
 void spl_camera_path_finish(struct spl_camera_path *path);
 
-/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size, projection or lens than
- * the first, a time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX
+/* Appends; `time` NAN where there is none (then none may have one). Refuses a camera of another size, projection or
+ * lens than the first, a time that is not later than the one before (field "time") and more than SPL_CAMERA_PATH_MAX
  * (SPL_E_LIMIT, field "cameras"). */
 int spl_camera_path_add(struct spl_camera_path *path, const struct spl_camera *camera, double time,
                         struct spl_error *err);
@@ -71,8 +71,8 @@ extern const char *const spl_path_positions_names[], *const spl_path_rotations_n
 int spl_camera_path_sample(const struct spl_camera_path *path, const struct spl_path_motion *motion, size_t frames,
                            struct spl_camera *out, struct spl_error *err);
 
-/* When each key is passed, in the time of the whole way, which is (*begin)[path->count], and of an open path is the last
- * key's. The caller frees *begin. */
+/* When each key is passed, in the time of the whole way, which is (*begin)[path->count], and of an open path is the
+ * last key's. The caller frees *begin. */
 int spl_camera_path_get_times(const struct spl_camera_path *path, const struct spl_path_motion *motion, double **begin,
                               struct spl_error *err);
 /* The same of frame `frame` of `frames`. */

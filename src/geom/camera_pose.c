@@ -51,8 +51,8 @@ static void get_up(const struct spl_value *v, const double usual[3], const doubl
     memcpy(up, lies ? (double[]){0, 0, -1} : (double[]){0, 1, 0}, 3 * sizeof *up);
 }
 
-/* Has what is seen all around stand upright: `up` is up in the image, and what is looked at in its middle column. Where that
- * lies straight up or down, it stays, to be refused. */
+/* Has what is seen all around stand upright: `up` is up in the image, and what is looked at in its middle column. Where
+ * that lies straight up or down, it stays, to be refused. */
 static void level(const double eye[3], double target[3], const double given_up[3])
 {
     double along = 0, square = 0, moved[3], left = 0, up[3];
@@ -83,11 +83,12 @@ static int find_station(const struct spl_value *v, const struct spl_camera_defau
         if (given(v, others[i]))
             return spl_camera_conflict(v, SPL_CAMERA_station, others[i], err);
     if (!dataset)
-        return spl_fail_field(err, SPL_E_INPUT, name, "no dataset stands behind this that could say where station %.0f is",
-                              number);
+        return spl_fail_field(err, SPL_E_INPUT, name,
+                              "no dataset stands behind this that could say where station %.0f is", number);
     if (!dataset->station_count)
-        return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f: no scan of dataset '%s' says where it was taken from",
-                              number, dataset->id);
+        return spl_fail_field(err, SPL_E_INPUT, name,
+                              "station %.0f: no scan of dataset '%s' says where it was taken from", number,
+                              dataset->id);
     if (number >= dataset->station_count)
         return spl_fail_field(err, SPL_E_INPUT, name, "station %.0f is none of dataset '%s', which has 0 to %u", number,
                               dataset->id, dataset->station_count - 1);

@@ -1,5 +1,5 @@
-/* A camera as ROS's CameraInfo says it: the raw image's k with what bends it, or p of the rectified one. Pure functions,
- * any thread. */
+/* A camera as ROS's CameraInfo says it: the raw image's k with what bends it, or p of the rectified one. Pure
+ * functions, any thread. */
 #include <string.h>
 
 #include "geom/camera_forms.h"
@@ -27,7 +27,8 @@ static int read_ros_matrix(const json_t *json, const char *name, unsigned column
 }
 
 /* What bends the raw image's rays: how many of its coefficients are there in *count, 0 where none bends. */
-static int read_ros_distortion(const json_t *json, double bend[8], unsigned *count, bool *fisheye, struct spl_error *err)
+static int read_ros_distortion(const json_t *json, double bend[8], unsigned *count, bool *fisheye,
+                               struct spl_error *err)
 {
     static const struct {
         const char *name;
@@ -61,8 +62,9 @@ static int read_ros_distortion(const json_t *json, double bend[8], unsigned *cou
     if (!bends)
         return 0;
     if (found < 0)
-        return spl_fail_field(err, SPL_E_INPUT, "ros.distortion_model",
-                              "ros.d bends, and ros.distortion_model is missing: plumb_bob, rational_polynomial or equidistant");
+        return spl_fail_field(
+            err, SPL_E_INPUT, "ros.distortion_model",
+            "ros.d bends, and ros.distortion_model is missing: plumb_bob, rational_polynomial or equidistant");
     if (given < models[found].least || given > models[found].most)
         return spl_fail_field(err, SPL_E_INPUT, "ros.d", "ros.d has %zu numbers; %s has %zu", given, name,
                               models[found].most);
@@ -78,7 +80,8 @@ int spl_form_read_ros(const json_t *json, struct spl_value *values, struct spl_e
     bool raw = json_object_get(json, "k"), rectified = json_object_get(json, "p"), fisheye = false;
     unsigned bends = 0;
     int rc;
-    if ((rc = spl_form_check(json, "ros", known, err)) || (rc = read_ros_distortion(json, bend, &bends, &fisheye, err)) ||
+    if ((rc = spl_form_check(json, "ros", known, err)) ||
+        (rc = read_ros_distortion(json, bend, &bends, &fisheye, err)) ||
         (rc = spl_json_get_number(json, "ros.width", &size[0], err)) ||
         (rc = spl_json_get_number(json, "ros.height", &size[1], err)))
         return rc;

@@ -4,10 +4,10 @@
 
 #include "geom/camera_parts.h"
 
-/* A scanner's rays: where the first and the last column and row look, and how many there are. Their counts become the size
- * in `own`, a copy of the values. */
-static const enum spl_camera_param scan[] = {SPL_CAMERA_azimuth, SPL_CAMERA_elevation}, scan_sides[] = {SPL_CAMERA_width,
-                                                                                                       SPL_CAMERA_height};
+/* A scanner's rays: where the first and the last column and row look, and how many there are. Their counts become the
+ * size in `own`, a copy of the values. */
+static const enum spl_camera_param scan[] = {SPL_CAMERA_azimuth, SPL_CAMERA_elevation},
+                                   scan_sides[] = {SPL_CAMERA_width, SPL_CAMERA_height};
 
 int spl_camera_take_scan(const struct spl_value *v, struct spl_value own[SPL_CAMERA_PARAMS], struct spl_error *err)
 {
@@ -21,8 +21,9 @@ int spl_camera_take_scan(const struct spl_value *v, struct spl_value own[SPL_CAM
         if (given(v, scan_sides[i]))
             return spl_camera_conflict(v, scan_sides[i], scan[i], err);
         if (!(fabs(n[0]) <= most && fabs(n[1]) <= most && fabs(n[1] - n[0]) <= 360))
-            return spl_fail_field(err, SPL_E_INPUT, name, "%s from %g to %g is not within -%g and %g, or more than a turn",
-                                  name, n[0], n[1], most, most);
+            return spl_fail_field(err, SPL_E_INPUT, name,
+                                  "%s from %g to %g is not within -%g and %g, or more than a turn", name, n[0], n[1],
+                                  most, most);
         if (!(n[2] >= 1 && n[2] == floor(n[2])) || (n[2] > 1 && n[0] == n[1]))
             return spl_fail_field(err, SPL_E_INPUT, name, "%g is no number of rays from %g to %g", n[2], n[0], n[1]);
         own[scan_sides[i]] = (struct spl_value){.given = true, .count = 1, .n = {n[2]}};
@@ -49,8 +50,8 @@ int spl_camera_resolve_around(const struct spl_value *v, struct spl_camera *came
         camera->cx = camera->cy = 0.5;
         return SPL_OK;
     }
-    int rc = spl_camera_set_around(camera, (enum spl_projection)v[SPL_CAMERA_projection].n[0], camera->width, camera->height,
-                                   err);
+    int rc = spl_camera_set_around(camera, (enum spl_projection)v[SPL_CAMERA_projection].n[0], camera->width,
+                                   camera->height, err);
     if (rc || !given(v, scan[0]))
         return rc;
     const double *azimuth = v[scan[0]].n, *elevation = v[scan[1]].n;

@@ -36,7 +36,8 @@ int spl_camera_missing(enum spl_camera_param param, enum spl_camera_param becaus
                           : param == SPL_CAMERA_model    ? spl_colmap_model_names
                                                          : "";
     return spl_fail_field(err, SPL_E_INPUT, spl_camera_param_names[param], "'%s' is needed where '%s' is given%s%s",
-                          spl_camera_param_names[param], spl_camera_param_names[because], *choices ? ": " : "", choices);
+                          spl_camera_param_names[param], spl_camera_param_names[because], *choices ? ": " : "",
+                          choices);
 }
 
 /* glTF's aspect ratio is that of the image: sides that are given may differ from it by the rounding to pixels. */
@@ -45,20 +46,24 @@ static int check_aspect(double aspect, const char *name, const double size[2], s
     if (aspect == 0 || fabs(size[1] * aspect - size[0]) < 0.501 || fabs(size[0] / aspect - size[1]) < 0.501)
         return 0;
     if (!strcmp(name, SPL_GLTF_XMAG))
-        return spl_fail_field(err, SPL_E_INPUT, name, "%s over ymag, %g, contradicts %.0f x %.0f pixels; leave out width or height",
-                              name, aspect, size[0], size[1]);
-    return spl_fail_field(err, SPL_E_INPUT, name, "%s %g contradicts %.0f x %.0f pixels; leave it out, or width or height",
-                          name, aspect, size[0], size[1]);
+        return spl_fail_field(err, SPL_E_INPUT, name,
+                              "%s over ymag, %g, contradicts %.0f x %.0f pixels; leave out width or height", name,
+                              aspect, size[0], size[1]);
+    return spl_fail_field(err, SPL_E_INPUT, name,
+                          "%s %g contradicts %.0f x %.0f pixels; leave it out, or width or height", name, aspect,
+                          size[0], size[1]);
 }
 
 static int resolve_size(const struct spl_value *v, const struct spl_camera_limits *limits, uint32_t *width,
                         uint32_t *height, struct spl_error *err)
 {
     static const enum spl_camera_param sides[] = {SPL_CAMERA_width, SPL_CAMERA_height};
-    const enum spl_projection projection = given(v, SPL_CAMERA_projection) ? (enum spl_projection)v[SPL_CAMERA_projection].n[0] : SPL_PERSPECTIVE;
+    const enum spl_projection projection =
+        given(v, SPL_CAMERA_projection) ? (enum spl_projection)v[SPL_CAMERA_projection].n[0] : SPL_PERSPECTIVE;
     const bool parallel = v[SPL_CAMERA_view_height].n[1] != 0;
     const char *said = parallel ? SPL_GLTF_XMAG : SPL_GLTF_ASPECT;
-    double aspect = v[parallel ? SPL_CAMERA_view_height : SPL_CAMERA_fov].n[1], size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
+    double aspect = v[parallel ? SPL_CAMERA_view_height : SPL_CAMERA_fov].n[1],
+           size[2] = {get(v, sides[0], 0), get(v, sides[1], 0)};
     double shape[2];
     spl_size_of_projection(projection, shape);
     if (aspect != 0)
@@ -107,8 +112,9 @@ static int resolve_orthographic(const struct spl_value *v, const struct spl_came
     double height = 2 * tan(usual_fov(defaults, camera) * M_PI / 360) * distance;
     for (int i = 0; i < 3; i++)
         if (given(v, others[i]))
-            return spl_camera_conflict(v, others[i], given(v, SPL_CAMERA_projection) ? SPL_CAMERA_projection : sizes[!given(v, sizes[0])],
-                            err);
+            return spl_camera_conflict(
+                v, others[i], given(v, SPL_CAMERA_projection) ? SPL_CAMERA_projection : sizes[!given(v, sizes[0])],
+                err);
     for (int i = 1; i < 3; i++)
         for (int j = 0; j < i; j++)
             if (given(v, sizes[i]) && given(v, sizes[j]))
@@ -118,7 +124,8 @@ static int resolve_orthographic(const struct spl_value *v, const struct spl_came
     if (given(v, SPL_CAMERA_units_per_pixel)) {
         double step = v[SPL_CAMERA_units_per_pixel].n[0];
         if (!(step >= 1e-9 && step <= 1e9))
-            return spl_fail_field(err, SPL_E_INPUT, "units_per_pixel", "units_per_pixel %g is not within 1e-9 and 1e9", step);
+            return spl_fail_field(err, SPL_E_INPUT, "units_per_pixel", "units_per_pixel %g is not within 1e-9 and 1e9",
+                                  step);
         height = step * camera->height;
     } else if (given(v, SPL_CAMERA_view_height)) {
         height = v[SPL_CAMERA_view_height].n[0];
@@ -141,7 +148,8 @@ static int resolve_orthographic(const struct spl_value *v, const struct spl_came
 /* A form that says a pinhole's lens is no fisheye's, and no plan's, whose numbers mean other things. */
 static int check_form(const struct spl_value *v, struct spl_error *err)
 {
-    if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].source || v[SPL_CAMERA_projection].n[0] == SPL_PERSPECTIVE)
+    if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].source ||
+        v[SPL_CAMERA_projection].n[0] == SPL_PERSPECTIVE)
         return 0;
     for (enum spl_camera_param lens = SPL_CAMERA_fov; lens <= SPL_CAMERA_cy; lens++)
         if (given(v, lens) && v[lens].source)
@@ -209,9 +217,9 @@ static int check_complete(const struct spl_value *v, struct spl_error *err)
     bool sized = is_orthographic(v) || given(v, SPL_CAMERA_view_height) || given(v, SPL_CAMERA_units_per_pixel);
     sized = sized || is_around(v) || is_fisheye(v);
     if (!given(v, SPL_CAMERA_fov) && !given(v, SPL_CAMERA_fx) && !given(v, SPL_CAMERA_model) && !sized)
-        return spl_fail_field(
-            err, SPL_E_INPUT, "fov",
-            "intrinsics are missing: fov, fx, model and params, view_height, gltf.perspective, open3d, ros or nerfstudio");
+        return spl_fail_field(err, SPL_E_INPUT, "fov",
+                              "intrinsics are missing: fov, fx, model and params, view_height, gltf.perspective, "
+                              "open3d, ros or nerfstudio");
     return 0;
 }
 

@@ -6,11 +6,18 @@
 #include "geom/distortion.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/error.h"
 
 static const double radial_reach = 20, fisheye_reach = 1.55; /* tan of 87 degrees; a view depth above 0 */
 enum { reach_steps = 2000, tangential_rounds = 24 };
+
+bool spl_distortion_is_same(const struct spl_distortion *a, const struct spl_distortion *b)
+{
+    return a->kind == b->kind && !memcmp(a->k, b->k, sizeof a->k) && !memcmp(a->p, b->p, sizeof a->p) &&
+           !memcmp(&a->reach, &b->reach, sizeof a->reach);
+}
 
 double spl_distortion_get_image(const struct spl_distortion *d, double r, double *growth)
 {
@@ -82,8 +89,8 @@ void spl_distortion_widen(struct spl_distortion *d)
     find_reach(d, d->kind == SPL_DISTORTION_FISHEYE ? M_PI : radial_reach);
 }
 
-/* The r, or the angle, whose image has the radius `image`, from a guess. Newton's steps, halving where they would leave what
- * is known to hold it. */
+/* The r, or the angle, whose image has the radius `image`, from a guess. Newton's steps, halving where they would leave
+ * what is known to hold it. */
 static double find_radius(const struct spl_distortion *d, double image, double guess)
 {
     double low = 0, high = d->reach, r = fmin(guess, d->reach), growth;

@@ -1,5 +1,5 @@
-/* What real lenses add to a pinhole (struct spl_distortion), both ways. Photographs are sampled through lenses, and views
- * drawn through them. Pure functions; any thread. */
+/* What real lenses add to a pinhole (struct spl_distortion), both ways. Photographs are sampled through lenses, and
+ * views drawn through them. Pure functions; any thread. */
 #ifndef SPL_GEOM_DISTORTION_H
 #define SPL_GEOM_DISTORTION_H
 
@@ -11,6 +11,9 @@ int spl_distortion_init(struct spl_distortion *distortion, struct spl_error *err
 
 /* `reach` anew for views, whose fisheyes see behind them: up to half a turn off the axis. */
 void spl_distortion_widen(struct spl_distortion *distortion);
+
+/* To the bit. */
+bool spl_distortion_is_same(const struct spl_distortion *a, const struct spl_distortion *b);
 
 /* The radius of the image of r (fisheye: of the angle a), and how fast it grows. Without the tangential terms. */
 double spl_distortion_get_image(const struct spl_distortion *distortion, double r, double *growth);

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "geom/distortion.h"
 #include "geom/ray_list.h"
+#include "geom/vector.h"
 
 const double spl_face_axes[SPL_FACES][9] = {
     {0, 0, -1, 0, 1, 0, 1, 0, 0}, {0, 0, 1, 0, 1, 0, -1, 0, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0},
@@ -15,11 +16,6 @@ const double spl_face_axes[SPL_FACES][9] = {
 };
 
 enum { edge_steps = 32, grow_steps = 128, FRONT = 4 };
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static unsigned find_face(const double ray[3])
 {
@@ -32,9 +28,9 @@ static unsigned find_face(const double ray[3])
 unsigned spl_face_of(const double ray[3], double place[2])
 {
     const unsigned face = find_face(ray);
-    const double *axes = spl_face_axes[face], along = dot(axes + 6, ray);
-    place[0] = dot(axes, ray) / along;
-    place[1] = dot(axes + 3, ray) / along;
+    const double *axes = spl_face_axes[face], along = dot3(axes + 6, ray);
+    place[0] = dot3(axes, ray) / along;
+    place[1] = dot3(axes + 3, ray) / along;
     return face;
 }
 
@@ -42,7 +38,7 @@ unsigned spl_faces_place(const struct spl_faces *faces, const double ray[3], dou
 {
     const unsigned face = spl_face_of(ray, pixel);
     const struct spl_camera *c = &faces->cameras[face];
-    *along = dot(spl_face_axes[face] + 6, ray);
+    *along = dot3(spl_face_axes[face] + 6, ray);
     pixel[0] = c->cx + c->fx * pixel[0];
     pixel[1] = c->cy + c->fy * pixel[1];
     return face;
@@ -102,9 +98,10 @@ static void add_image_edges(struct parts *parts, const struct spl_camera *camera
     for (int i = 0; i < 4 * (edge_steps + 1); i++) {
         const double t = (double)(i % (edge_steps + 1)) / edge_steps, w = camera->width, h = camera->height;
         const int edge = i / (edge_steps + 1);
+        const double x = edge < 2 ? t * w : edge == 2 ? 0 : w, y = edge < 2 ? (edge ? h : 0) : t * h;
         if (camera->projection == SPL_EQUIRECTANGULAR)
-            get_ring_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray);
-        else if (!spl_camera_get_ray(camera, edge < 2 ? t * w : edge == 2 ? 0 : w, edge < 2 ? (edge ? h : 0) : t * h, ray))
+            get_ring_ray(camera, x, y, ray);
+        else if (!spl_camera_get_ray(camera, x, y, ray))
             continue;
         add_ray(parts, ray);
     }
@@ -144,21 +141,21 @@ static void add_face_edges(struct parts *parts, const struct spl_camera *camera)
         if (!is_inside(camera, ray))
             continue;
         for (unsigned face = 0; face < SPL_FACES; face++) {
-            const double *axes = spl_face_axes[face], place[2] = {dot(axes, ray), dot(axes + 3, ray)};
-            if (axes[6 + along] != 0 || dot(axes + 6, ray) < 0)
+            const double *axes = spl_face_axes[face], place[2] = {dot3(axes, ray), dot3(axes + 3, ray)};
+            if (axes[6 + along] != 0 || dot3(axes + 6, ray) < 0)
                 continue;
             for (int side = -1; side <= 1; side++) {
                 const double moved = fmin(fmax(t + side * step, -1), 1) - t;
                 grow(parts, face, (double[]){place[0] + axes[along] * moved, place[1] + axes[3 + along] * moved});
             }
         }
-        parts->least = fmin(parts->least, ray[2] / sqrt(dot(ray, ray)));
+        parts->least = fmin(parts->least, ray[2] / sqrt(dot3(ray, ray)));
     }
 }
 
-/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its own.
- * A face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by what is
- * left of it to 90 degrees. */
+/* Focal length of the faces: what a pixel of the camera asks for along the radius, and around it, at most twice its
+ * own. A face itself is finer towards its edges than in its middle: the front by the angle off the axis, the others by
+ * what is left of it to 90 degrees. */
 static double find_focal(const struct spl_camera *camera, double widest)
 {
     const double focal = fmax(fabs(camera->fx), fabs(camera->fy)), end = fmin(widest, M_PI_2);
@@ -226,9 +223,11 @@ int spl_faces_init_of(struct spl_faces *faces, const struct spl_camera *camera, 
             from[k] = floor(parts.low[i][k] * focal + middle) - SPL_FACE_MARGIN;
             size[k] = ceil(parts.high[i][k] * focal + middle) + SPL_FACE_MARGIN - from[k];
             if (!(size[k] <= side_px))
-                return spl_fail_field(err, SPL_E_LIMIT, blame(camera),
-                                      "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
-                                      "%u are drawn", size[k], side_px);
+                return spl_fail_field(
+                    err, SPL_E_LIMIT, blame(camera),
+                    "pixels as fine as the image's are %.0f on a side of the cube around the eye; at most "
+                    "%u are drawn",
+                    size[k], side_px);
         }
         *face = *camera;
         face->projection = SPL_PERSPECTIVE;

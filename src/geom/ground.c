@@ -1,5 +1,5 @@
-/* The ground under a plan; see ground.h. Everything is in doubles: at UTM coordinates a corner is right to a millionth of a
- * millimetre. */
+/* The ground under a plan; see ground.h. Everything is in doubles: at UTM coordinates a corner is right to a millionth
+ * of a millimetre. */
 #include "geom/ground.h"
 
 #include <ctype.h>
@@ -24,7 +24,9 @@ int spl_camera_get_ground(const struct spl_camera *camera, struct spl_ground *gr
                               "a map is of a view straight down: its target lies below its eye, at the same x and y");
     for (int i = 0; i < 2; i++) {
         /* What is off by rounding alone is not off: north-up is. */
-        double r = fabs(right[i]) <= straight ? 0 : fabs(fabs(right[i]) - 1) <= straight ? copysign(1, right[i]) : right[i];
+        double r = fabs(right[i]) <= straight             ? 0
+                   : fabs(fabs(right[i]) - 1) <= straight ? copysign(1, right[i])
+                                                          : right[i];
         double d = fabs(down[i]) <= straight ? 0 : fabs(fabs(down[i]) - 1) <= straight ? copysign(1, down[i]) : down[i];
         ground->across[i] = r / camera->fx;
         ground->down[i] = d / camera->fy;

@@ -19,8 +19,8 @@ const char *spl_ground_print_world_file(const struct spl_ground *ground, char te
 /* What a world file beside a picture ends in: ".jgw", ".pgw"; NULL of formats that have none. */
 const char *spl_format_world_file(enum spl_format format);
 
-/* The number in EPSG's list of a coordinate system's text, horizontal part: "EPSG:2994", "EPSG:2994+5703", or a WKT whose
- * projected, else geographic system says its own. 0 where it says none. */
+/* The number in EPSG's list of a coordinate system's text, horizontal part: "EPSG:2994", "EPSG:2994+5703", or a WKT
+ * whose projected, else geographic system says its own. 0 where it says none. */
 uint32_t spl_epsg_from_text(const char *text);
 
 #endif

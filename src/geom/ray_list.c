@@ -1,8 +1,9 @@
 /* Lists of directions: checked, made unit, and measured, once, so that whoever asks what a view of them costs need not
  * walk a million of them.
  *
- * How densely they lie is counted, not guessed from their order: cells of cubes' faces, ever coarser, are marked by each
- * direction; the coarsest whose cells most directions have to themselves is fine enough. Pure functions; any thread. */
+ * How densely they lie is counted, not guessed from their order: cells of cubes' faces, ever coarser, are marked by
+ * each direction; the coarsest whose cells most directions have to themselves is fine enough. Pure functions; any
+ * thread. */
 #include "geom/ray_list.h"
 
 #include <math.h>
@@ -23,8 +24,8 @@ static int make_unit(const double v[3], size_t index, double out[3], struct spl_
     const double largest = fmax(fmax(fabs(v[0]), fabs(v[1])), fabs(v[2]));
     const bool finite = isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
     if (!finite || !(largest > 0))
-        return spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] is %g, %g, %g: %s", index, v[0], v[1], v[2],
-                              finite ? "it points nowhere" : "its numbers must be finite");
+        return spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] is %g, %g, %g: %s", index, v[0], v[1],
+                              v[2], finite ? "it points nowhere" : "its numbers must be finite");
     double square = 0; /* of what may be as small or as large as doubles are */
     for (int i = 0; i < 3; i++) {
         out[i] = v[i] / largest;
@@ -117,11 +118,12 @@ void spl_rays_destroy(struct spl_rays *rays)
         free(rays);
 }
 
-int spl_camera_set_rays(struct spl_camera *camera, const struct spl_rays *rays, double resolution, struct spl_error *err)
+int spl_camera_set_rays(struct spl_camera *camera, const struct spl_rays *rays, double resolution,
+                        struct spl_error *err)
 {
     if (!(resolution == 0 || (resolution >= 1 && resolution <= resolution_most)))
-        return spl_fail_field(err, SPL_E_INPUT, "resolution", "resolution %g is not within 1 and %g pixels a radian", resolution,
-                              resolution_most);
+        return spl_fail_field(err, SPL_E_INPUT, "resolution", "resolution %g is not within 1 and %g pixels a radian",
+                              resolution, resolution_most);
     camera->projection = SPL_RAYS;
     camera->lens = (struct spl_distortion){0};
     camera->width = 1;

@@ -1,5 +1,5 @@
-/* A list of directions that a view looks along (projection RAYS), and what their faces have to be. Read-only once made; any
- * thread. */
+/* A list of directions that a view looks along (projection RAYS), and what their faces have to be. Read-only once made;
+ * any thread. */
 #ifndef SPL_GEOM_RAY_LIST_H
 #define SPL_GEOM_RAY_LIST_H
 

@@ -1,5 +1,5 @@
-/* Cameras that see further around than a pinhole, or through a lens: where their rays go, where points have an image, and
- * what is asked of their numbers. Pure functions; any thread. */
+/* Cameras that see further around than a pinhole, or through a lens: where their rays go, where points have an image,
+ * and what is asked of their numbers. Pure functions; any thread. */
 #include "geom/faces.h"
 
 #include <math.h>
@@ -48,8 +48,8 @@ int spl_camera_set_fisheye(struct spl_camera *camera, double fov_degrees, uint32
                            struct spl_error *err)
 {
     if (!(fov_degrees > 0 && fov_degrees <= 360))
-        return spl_fail_field(err, SPL_E_INPUT, "fov", "a fisheye's field of view must be above 0, up to 360 degrees, not %g",
-                              fov_degrees);
+        return spl_fail_field(err, SPL_E_INPUT, "fov",
+                              "a fisheye's field of view must be above 0, up to 360 degrees, not %g", fov_degrees);
     int rc = check_size(width, height, err);
     if (rc)
         return rc;
@@ -93,9 +93,10 @@ int spl_camera_check_bent(const struct spl_camera *camera, struct spl_error *err
         const double half = camera->height / 2.0;
         if (camera->width != 6 * (uint64_t)camera->height || camera->fx != half || camera->fy != half ||
             camera->cx != half || camera->cy != half)
-            return spl_fail_field(err, SPL_E_INPUT, "width",
-                                  "the six faces of a cube lie side by side, each as wide as high: %u is not six times %u",
-                                  camera->width, camera->height);
+            return spl_fail_field(
+                err, SPL_E_INPUT, "width",
+                "the six faces of a cube lie side by side, each as wide as high: %u is not six times %u", camera->width,
+                camera->height);
     }
     if (lens->kind != (fisheye ? SPL_DISTORTION_FISHEYE : SPL_DISTORTION_NONE) &&
         !(camera->projection == SPL_PERSPECTIVE && lens->kind == SPL_DISTORTION_RADIAL))
@@ -103,8 +104,9 @@ int spl_camera_check_bent(const struct spl_camera *camera, struct spl_error *err
                               spl_projection_name(camera->projection), (int)lens->kind);
     for (int i = 0; i < 2; i++)
         if (fabs(lens->p[i]) > tangential_most)
-            return spl_fail_field(err, SPL_E_INPUT, "params", "the lens has the tangential coefficient %g; at most %g is drawn",
-                                  lens->p[i], tangential_most);
+            return spl_fail_field(err, SPL_E_INPUT, "params",
+                                  "the lens has the tangential coefficient %g; at most %g is drawn", lens->p[i],
+                                  tangential_most);
     for (int i = 0; i < 8; i++)
         if (!isfinite(i < 6 ? lens->k[i] : lens->p[i - 6]) || (i >= 6 && fisheye && lens->p[i - 6] != 0))
             return spl_fail_field(err, SPL_E_INPUT, "params", "the lens has the %s coefficient %g",
@@ -143,7 +145,8 @@ bool spl_camera_get_ray(const struct spl_camera *camera, double u, double v, dou
     if (!spl_distortion_get_ray(&camera->lens, (double[]){x, y}, camera->projection == SPL_CUBE ? own : ray))
         return false;
     for (int i = 0; camera->projection == SPL_CUBE && i < 3; i++)
-        ray[i] = spl_face_axes[face][i] * own[0] + spl_face_axes[face][3 + i] * own[1] + spl_face_axes[face][6 + i] * own[2];
+        ray[i] =
+            spl_face_axes[face][i] * own[0] + spl_face_axes[face][3 + i] * own[1] + spl_face_axes[face][6 + i] * own[2];
     return true;
 }
 

@@ -17,8 +17,8 @@ enum { SPL_WIDTH_DEFAULT = 1280, SPL_HEIGHT_DEFAULT = 720 };
 /* The size of an image of which neither side is said, and so its ratio where one is. */
 static inline void spl_size_of_projection(enum spl_projection projection, double shape[2])
 {
-    static const double shapes[SPL_PROJECTION_COUNT][2] = {[SPL_EQUIRECTANGULAR] = {1440, 720}, [SPL_CUBE] = {1920, 320},
-                                                           [SPL_FISHEYE] = {720, 720}};
+    static const double shapes[SPL_PROJECTION_COUNT][2] = {
+        [SPL_EQUIRECTANGULAR] = {1440, 720}, [SPL_CUBE] = {1920, 320}, [SPL_FISHEYE] = {720, 720}};
     shape[0] = shapes[projection][0] > 0 ? shapes[projection][0] : SPL_WIDTH_DEFAULT;
     shape[1] = shapes[projection][1] > 0 ? shapes[projection][1] : SPL_HEIGHT_DEFAULT;
 }

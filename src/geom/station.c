@@ -5,12 +5,9 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double coordinate_max = 1e15, row_tolerance = 1e-6, upright_cosine = 0.70710678118654752;
+#include "geom/vector.h"
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static const double coordinate_max = 1e15, row_tolerance = 1e-6, upright_cosine = 0.70710678118654752;
 
 bool spl_rotation_straighten(double r[9])
 {
@@ -44,10 +41,10 @@ const char *spl_station_judge(const double pose[16])
 /* `axis` without what of it goes along `up`, one long; false where nothing is left. */
 static bool level(const double axis[3], const double up[3], double out[3])
 {
-    const double along = dot(axis, up);
+    const double along = dot3(axis, up);
     for (int i = 0; i < 3; i++)
         out[i] = axis[i] - along * up[i];
-    const double length = sqrt(dot(out, out));
+    const double length = sqrt(dot3(out, out));
     for (int i = 0; i < 3; i++)
         out[i] /= length;
     return length > 1e-6;
@@ -68,7 +65,7 @@ void spl_station_look(const double pose[16], const double about[3], double forwa
     const bool turned = spl_rotation_straighten(r);
     for (int i = 0; i < 9; i++)
         axes[i / 3][i % 3] = turned ? r[i % 3 * 3 + i / 3] : i % 4 == 0; /* its columns */
-    const bool upright = fabs(dot(axes[2], up)) >= upright_cosine;
+    const bool upright = fabs(dot3(axes[2], up)) >= upright_cosine;
     if (level(axes[upright ? 0 : 2], up, forward) || level(axes[0], up, forward))
         return;
     level(axes[1], up, forward);

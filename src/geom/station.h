@@ -13,10 +13,10 @@ bool spl_rotation_straighten(double r[9]);
  * row that is not 0 0 0 1. NULL = nothing. */
 const char *spl_station_judge(const double pose[16]);
 
-/* Where somebody looks who stands there, level: unit vectors, `forward` at right angles to `up`, which is `about`, of any
- * length but zero. A scanner, whose z axis is within 45 degrees of upright or hanging, looks along its x axis; what lies
- * otherwise is a camera, x right, y down, and looks along z. Axes that are none (mirrored, bent) are taken for those of
- * the world. */
+/* Where somebody looks who stands there, level: unit vectors, `forward` at right angles to `up`, which is `about`, of
+ * any length but zero. A scanner, whose z axis is within 45 degrees of upright or hanging, looks along its x axis; what
+ * lies otherwise is a camera, x right, y down, and looks along z. Axes that are none (mirrored, bent) are taken for
+ * those of the world. */
 void spl_station_look(const double pose[16], const double about[3], double forward[3], double up[3]);
 
 #endif

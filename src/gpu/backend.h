@@ -79,9 +79,8 @@ struct spl_gpu_backend {
 
     /* The previous submission has ended. */
     int (*begin)(struct spl_gpu *gpu, struct spl_error *err);
-    /* `counts`: as of spl_gpu_dispatch_indirect(), NULL: `workgroups`. */
     void (*dispatch)(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
-                     uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
+                     uint32_t workgroups);
     void (*barrier)(struct spl_gpu *gpu);
     void (*copy)(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
                  uint64_t to_offset, uint64_t bytes);

@@ -228,19 +228,7 @@ void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
     check_bindings(gpu, kernel, bindings, &arguments);
     spl_assert(workgroups <= gpu->limits.workgroups);
     if (takes(gpu) && workgroups)
-        gpu->backend->dispatch(gpu, kernel, &arguments, workgroups, NULL, 0);
-}
-
-void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT],
-                               struct spl_gpu_buffer *counts, uint64_t offset)
-{
-    struct spl_gpu_arguments arguments;
-    check_bindings(gpu, kernel, bindings, &arguments);
-    spl_assert(offset % 4 == 0);
-    check_range(gpu, counts, offset, 3 * sizeof(uint32_t));
-    if (takes(gpu))
-        gpu->backend->dispatch(gpu, kernel, &arguments, 0, counts, offset);
+        gpu->backend->dispatch(gpu, kernel, &arguments, workgroups);
 }
 
 void spl_gpu_barrier(struct spl_gpu *gpu)

@@ -89,11 +89,6 @@ int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err);
 /* Runs `kernel` over what it binds of `bindings`; the others are ignored. */
 void spl_gpu_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
                       const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], uint32_t workgroups);
-/* The same with the number of workgroups in three words (x, y, z; at most limits.workgroups in x, 1 in y and z: the
- * caller's kernel that wrote them keeps to that) at `offset`, a multiple of 4, of `counts`. */
-void spl_gpu_dispatch_indirect(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                               const struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT], struct spl_gpu_buffer *counts,
-                               uint64_t offset);
 void spl_gpu_barrier(struct spl_gpu *gpu); /* everything before is visible to everything after (and to the host) */
 void spl_gpu_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
                   uint64_t to_offset, uint64_t bytes);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "base/memory.h"
 #include "image/encode.h"
 
@@ -32,20 +33,6 @@ static void make_map(uint8_t map[MAP_STEPS][3])
  * wide: enough for a robust range, in one pass. */
 enum { BINS = 0x7f80, BIN_SHIFT = 16 };
 
-static uint32_t float_bits(float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits;
-}
-
-static float bits_float(uint32_t bits)
-{
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
 static int robust_range(const float *values, size_t count, float *near, float *far, struct spl_error *err)
 {
     size_t *histogram = spl_alloc(BINS, sizeof *histogram, err);
@@ -57,7 +44,7 @@ static int robust_range(const float *values, size_t count, float *near, float *f
         float value = values[i];
         if (!(value > 0 && value < INFINITY))
             continue;
-        histogram[float_bits(value) >> BIN_SHIFT]++;
+        histogram[spl_float_to_bits(value) >> BIN_SHIFT]++;
         total++;
         least = value < least ? value : least;
         most = value > most ? value : most;
@@ -70,15 +57,17 @@ static int robust_range(const float *values, size_t count, float *near, float *f
             first++;
         for (seen = 0; (seen += histogram[last]) <= skip;)
             last--;
-        *near = fmaxf(bits_float(first << BIN_SHIFT), least);
-        *far = fminf(bits_float((last + 1) << BIN_SHIFT), most);
+        *near = fmaxf(spl_float_of_bits(first << BIN_SHIFT), least);
+        *far = fminf(spl_float_of_bits((last + 1) << BIN_SHIFT), most);
     }
     free(histogram);
     return SPL_OK;
 }
 
-int spl_convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
-                         struct spl_error *err)
+/* Depth or range through the colour map, nothing = black. near and far get the values at the map's ends: the 1st and
+ * 99th percentile to within 1 % of their value, 0 and 0 where nothing is. */
+static int convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
+                            struct spl_error *err)
 {
     int rc = robust_range(values, count, near, far, err);
     if (rc)
@@ -110,7 +99,8 @@ void spl_convert_normal(const float *normals, size_t count, uint8_t *rgb)
     }
 }
 
-void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb)
+/* A colour by hash of the id, never black; nothing = black. */
+static void convert_id(const uint32_t *ids, size_t count, uint8_t *rgb)
 {
     for (size_t i = 0; i < count; i++) {
         uint32_t h = ids[i];
@@ -170,11 +160,11 @@ int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl
     } else if (image->layer == SPL_LAYER_NORMAL) {
         spl_convert_normal(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_ID) {
-        spl_convert_id(image->pixels, count, picture);
+        convert_id(image->pixels, count, picture);
     } else if (image->layer == SPL_LAYER_PRIMITIVE) {
         spl_convert_primitive(image->pixels, count, picture);
     } else {
-        return spl_convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
+        return convert_distance(image->pixels, count, picture, &encoded->near, &encoded->far, err);
     }
     return SPL_OK;
 }

@@ -12,8 +12,8 @@ int spl_decode_png(FILE *file, const char *path, struct spl_image *out, struct s
 int spl_decode_jpeg(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 int spl_decode_npy(FILE *file, const char *path, struct spl_image *out, struct spl_error *err);
 
-/* load_npy.c: the text between magic and numbers, as a string, with the file left at the numbers; what stands behind 'key':
- * there, or NULL; and of a shape its sides, none where it is broken. */
+/* load_npy.c: the text between magic and numbers, as a string, with the file left at the numbers; what stands behind
+ * 'key': there, or NULL; and of a shape its sides, none where it is broken. */
 enum { SPL_NPY_HEADER_MAX = 4096, SPL_NPY_SHAPE_MAX = 4 };
 int spl_npy_read_header(FILE *file, const char *path, char text[SPL_NPY_HEADER_MAX], struct spl_error *err);
 const char *spl_npy_find(const char *header, const char *key);

@@ -29,16 +29,8 @@ int spl_encode_raw(const struct spl_image *image, struct spl_encoded *out, struc
 int spl_convert_picture(const struct spl_image *image, uint8_t **out, struct spl_encoded *encoded,
                         struct spl_error *err);
 
-/* Depth or range through the colour map, nothing = black. near and far get the values at the map's ends: the 1st and
- * 99th percentile to within 1 % of their value, 0 and 0 where nothing is. */
-int spl_convert_distance(const float *values, size_t count, uint8_t *rgb, float *near, float *far,
-                         struct spl_error *err);
-
 /* round((n + 1) / 2 * 255); nothing (zero or not a number) = 0, 0, 0. */
 void spl_convert_normal(const float *normals, size_t count, uint8_t *rgb);
-
-/* A colour by hash of the id, never black; nothing = black. */
-void spl_convert_id(const uint32_t *ids, size_t count, uint8_t *rgb);
 
 /* spl_shape_color() of each. */
 void spl_convert_primitive(const uint32_t *primitives, size_t count, uint8_t *rgb);

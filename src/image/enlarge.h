@@ -18,8 +18,8 @@ void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_i
                        uint32_t end);
 
 /* One pixel of `large`'s kind from around (x, y) of `small`, whose first pixel's centre is at (0.5, 0.5), by the same
- * rules; `to` takes spl_pixel_bytes(). `tolerance` of the nearest pixel's depth is an edge. Inside of the image, or as at
- * its rim. */
+ * rules; `to` takes spl_pixel_bytes(). `tolerance` of the nearest pixel's depth is an edge. Inside of the image, or as
+ * at its rim. */
 void spl_image_sample(const struct spl_image *small, double x, double y, float tolerance, void *to);
 
 #endif

@@ -46,7 +46,7 @@ const struct spl_ffmpeg *spl_ffmpeg_open(struct spl_error *err)
     pthread_once(&once, load);
     if (!missing[0])
         return &ffmpeg;
-    spl_fail_field(err, SPL_E_UNSUPPORTED, "video", "videos need FFmpeg: %s; install libavformat%d and libswscale%d", missing,
-                   LIBAVFORMAT_VERSION_MAJOR, LIBSWSCALE_VERSION_MAJOR);
+    spl_fail_field(err, SPL_E_UNSUPPORTED, "video", "videos need FFmpeg: %s; install libavformat%d and libswscale%d",
+                   missing, LIBAVFORMAT_VERSION_MAJOR, LIBSWSCALE_VERSION_MAJOR);
     return NULL;
 }

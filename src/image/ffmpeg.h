@@ -1,5 +1,6 @@
-/* FFmpeg's libraries behind dlopen: a hundred and twenty libraries come with them, which took two thirds of the time that
- * a command needs to begin. A file that includes this calls their functions by their names, after spl_ffmpeg_open(). */
+/* FFmpeg's libraries behind dlopen: a hundred and twenty libraries come with them, which took two thirds of the time
+ * that a command needs to begin. A file that includes this calls their functions by their names, after
+ * spl_ffmpeg_open(). */
 #ifndef SPL_IMAGE_FFMPEG_H
 #define SPL_IMAGE_FFMPEG_H
 

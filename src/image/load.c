@@ -105,6 +105,15 @@ int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_
     return rc;
 }
 
+int spl_image_get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
+{
+    struct spl_image_info info = {0};
+    int rc = spl_image_get_info(path, &info, err);
+    *width = info.width;
+    *height = info.height;
+    return rc;
+}
+
 int spl_image_load_of(FILE *file, const char *path, enum spl_layer layer, struct spl_image *out, struct spl_error *err)
 {
     spl_assert((unsigned)layer < SPL_LAYER_COUNT);

@@ -34,6 +34,7 @@ struct spl_image_info {
 
 /* As spl_image_load() without its pixels: PNG and JPEG. */
 int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_error *err);
+int spl_image_get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err);
 int spl_image_get_info_of(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err);
 
 #endif

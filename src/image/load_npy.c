@@ -30,7 +30,8 @@ static int fail(const char *path, const char *field, const char *what, struct sp
 /* A key that is there twice means one thing to us and another to numpy, which takes the last. */
 static int check_keys(const char *path, const char *header, struct spl_error *err)
 {
-    static const char *const keys[] = {"'descr'", "'fortran_order'", "'shape'"}, *const fields[] = {"descr", "fortran_order", "shape"};
+    static const char *const keys[] = {"'descr'", "'fortran_order'", "'shape'"}, *const fields[] = {
+                                                                                     "descr", "fortran_order", "shape"};
     for (int i = 0; i < 3; i++) {
         const char *at = strstr(header, keys[i]);
         at = at ? strstr(at + strlen(keys[i]), keys[i]) : NULL;

@@ -33,10 +33,11 @@ static int read_form(FILE *file, uint64_t bytes, const char *name, size_t most, 
         return fail(name, "its shape must be (count, 3)", err);
     const long start = ftell(file);
     if (!shape[0] || shape[0] > most)
-        return spl_fail(err, SPL_E_INPUT, "%s: NPY: it has %llu rows; 1 to %zu are taken", name, (unsigned long long)shape[0],
-                        most);
+        return spl_fail(err, SPL_E_INPUT, "%s: NPY: it has %llu rows; 1 to %zu are taken", name,
+                        (unsigned long long)shape[0], most);
     if (start < 0 || bytes < (uint64_t)start || bytes - (uint64_t)start != shape[0] * 3 * *size)
-        return spl_fail(err, SPL_E_INPUT, "%s: NPY: %llu bytes are there, %llu rows of 3 numbers and the header need %llu", name,
+        return spl_fail(err, SPL_E_INPUT,
+                        "%s: NPY: %llu bytes are there, %llu rows of 3 numbers and the header need %llu", name,
                         (unsigned long long)bytes, (unsigned long long)shape[0],
                         (unsigned long long)((start < 0 ? 0 : (uint64_t)start) + shape[0] * 3 * *size));
     *count = (size_t)shape[0];

@@ -1,10 +1,10 @@
 /* GeoTIFF by libtiff: a layer's own numbers, and where its pixels lie on the ground (geom/ground.h).
  *
- * color is RGB with straight alpha, depth and range float32 heights (height of depth 0 less depth; NaN = nothing, which is
- * said as GDAL does), normal three floats, id and primitive uint32, coverage float32. Deflate, by strips of some 64 KiB.
- * The tags of GeoTIFF 1.1 are a dozen numbers, written here: pixel is area, ModelPixelScale and ModelTiepoint where north
- * is up, else ModelTransformation. Memory grows with what is written and is refused beyond what the pixels can take; no
- * time is noted, so that equal images are equal bytes. Any thread: handlers are this file's own. */
+ * color is RGB with straight alpha, depth and range float32 heights (height of depth 0 less depth; NaN = nothing, which
+ * is said as GDAL does), normal three floats, id and primitive uint32, coverage float32. Deflate, by strips of some 64
+ * KiB. The tags of GeoTIFF 1.1 are a dozen numbers, written here: pixel is area, ModelPixelScale and ModelTiepoint
+ * where north is up, else ModelTransformation. Memory grows with what is written and is refused beyond what the pixels
+ * can take; no time is noted, so that equal images are equal bytes. Any thread: handlers are this file's own. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>

@@ -10,5 +10,6 @@ int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *grou
     (void)ground;
     (void)unit;
     (void)out;
-    return spl_fail_field(err, SPL_E_UNSUPPORTED, "format", "this build makes no GeoTIFF; ask for png and its world file");
+    return spl_fail_field(err, SPL_E_UNSUPPORTED, "format",
+                          "this build makes no GeoTIFF; ask for png and its world file");
 }

@@ -8,9 +8,9 @@
 
 #include "base/error.h"
 
-/* An NPY file of `bytes` bytes, from the start of `file` on: float32 or float64, little-endian, of shape (count, 3), rows or
- * columns first; 1 to `most` of them. The caller frees *out, x, y, z of each. SPL_E_INPUT, which says what is wrong; `name` is
- * for messages. Sizes are checked before anything is allocated. */
+/* An NPY file of `bytes` bytes, from the start of `file` on: float32 or float64, little-endian, of shape (count, 3),
+ * rows or columns first; 1 to `most` of them. The caller frees *out, x, y, z of each. SPL_E_INPUT, which says what is
+ * wrong; `name` is for messages. Sizes are checked before anything is allocated. */
 int spl_vectors_load_npy(FILE *file, uint64_t bytes, const char *name, size_t most, double **out, size_t *count,
                          struct spl_error *err);
 

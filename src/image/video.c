@@ -141,7 +141,8 @@ static int encode(struct spl_video *video, const AVFrame *frame, struct spl_erro
     while (rc >= 0 && (rc = video->ff->avcodec_receive_packet(video->codec, video->packet)) >= 0) {
         video->ff->av_packet_rescale_ts(video->packet, video->codec->time_base, video->file->streams[0]->time_base);
         if (!video->packet->duration)
-            video->packet->duration = video->ff->av_rescale_q(1, video->codec->time_base, video->file->streams[0]->time_base);
+            video->packet->duration =
+                video->ff->av_rescale_q(1, video->codec->time_base, video->file->streams[0]->time_base);
         rc = video->ff->av_interleaved_write_frame(video->file, video->packet);
     }
     if (rc == AVERROR(EAGAIN) || rc == AVERROR_EOF)

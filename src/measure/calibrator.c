@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/float.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
@@ -88,9 +89,8 @@ static void scatter(void *context, size_t begin, size_t end, unsigned worker)
         if (x < 0 || y < 0 || x >= WIDTH || y >= HEIGHT)
             continue;
         uint64_t *pixel = &pixels[(uint32_t)y * WIDTH + (uint32_t)x];
-        uint32_t depth;
-        memcpy(&depth, &w, sizeof depth);
-        uint64_t mine = (uint64_t)depth << 32 | p->color, there = __atomic_load_n(pixel, __ATOMIC_RELAXED);
+        uint64_t mine = (uint64_t)spl_float_to_bits(w) << 32 | p->color,
+                 there = __atomic_load_n(pixel, __ATOMIC_RELAXED);
         while (mine < there &&
                !__atomic_compare_exchange_n(pixel, &there, mine, 1, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
             ;

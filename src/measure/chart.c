@@ -233,8 +233,8 @@ static void write_labels(struct layout *l)
                 write_label(l, &l->places[i]);
 }
 
-/* The curves' names in two rows under the title, those that are not dashed first; what does not fit stays in the points'
- * own texts. */
+/* The curves' names in two rows under the title, those that are not dashed first; what does not fit stays in the
+ * points' own texts. */
 static void write_legend(const struct layout *l, const struct spl_chart *chart)
 {
     double x = LEFT, y = 54;

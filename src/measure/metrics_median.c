@@ -5,15 +5,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "measure/metrics_parts.h"
 
 enum { bins = 1 << 16 };
 
 static inline uint32_t bits_of(float value)
 {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    return bits & 0x7fffffff; /* -0 is 0 */
+    return spl_float_to_bits(value) & 0x7fffffff; /* -0 is 0 */
 }
 
 /* The bin that holds rank `*rank`, which becomes the rank inside it. */
@@ -36,10 +35,7 @@ static float select_rank(const float *values, size_t count, uint64_t rank)
     for (size_t i = 0; i < count; i++)
         if (!isnan(values[i]) && bits_of(values[i]) >> 16 == upper)
             histogram[bits_of(values[i]) & 0xffff]++;
-    uint32_t bits = upper << 16 | find_bin(histogram, &rank);
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
+    return spl_float_of_bits(upper << 16 | find_bin(histogram, &rank));
 }
 
 double spl_metrics_median(const float *values, size_t count)

@@ -23,8 +23,8 @@ struct spl_demand {
     uint64_t samples_max; /* that a setting may need for it; 0 = any */
     enum spl_layer layer;
     const struct spl_soft_params *soft; /* may be NULL: as without terms, nothing; it is kept as it is */
-    double soft_splats, soft_share; /* for a first guess: of the dataset, 0 = unknown; how many of them are soft, 0 to 1,
-                                       NAN = unknown */
+    double soft_splats, soft_share; /* for a first guess: of the dataset, 0 = unknown; how many of them are soft, 0 to
+                                       1, NAN = unknown */
     bool keep_method, keep_lod, keep_supersample, keep_atoms, keep_maps; /* only settings that equal `kept` in these */
     struct spl_setting kept;
 };

@@ -39,7 +39,8 @@ static bool is_drawn(const struct spl_soft_params *soft)
 static uint64_t key_of(const struct spl_soft_params *soft, enum spl_layer layer)
 {
     char text[SPL_TERMS_TEXT_MAX + 1];
-    uint64_t key = 14695981039346656037u ^ ((uint64_t)layer << 8 | (uint64_t)soft->of << 4 | (uint64_t)soft->model << 1 | is_drawn(soft));
+    uint64_t key = 14695981039346656037u ^
+                   ((uint64_t)layer << 8 | (uint64_t)soft->of << 4 | (uint64_t)soft->model << 1 | is_drawn(soft));
     spl_soft_print(soft, text, sizeof text);
     for (const char *c = text; *c; c++)
         key = (key ^ (uint8_t)*c) * 1099511628211u;

@@ -1,5 +1,5 @@
 /* Profiles in memory: making one, the time model's fit, the front, where the file lies. Reading and writing are in
- * profile_json.c.
+ * profile_json.c and profile_file.c.
  *
  * Invariant: a profile that came from spl_profile_load() or went through spl_profile_save() has only numbers in the
  * ranges that profile.h states, so that the planner computes with them unchecked. Pure but for allocation; any thread.

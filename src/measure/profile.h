@@ -120,6 +120,9 @@ int spl_profile_load(const char *path, const struct spl_dataset_info *dataset, c
 int spl_profile_parse(const char *bytes, size_t length, const char *name, struct spl_profile *profile,
                       struct spl_error *err);
 
+/* SPL_E_INPUT where a point is out of range, contradicts itself or stands twice; `name` is for messages. */
+int spl_profile_check(const struct spl_profile *profile, const char *name, struct spl_error *err);
+
 /* Checks what load checks, so that what is saved can be loaded; PSNR above SPL_PROFILE_PSNR_MAX is cut there. Writes a
  * temporary file beside `path`, syncs and renames. */
 int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err);

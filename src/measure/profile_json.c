@@ -1,29 +1,21 @@
-/* Profiles as files. One table says what numbers a setting has, in which range, and whether they may be missing;
+/* Profiles as JSON. One table says what numbers a setting has, in which range, and whether they may be missing;
  * parsing, checking and writing all come from it.
  *
- * Nothing of a file is trusted: sizes are bounded before they are allocated, every number is checked, and a profile of
- * another dataset version or another device is refused, because its promises would be about something else. Unknown
- * members are ignored, so that later versions can add some. Any thread; blocks on disk. */
+ * Nothing of a text is trusted: counts are bounded before anything is allocated, every number is checked. Unknown
+ * members are ignored, so that later versions can add some. Any thread. */
 #include "measure/profile.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include "base/decimal.h"
-#include "base/file.h"
 #include "base/memory.h"
 #include "shared.h"
 
 #define FORMAT "splatd-profile"
 
-enum { file_max = 1 << 20, side_max = 1 << 16, views_max = 1000000 };
+enum { side_max = 1 << 16, views_max = 1000000 };
 
 static const struct number {
     const char *name;
@@ -47,13 +39,13 @@ static const struct number {
 };
 enum { number_count = sizeof numbers / sizeof *numbers };
 
-static double *number_of(struct spl_profile_point *point, const struct number *number)
+static double number_of(const struct spl_profile_point *point, const struct number *number)
 {
-    return (double *)((char *)point + number->offset);
+    return *(const double *)((const char *)point + number->offset);
 }
 
 /* Everything that parsing does not settle by itself; `name` is for messages. */
-static int check_point(struct spl_profile_point *point, const char *name, size_t index, struct spl_error *err)
+static int check_point(const struct spl_profile_point *point, const char *name, size_t index, struct spl_error *err)
 {
     const struct spl_setting *s = &point->setting;
     if (!(s->lod >= 0 && s->lod <= 64))
@@ -67,7 +59,7 @@ static int check_point(struct spl_profile_point *point, const char *name, size_t
         return spl_fail_field(err, SPL_E_INPUT, "atoms", "%s: point %zu: atoms %u is above %d", name, index, s->atoms,
                               SPL_TEXTURE_ATOMS);
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
-        double value = *number_of(point, n);
+        double value = number_of(point, n);
         if (isnan(value) && n->optional)
             continue;
         if (!(value >= n->least && value <= n->most))
@@ -86,7 +78,7 @@ static int check_point(struct spl_profile_point *point, const char *name, size_t
     return 0;
 }
 
-static int check(struct spl_profile *profile, const char *name, struct spl_error *err)
+int spl_profile_check(const struct spl_profile *profile, const char *name, struct spl_error *err)
 {
     int rc = 0;
     for (size_t i = 0; !rc && i < profile->count; i++) {
@@ -218,7 +210,7 @@ static int read_point(const json_t *object, const struct spl_profile *profile, c
         return spl_fail_field(err, SPL_E_INPUT, "method", "%s: point %zu: unknown method '%s'", name, index, method);
     point->setting.method = (enum spl_method)found;
     for (const struct number *n = numbers; !rc && n < numbers + number_count; n++)
-        rc = read_number(object, n->name, n->optional, name, index, number_of(point, n), err);
+        rc = read_number(object, n->name, n->optional, name, index, (double *)((char *)point + n->offset), err);
     return rc;
 }
 
@@ -276,7 +268,7 @@ static int read_points(const json_t *root, const char *name, struct spl_profile 
     int rc = 0;
     for (size_t i = 0; !rc && i < count; i++)
         rc = read_point(json_array_get(points, i), profile, name, i, &profile->points[i], err);
-    return rc ? rc : check(profile, name, err);
+    return rc ? rc : spl_profile_check(profile, name, err);
 }
 
 int spl_profile_parse(const char *bytes, size_t length, const char *name, struct spl_profile *profile,
@@ -299,75 +291,10 @@ int spl_profile_parse(const char *bytes, size_t length, const char *name, struct
     return rc;
 }
 
-static int compare(const struct spl_profile *profile, const struct spl_dataset_info *dataset,
-                   const struct spl_device_info *device, const char *path, struct spl_error *err)
-{
-    if (dataset && profile->dataset_version != dataset->version)
-        return spl_fail_field(err, SPL_E_INPUT, "version",
-                              "%s is about version %016" PRIx64 " of dataset '%s', which is now %016" PRIx64
-                              "; 'splatd bench' measures it anew",
-                              path, profile->dataset_version, dataset->id, dataset->version);
-    if (device && (strcmp(profile->backend, device->backend) || strcmp(profile->device, device->name) ||
-                   strcmp(profile->driver, device->driver)))
-        return spl_fail_field(err, SPL_E_INPUT, "device",
-                              "%.150s is about %s: %.60s (%.60s), not %s: %.60s (%.60s); 'splatd bench' measures anew",
-                              path, profile->backend, profile->device, profile->driver, device->backend, device->name,
-                              device->driver);
-    return 0;
-}
-
-/* The file's bytes, malloc'd; NULL on failure. */
-static char *read_file(const char *path, size_t *length, struct spl_error *err)
-{
-    char *bytes = NULL;
-    struct stat status;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a FIFO of this name has nobody wait for its writer
-    FILE *file = fd < 0 ? NULL : fdopen(fd, "r");
-    if (!file && fd >= 0)
-        close(fd);
-    if (!file && errno == ENOENT) {
-        spl_fail(err, SPL_E_NOT_FOUND, "there is no profile '%s'; 'splatd bench' makes one", path);
-        return NULL;
-    }
-    if (!file || fstat(fileno(file), &status))
-        spl_fail_errno(err, errno, "cannot read '%s'", path);
-    else if (!S_ISREG(status.st_mode) || status.st_size > file_max)
-        spl_fail(err, SPL_E_INPUT, "'%s' is no profile: no plain file, or larger than %d bytes", path, (int)file_max);
-    else if ((bytes = spl_alloc_raw((size_t)status.st_size + 1, 1, err)))
-        *length = fread(bytes, 1, (size_t)status.st_size, file);
-    if (bytes && ferror(file)) {
-        spl_fail_errno(err, errno, "cannot read '%s'", path);
-        free(bytes);
-        bytes = NULL;
-    }
-    if (file)
-        fclose(file);
-    return bytes;
-}
-
-int spl_profile_load(const char *path, const struct spl_dataset_info *dataset, const struct spl_device_info *device,
-                     struct spl_profile *profile, struct spl_error *err)
-{
-    struct spl_error own = {0};
-    size_t length = 0;
-    *profile = (struct spl_profile){0};
-    if (!err)
-        err = &own; // the code is read back below
-    char *bytes = read_file(path, &length, err);
-    if (!bytes)
-        return err->code;
-    int rc = spl_profile_parse(bytes, length, path, profile, err);
-    free(bytes);
-    if (!rc && (rc = compare(profile, dataset, device, path, err)))
-        spl_profile_finish(profile);
-    return rc;
-}
-
 /* ------------------------------------------------------------------------------------------------------- writing */
 
 static json_t *point_to_json(const struct spl_profile_point *point)
 {
-    struct spl_profile_point copy = *point;
     json_t *json = json_pack("{s:s, s:f, s:f, s:i, s:b}", "method", spl_method_name(point->setting.method), "lod",
                              point->setting.lod, "supersample", point->setting.supersample, "atoms",
                              (int)point->setting.atoms, "front", point->front);
@@ -376,7 +303,7 @@ static json_t *point_to_json(const struct spl_profile_point *point)
     if (point->setting.soft)
         json_object_set_new(json, "soft_model", json_string(spl_setting_soft_name(point->setting.soft)));
     for (const struct number *n = numbers; n < numbers + number_count; n++) {
-        double value = *number_of(&copy, n);
+        double value = number_of(point, n);
         if (n->offset == offsetof(struct spl_profile_point, soft_ms) && !point->setting.soft)
             continue;
         json_object_set_new(json, n->name, isfinite(value) ? json_real(value) : json_null());
@@ -406,37 +333,4 @@ json_t *spl_profile_to_json(const struct spl_profile *profile)
                      "name", profile->device, "driver", profile->driver, "software", profile->software, "reference",
                      profile->reference, "views", (int)profile->views, "width", (int)profile->width, "height",
                      (int)profile->height, "soft", soft_to_json(&profile->soft), "points", points);
-}
-
-int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)
-{
-    struct spl_profile copy = *profile, again = {0};
-    json_t *json = NULL;
-    char *text = NULL;
-    int rc = SPL_E_NOMEM;
-    if (!profile->count || profile->count > SPL_PROFILE_POINTS_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "points", "a profile holds 1 to %d settings, not %zu",
-                              (int)SPL_PROFILE_POINTS_MAX, profile->count);
-    if (!(copy.points = spl_alloc_raw(copy.count, sizeof *copy.points, err)))
-        return SPL_E_NOMEM;
-    memcpy(copy.points, profile->points, copy.count * sizeof *copy.points);
-    for (size_t i = 0; i < copy.count; i++) {
-        copy.points[i].psnr = fmin(copy.points[i].psnr, SPL_PROFILE_PSNR_MAX); // NAN would become the maximum
-        copy.points[i].psnr_q05 = fmin(copy.points[i].psnr_q05, SPL_PROFILE_PSNR_MAX);
-        if (isnan(profile->points[i].psnr))
-            copy.points[i].psnr = NAN;
-        if (isnan(profile->points[i].psnr_q05))
-            copy.points[i].psnr_q05 = NAN;
-    }
-    json = spl_profile_to_json(&copy);
-    text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
-    if (!text)
-        spl_fail(err, SPL_E_NOMEM, "out of memory for the profile '%s'", path);
-    else if (!(rc = check(&copy, path, err)) && !(rc = spl_profile_parse(text, strlen(text), path, &again, err)))
-        rc = spl_file_replace(path, text, strlen(text), err);
-    spl_profile_finish(&again);
-    json_decref(json);
-    free(text);
-    free(copy.points);
-    return rc;
 }

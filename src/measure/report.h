@@ -35,10 +35,10 @@ json_t *spl_report_to_json(const struct spl_report *report, const struct spl_pee
 /* One row a setting with a header row: api/profile.md has the columns' meaning. *csv is released with free(). */
 int spl_report_to_csv(const struct spl_report *report, char **csv, size_t *length, struct spl_error *err);
 
-/* The chart of a profile, whoever measured it: a colour a method, another with maps, a dash pattern a soft model, a curve
- * each, supersampling and cap of atoms (the fewer the paler), labels are the levels of detail. The dataset's `splats` and
- * `calibrator_ms` are told where they are above 0; `peers` may be NULL. data-index of a point is its index in the
- * profile. *svg is released with free(). */
+/* The chart of a profile, whoever measured it: a colour a method, another with maps, a dash pattern a soft model, a
+ * curve each, supersampling and cap of atoms (the fewer the paler), labels are the levels of detail. The dataset's
+ * `splats` and `calibrator_ms` are told where they are above 0; `peers` may be NULL. data-index of a point is its index
+ * in the profile. *svg is released with free(). */
 int spl_report_chart(const struct spl_profile *profile, uint64_t splats, double calibrator_ms,
                      const struct spl_peers *peers, char **svg, size_t *length, struct spl_error *err);
 

@@ -15,11 +15,11 @@ int spl_tolerance_create(const struct spl_dataset *dataset, struct spl_tolerance
 void spl_tolerance_destroy(struct spl_tolerance *tolerance); /* NULL-safe */
 
 /* out[i] = the radius, in the dataset's unit, at which the nearest splat of pixel i was drawn: its own, times what
- * level selection adds for the splats it leaves out at the pixel's depth z (src/render/select_draw.c): 1 / sqrt(clamp((s /
- * lod)^2, 1/4, 1)),  s = spacing * focal * supersample / z, taken with the exact share where the renderer rounds the
- * count up to full lanes, so at most a few per cent wide. Pixels without a splat get the dataset's median radius. `id`
- * and `depth` are layers of a frame of `view`; `out` holds one float a pixel. Same for any number of threads (0 = all
- * cores). */
+ * level selection adds for the splats it leaves out at the pixel's depth z (src/render/select_draw.c): 1 /
+ * sqrt(clamp((s / lod)^2, 1/4, 1)),  s = spacing * focal * supersample / z, taken with the exact share where the
+ * renderer rounds the count up to full lanes, so at most a few per cent wide. Pixels without a splat get the dataset's
+ * median radius. `id` and `depth` are layers of a frame of `view`; `out` holds one float a pixel. Same for any number
+ * of threads (0 = all cores). */
 void spl_tolerance_fill(const struct spl_tolerance *tolerance, const struct spl_view *view, const struct spl_image *id,
                         const struct spl_image *depth, unsigned threads, float *out);
 

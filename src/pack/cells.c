@@ -214,7 +214,8 @@ int spl_cells_init_above(struct spl_cells *cells, const struct spl_cells *below,
     uint32_t count = 0;
     for (uint32_t k = 0; k < below->count; k++)
         count += k == 0 || below->cells[k].key >> 3 != below->cells[k - 1].key >> 3;
-    *cells = (struct spl_cells){.spill = below->spill, .count = count, .shift = below->shift + 1, .edge = 2 * below->edge};
+    *cells =
+        (struct spl_cells){.spill = below->spill, .count = count, .shift = below->shift + 1, .edge = 2 * below->edge};
     cells->cells = spl_spill_alloc(cells->spill, (size_t)count + 1, sizeof *cells->cells, err);
     if (!cells->cells)
         return SPL_E_NOMEM;

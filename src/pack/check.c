@@ -18,10 +18,11 @@ int spl_pack_check_primitives(const struct spl_pack_options *o, struct spl_error
                               "more metres",
                               o->error);
     if (o->error > error_most) // what each scan's own size says as well, once it is read
-        return spl_fail_field(err, SPL_E_USAGE, "error",
-                              "%g m; what primitives may be off their points is at most a tenth of the scan, and %g m in "
-                              "any case: name some millimetres, or leave it out",
-                              o->error, error_most);
+        return spl_fail_field(
+            err, SPL_E_USAGE, "error",
+            "%g m; what primitives may be off their points is at most a tenth of the scan, and %g m in "
+            "any case: name some millimetres, or leave it out",
+            o->error, error_most);
     if (o->primitives != SPL_PRIMITIVES_OFF && o->primitives != SPL_PRIMITIVES_ALL)
         return spl_fail_field(err, SPL_E_USAGE, field, "%d; off or all", (int)o->primitives);
     if (o->primitives == SPL_PRIMITIVES_OFF && o->export_primitives)

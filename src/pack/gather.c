@@ -115,7 +115,8 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
             p->station[at] = known ? (uint16_t)station : SPL_NO_STATION;
         }
         for (int c = 0; p->normal && c < 3; c++)
-            p->normal[at][c] = attributes & SPL_CLOUD_NORMAL ? batch->normal[i][c] + 0.0f : 0; // no -0, which has a code of its own
+            // no -0, which has a code of its own
+            p->normal[at][c] = attributes & SPL_CLOUD_NORMAL ? batch->normal[i][c] + 0.0f : 0;
     }
     p->count = at;
     p->points_read += batch->count;

@@ -48,8 +48,8 @@ static void tell_what_is_left(const struct spl_pack_options *options, const stru
     double reached = all / (double)report->leaf_splats, off = reached / options->prune;
     if (options->prune <= 1 || !options->warn || (off > 1 / prune_near && off < prune_near))
         return;
-    snprintf(text, sizeof text, "--prune %u leaves one splat of %.1f: no nodes of the octree come closer", options->prune,
-             reached);
+    snprintf(text, sizeof text, "--prune %u leaves one splat of %.1f: no nodes of the octree come closer",
+             options->prune, reached);
     options->warn(options->progress_context, text);
 }
 

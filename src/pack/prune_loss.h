@@ -20,8 +20,8 @@ void spl_prune_shapes_destroy(struct spl_prune_shapes *shapes);
 /* The node's splats, and what its panels are worth of them. */
 uint64_t spl_prune_count(const struct spl_prune_loss *loss, uint64_t node);
 
-/* What a dataset counts as its leaf splats of a node that is one of its leaves: as above, but of a node without children
- * the points that its panels stand for. */
+/* What a dataset counts as its leaf splats of a node that is one of its leaves: as above, but of a node without
+ * children the points that its panels stand for. */
 uint64_t spl_prune_left(const struct spl_prune_loss *loss, uint64_t node);
 
 /* The loss of a node that has children; of `below` leaf splats. Looks at an even part of them, in proportion to its

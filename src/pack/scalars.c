@@ -12,7 +12,8 @@
 #include "dataset/streams.h"
 #include "pack/points.h"
 
-enum { decimals_max = 6, halvings_max = 20, digit_bits = 16, digits = 1 << digit_bits, bits_of_floats = 16, bits_of_doubles = 24 };
+enum { decimals_max = 6, halvings_max = 20, digit_bits = 16, digits = 1 << digit_bits, bits_of_floats = 16,
+       bits_of_doubles = 24 };
 static const double most_steps = 4294967290.0; /* below SPL_STREAM_NONE, with room for rounding */
 static const double most_whole = 0x1p52;       /* where steps are counted exactly */
 static const double largest = 0x1p900;         /* of a value, so that those that come back are finite */

@@ -1,6 +1,6 @@
-/* Large arrays of a pack that need not lie in memory: beyond a third of what the pack may take they lie in files without a
- * name, mapped, and what of them was not used for a while is let go of whenever the process comes near its bound. What
- * is made with them is the same wherever they lie. */
+/* Large arrays of a pack that need not lie in memory: beyond a third of what the pack may take they lie in files
+ * without a name, mapped, and what of them was not used for a while is let go of whenever the process comes near its
+ * bound. What is made with them is the same wherever they lie. */
 #ifndef SPL_PACK_SPILL_H
 #define SPL_PACK_SPILL_H
 
@@ -23,7 +23,8 @@ void *spl_spill_alloc_raw(struct spl_spill *spill, size_t count, size_t size, st
 void *spl_spill_realloc(struct spl_spill *spill, void *old, size_t count, size_t size, struct spl_error *err);
 void spl_spill_free(struct spl_spill *spill, void *array);
 
-/* Many small ones, which come back only when the spill is destroyed. Where `spill` is NULL as spl_alloc_raw(), free(). */
+/* Many small ones, which come back only when the spill is destroyed. Where `spill` is NULL as spl_alloc_raw(),
+ * free(). */
 void *spl_spill_take(struct spl_spill *spill, size_t count, size_t size, struct spl_error *err);
 void spl_spill_give(struct spl_spill *spill, void *array);
 

@@ -1,6 +1,6 @@
-/* Scans side by side once more, by what their headers say of coordinates. What differs here shifts or stretches one scan
- * against the other, or all of them, without a sign of it in the points: so it is refused, and what somebody knows better
- * is theirs to say. The caller's thread. */
+/* Scans side by side once more, by what their headers say of coordinates. What differs here shifts or stretches one
+ * scan against the other, or all of them, without a sign of it in the points: so it is refused, and what somebody knows
+ * better is theirs to say. The caller's thread. */
 #include "pack/system.h"
 
 #include <ctype.h>
@@ -88,11 +88,11 @@ static int compare_systems(const struct finding *f, const struct spl_scan **of, 
             *of = scan;
         enum likeness like = compare(&(*of)->coordinates, &scan->coordinates);
         if (like == LIKE_DIFFERENT)
-            return spl_fail_field(err, SPL_E_INPUT, "crs",
-                                  "%.120s and %.120s are in different coordinate systems (%s, %s): bring all scans into "
-                                  "one first; or, where they are in one, say in which with --crs, or --crs none",
-                                  (*of)->path, scan->path, name_system(&(*of)->coordinates, a),
-                                  name_system(&scan->coordinates, b));
+            return spl_fail_field(
+                err, SPL_E_INPUT, "crs",
+                "%.120s and %.120s are in different coordinate systems (%s, %s): bring all scans into "
+                "one first; or, where they are in one, say in which with --crs, or --crs none",
+                (*of)->path, scan->path, name_system(&(*of)->coordinates, a), name_system(&scan->coordinates, b));
         unsure = unsure || like == LIKE_SAME ? unsure : scan;
     }
     if (*of && silent) {
@@ -114,24 +114,26 @@ static int check_unit(const struct finding *f, const struct spl_scan *scan, bool
     const struct spl_cloud_coordinates *c = &scan->coordinates;
     char a[SPL_UNIT_TEXT_MAX], b[SPL_UNIT_TEXT_MAX], system[96];
     if (c->angles)
-        return spl_fail_field(err, SPL_E_INPUT, "crs",
-                              "%.120s: x and y are longitude and latitude (%s), in degrees, no lengths: project them "
-                              "first, such as with \"pdal translate IN OUT.las reprojection "
-                              "--filters.reprojection.out_srs=EPSG:…\"; where they are none, say it with --crs EPSG:N or "
-                              "--unit m",
-                              scan->path, name_system(c, system));
+        return spl_fail_field(
+            err, SPL_E_INPUT, "crs",
+            "%.120s: x and y are longitude and latitude (%s), in degrees, no lengths: project them "
+            "first, such as with \"pdal translate IN OUT.las reprojection "
+            "--filters.reprojection.out_srs=EPSG:…\"; where they are none, say it with --crs EPSG:N or "
+            "--unit m",
+            scan->path, name_system(c, system));
     if (c->unit_m == 0 || c->height_unit_m == 0 || spl_unit_is_same(c->unit_m, c->height_unit_m))
         return SPL_OK;
     spl_unit_print(c->unit_m, a);
     spl_unit_print(c->height_unit_m, b);
     if (fabs(c->unit_m / c->height_unit_m - 1) > heights_alike)
-        return spl_fail_field(err, SPL_E_INPUT, "unit",
-                              "%.120s: x and y are in %s, heights in %s: bring them into one unit first; where they are "
-                              "in one, say it with --unit %s",
-                              scan->path, a, b, a);
+        return spl_fail_field(
+            err, SPL_E_INPUT, "unit",
+            "%.120s: x and y are in %s, heights in %s: bring them into one unit first; where they are "
+            "in one, say it with --unit %s",
+            scan->path, a, b, a);
     if (!*mentioned)
-        say(f, "%.60s: x and y are in %s, heights in %s, which differ in the sixth digit: taken as %s", scan->name, a, b,
-            a);
+        say(f, "%.60s: x and y are in %s, heights in %s, which differ in the sixth digit: taken as %s", scan->name, a,
+            b, a);
     *mentioned = true;
     return SPL_OK;
 }
@@ -181,7 +183,8 @@ static void mention_overruled(const struct finding *f, double unit_m)
 }
 
 /* A dataset has one unit, which is also its system's: one in another unit is none of these coordinates, and would place
- * them elsewhere. The user's own is refused, that of the scans, whose unit the user knows better, left out (*crs NULL). */
+ * them elsewhere. The user's own is refused, that of the scans, whose unit the user knows better, left out (*crs
+ * NULL). */
 static int check_system(const struct finding *f, const struct spl_scan *of, const struct spl_cloud_coordinates **crs,
                         double unit_m, struct spl_error *err)
 {

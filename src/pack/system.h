@@ -19,7 +19,8 @@ struct spl_system_options {
 
 /* From all scans' headers and the user. Refuses, by their names, scans in different systems or units, longitudes and
  * latitudes, and heights in another unit than the rest, unless the user says better; warns of those that say nothing
- * beside others that do. SPL_E_USAGE for what is wrong with `options`; SPL_E_INPUT. Blocks on a file that `crs` names. */
+ * beside others that do. SPL_E_USAGE for what is wrong with `options`; SPL_E_INPUT. Blocks on a file that `crs`
+ * names. */
 int spl_system_find(struct spl_system *system, const struct spl_scans *scans, const struct spl_system_options *options,
                     struct spl_error *err);
 void spl_system_finish(struct spl_system *system);

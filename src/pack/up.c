@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "geom/eigen.h"
+#include "geom/vector.h"
 
 static const double level_most = 0.05; /* mean square of right sides along up: 13 degrees */
 static const double spread_least = 0.01, spread_ratio = 8; /* of the next direction: else all images face one way */
@@ -16,11 +17,6 @@ static const double sided_least = 0.2;                     /* mean of upward sid
 static const double turned_most = 0.25;                    /* square of their mean: they point every way */
 static const double likely_upward = 0.5;                   /* 60 degrees from the median: not taken upright */
 static const double z_already = 0.99619;                   /* 5 degrees */
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* x, y, z of the image's frame, y turned upwards. */
 static void get_axis(const struct spl_named_view *view, int axis, double out[3])
@@ -35,7 +31,7 @@ static double mean_along(const struct spl_view_list *views, int axis, const doub
     double sum = 0, a[3];
     for (size_t i = 0; i < views->count; i++) {
         get_axis(&views->views[i], axis, a);
-        sum += dot(a, v);
+        sum += dot3(a, v);
     }
     return sum / (double)views->count;
 }
@@ -48,7 +44,7 @@ static bool find_level(const struct spl_view_list *views, const double *median, 
     for (size_t i = 0; i < views->count; i++) {
         get_axis(&views->views[i], 0, x);
         get_axis(&views->views[i], 1, y);
-        if (median && dot(y, median) < likely_upward)
+        if (median && dot3(y, median) < likely_upward)
             continue;
         for (int a = 0, k = 0; a < 3; a++)
             for (int b = a; b < 3; b++)
@@ -75,7 +71,7 @@ static bool find_median(const struct spl_view_list *views, double median[3])
                 sum[c] += weight * y[c];
             weights += weight;
         }
-        double length = sqrt(dot(sum, sum));
+        double length = sqrt(dot3(sum, sum));
         if (!(length > 1e-3 * weights))
             return false;
         for (int c = 0; c < 3; c++)
@@ -103,9 +99,9 @@ static bool find(const struct spl_view_list *views, double up[3])
     if (!find_median(views, median))
         return false;
     memcpy(up, median, sizeof median);
-    if (find_level(views, median, v) && fabs(dot(v, median)) >= likely_upward)
+    if (find_level(views, median, v) && fabs(dot3(v, median)) >= likely_upward)
         for (int c = 0; c < 3; c++)
-            up[c] = dot(v, median) < 0 ? -v[c] : v[c];
+            up[c] = dot3(v, median) < 0 ? -v[c] : v[c];
     return true;
 }
 

@@ -1,18 +1,15 @@
-/* The default view: a camera's own, one from inside, one from outside. The caller's thread; equal points, equal view. */
+/* The default view: a camera's own, one from inside, one from outside. The caller's thread; equal points, equal
+ * view. */
 #include "pack/view.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geom/fit.h"
+#include "geom/vector.h"
 #include "pack/view/inside.h"
 #include "pack/view/outside.h"
 #include "pack/view/sample.h"
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* A station whose points all lie around its z axis is a camera: x right, y down, z forward. A scanner stands upright,
  * and sees around itself. */
@@ -43,7 +40,7 @@ static bool view_from_camera(const struct spl_points *p, struct spl_default_view
     depth /= (double)seen;
     /* what somebody knows of up, unless the camera looks there */
     const double forward[3] = {pose[2], pose[6], pose[10]};
-    bool told = p->up[2] != 1 && fabs(dot(p->up, forward)) < 0.9 * sqrt(dot(forward, forward));
+    bool told = p->up[2] != 1 && fabs(dot3(p->up, forward)) < 0.9 * sqrt(dot3(forward, forward));
     for (int c = 0; c < 3; c++) {
         view->eye[c] = pose[4 * c + 3];
         view->target[c] = view->eye[c] + depth * pose[4 * c + 2];

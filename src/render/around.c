@@ -83,7 +83,8 @@ static double slope(double own, float before, float after)
 
 double spl_around_depth_at(const struct spl_image *image, double x, double y)
 {
-    const double column = fmin(fmax(floor(x), 1), image->width - 2.0), row = fmin(fmax(floor(y), 1), image->height - 2.0);
+    const double column = fmin(fmax(floor(x), 1), image->width - 2.0),
+                 row = fmin(fmax(floor(y), 1), image->height - 2.0);
     const float *at = (const float *)image->pixels + (size_t)row * image->width + (size_t)column;
     const double own = 1 / (double)*at;
     const double carried = own + slope(own, at[-1], at[1]) * (x - column - 0.5) +
@@ -121,7 +122,8 @@ static void look_up_pixel(const struct job *j, uint32_t x, uint32_t y)
         if (!image->pixels)
             continue;
         void *to = (char *)spl_image_row(image, y) + (size_t)x * spl_pixel_bytes(image->type);
-        if (!sees || !j->around->faces.cameras[face].width || !from[layer == SPL_LAYER_RANGE ? SPL_LAYER_DEPTH : layer].pixels)
+        if (!sees || !j->around->faces.cameras[face].width ||
+            !from[layer == SPL_LAYER_RANGE ? SPL_LAYER_DEPTH : layer].pixels)
             put_nothing(layer, j->wanted->background, to);
         else if (layer == SPL_LAYER_RANGE)
             *(float *)to = (float)(spl_around_depth_at(&from[SPL_LAYER_DEPTH], place[0], place[1]) / along);

@@ -92,7 +92,8 @@ int spl_color_parse_range(const char *text, struct spl_color_params *out, struct
         bool more = end && !i && end[-1] == '.' && *end == '.'; // of 1..2, one dot is the number's
         if (!end || (i ? *end != 0 : strncmp(more ? end - 1 : end, "..", 2) != 0))
             return spl_fail_field(err, SPL_E_INPUT, "range",
-                                  "range '%.48s' is none; write 0..200, or q0.02..q0.98 for shares of the splats", text);
+                                  "range '%.48s' is none; write 0..200, or q0.02..q0.98 for shares of the splats",
+                                  text);
         range[i] += 0.0;
         at = more ? end - 1 : end;
     }
@@ -100,7 +101,8 @@ int spl_color_parse_range(const char *text, struct spl_color_params *out, struct
         if (!isfinite(range[i]) || (shares[i] && !(range[i] >= 0 && range[i] <= 1)))
             return spl_fail_field(err, SPL_E_INPUT, "range", "range '%.48s': a quantile is within 0 and 1", text);
     if (shares[0] == shares[1] && range[0] > range[1])
-        return spl_fail_field(err, SPL_E_INPUT, "range", "range '%.48s': its ends fall; write the lower one first", text);
+        return spl_fail_field(err, SPL_E_INPUT, "range", "range '%.48s': its ends fall; write the lower one first",
+                              text);
     memcpy(out->range, range, sizeof range);
     memcpy(out->shares, shares, sizeof shares);
     out->has_range = true;

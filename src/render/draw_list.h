@@ -75,8 +75,8 @@ struct spl_draw_list {
     uint64_t *work_of_chunk;           /* the same */
     uint64_t drawn[SPL_CHUNK_KINDS];   /* splats, pieces of lines, panels, meshes; of the latter two those whose cells
                                           are drawn one by one, too */
-    uint64_t listed_splats;            /* solid splats and panels, once for every window that they are drawn in; a panel counts as
-                                          SPL_PANEL_WORTH */
+    uint64_t listed_splats;            /* solid splats and panels, once for every window that they are drawn
+                                          in; a panel counts as SPL_PANEL_WORTH */
     uint32_t nodes;                    /* that the chunks came from */
     uint64_t sample_splats;            /* upper bound of the splats that reach any one sample */
     uint64_t sample_panels;            /* the same of panels that are drawn as such */

@@ -20,8 +20,9 @@ struct spl_chunk_bounds spl_footprint_bounds(const struct spl_camera *camera, co
     bool few = (last[0] - first[0] + 1) * (last[1] - first[1] + 1) <= SPL_OCCLUSION_TILES_MAX;
     double reach = SPL_LOW_PASS_REACH / camera->fx;
     double least = camera->projection == SPL_ORTHOGRAPHIC ? fmax(0, near - reach) : near * fmax(0, 1 - reach);
-    return (struct spl_chunk_bounds){
-        .first = first[0] | first[1] << 16, .last = last[0] | last[1] << 16, .near = few ? (float)(least * (1 - 1e-5)) : 0};
+    return (struct spl_chunk_bounds){.first = first[0] | first[1] << 16,
+                                     .last = last[0] | last[1] << 16,
+                                     .near = few ? (float)(least * (1 - 1e-5)) : 0};
 }
 
 double spl_footprint_side(const struct spl_camera *camera, double radius, double near)

@@ -6,7 +6,8 @@
 
 #include "shared.h"
 
-/* The occlusion tiles of samples [low, high], which may lie outside the image, of what is nowhere nearer than `near`. */
+/* The occlusion tiles of samples [low, high], which may lie outside the image, of what is nowhere nearer than
+ * `near`. */
 struct spl_chunk_bounds spl_footprint_bounds(const struct spl_camera *camera, const double low[2],
                                              const double high[2], double near);
 

@@ -1,13 +1,12 @@
 /* The io threads; see io.h.
  *
  * Invariants: staged[far] counts the bytes of reads under way and of those ended that were not given back, from afar or
- * not, and is raised before memory is taken; it exceeds SPL_IO_BYTES only for one read alone, and from afar by what hangs,
- * SPL_IO_HANGING_BYTES at most. Memory that is given back while there is
- * more to read is kept for that, within the same bound: to have it anew costs as much as the read. A read is in one
- * list at a time, but for those taken, which are in none. Of a source as many reads are under way as it says; a thread
- * is begun where one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them,
- * waits for those that are not in the middle of a read, and leaves the others behind: then `io` is theirs, and the last
- * one frees it. */
+ * not, and is raised before memory is taken; it exceeds SPL_IO_BYTES only for one read alone, and from afar by what
+ * hangs, SPL_IO_HANGING_BYTES at most. Memory that is given back while there is more to read is kept for that, within
+ * the same bound: to have it anew costs as much as the read. A read is in one list at a time, but for those taken,
+ * which are in none. Of a source as many reads are under way as it says; a thread is begun where one of another could
+ * be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them, waits for those that
+ * are not in the middle of a read, and leaves the others behind: then `io` is theirs, and the last one frees it. */
 #include "render/io.h"
 
 #include <pthread.h>

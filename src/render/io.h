@@ -1,7 +1,7 @@
 /* Reads on threads of their own: what a renderer wants of its datasets' files, in the order that it needs it, into host
- * memory that is counted before it is taken. Each file is read by one thread at a time (one from afar by some, as most of
- * a read is waiting), and files side by side: one whose disk does not answer holds up nobody else. What comes from afar has
- * memory, threads and places of its own, so that servers that hang hold up no disk.
+ * memory that is counted before it is taken. Each file is read by one thread at a time (one from afar by some, as most
+ * of a read is waiting), and files side by side: one whose disk does not answer holds up nobody else. What comes from
+ * afar has memory, threads and places of its own, so that servers that hang hold up no disk.
  *
  * Life of a read: begin() → waits → is read → ended → take() → end(). The owner may end() it at any time: one that
  * waits is forgotten, the bytes of one that is being read are dropped when they have come. Nobody waits for a read that
@@ -24,8 +24,8 @@ enum {
     SPL_IO_THREADS = 64, /* three quarters of both may be from afar */
 };
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
-/* The same of what comes from afar, apart from that. What of it hangs counts apart as well: so much may, and more from afar
- * waits then. */
+/* The same of what comes from afar, apart from that. What of it hangs counts apart as well: so much may, and more from
+ * afar waits then. */
 #define SPL_IO_HANGING_BYTES (4 * SPL_IO_BYTES)
 
 struct spl_io_what {
@@ -35,8 +35,8 @@ struct spl_io_what {
     uint32_t index;
     size_t bytes; /* that `read` writes, at least 1 */
     void *owner;  /* of the read; not looked at */
-    uint64_t (*get_moved_ns)(const void *source); // when a read of it last came on, though it has not ended; NULL: it is not
-                                                  // from afar
+    uint64_t (*get_moved_ns)(const void *source); // when a read of it that has not ended last came on; NULL: it is
+                                                  // not from afar
     unsigned at_once; /* reads of the source under way together; 0 = 1 */
 };
 

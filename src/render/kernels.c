@@ -6,14 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/memory.h"
+#include "base/array.h"
 
 struct spl_kernel_made {
     struct spl_kernel_key key;
     struct spl_gpu_kernel *kernel;
 };
-
-enum { made_at_start = 32 };
 
 static bool is_same(const struct spl_kernel_key *a, const struct spl_kernel_key *b)
 {
@@ -42,14 +40,8 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
             return SPL_OK;
         }
     }
-    if (kernels->count == kernels->capacity) {
-        size_t capacity = kernels->capacity ? 2 * kernels->capacity : made_at_start;
-        struct spl_kernel_made *made = spl_realloc(kernels->made, capacity, sizeof *made, err);
-        if (!made)
-            return SPL_E_NOMEM;
-        kernels->made = made;
-        kernels->capacity = capacity;
-    }
+    if (spl_array_reserve(kernels->made, kernels->capacity, kernels->count + 1, err))
+        return SPL_E_NOMEM;
     int rc = make(gpu, key, out, err);
     if (!rc)
         kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out};

@@ -1,24 +1,18 @@
 /* Chunks against terms; see marks.h. A chunk's header has the base and the width of its codes, so the numbers that it
- * may have are a range, modulo 2^32 as codes decode; its box bounds distances to shapes. What that leaves open becomes a
- * test. W of eq. 22 is computed here and in soft_mark.comp by the same products of floats.
+ * may have are a range, modulo 2^32 as codes decode; its box bounds distances to shapes. What that leaves open becomes
+ * a test. W of eq. 22 is computed here and in soft_mark.comp by the same products of floats.
  *
- * A test (SPL_TEST_*): of numbers a code is soft where code + start, modulo 2^32, is at most the span; of few codes there
- * is a table of marks; of a shape its words say where it lies. Pure functions; any thread. */
+ * A test (SPL_TEST_*): of numbers a code is soft where code + start, modulo 2^32, is at most the span; of few codes
+ * there is a table of marks; of a shape its words say where it lies. Pure functions; any thread. */
 #include "render/marks.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "dataset/chunk.h"
 #include "render/terms.h"
-
-static uint32_t word_of(float value)
-{
-    uint32_t word;
-    memcpy(&word, &value, sizeof word);
-    return word;
-}
 
 static float share_at(const struct spl_marks_term *term, uint32_t past)
 {
@@ -53,13 +47,14 @@ static enum spl_marks_verdict judge_numbers(const struct spl_marks_term *term, e
     test[3] = start;
     test[4] = term->span;
     test[5] = term->shift;
-    test[6] = word_of(term->share_low);
-    test[7] = word_of(term->share_step);
-    test[8] = word_of(term->share_high);
-    test[9] = word_of(term->share_step_high);
+    test[6] = spl_float_to_bits(term->share_low);
+    test[7] = spl_float_to_bits(term->share_step);
+    test[8] = spl_float_to_bits(term->share_high);
+    test[9] = spl_float_to_bits(term->share_step_high);
     if (start > term->span || most > term->span - start || (none && !term->complete))
         return SPL_VERDICT_SOME;
-    return share_at(term, start) >= 1 && share_at(term, start + (uint32_t)most) >= 1 ? SPL_VERDICT_ALL : SPL_VERDICT_BLENDED;
+    return share_at(term, start) >= 1 && share_at(term, start + (uint32_t)most) >= 1 ? SPL_VERDICT_ALL
+                                                                                     : SPL_VERDICT_BLENDED;
 }
 
 /* Each of a chunk's few codes has its mark. */
@@ -87,7 +82,10 @@ static enum spl_marks_verdict judge_table(const struct spl_marks_term *term, con
         soft++;
         whole += mark == SPL_MARK_WHOLE;
     }
-    return !soft ? SPL_VERDICT_NONE : soft < codes ? SPL_VERDICT_SOME : whole < codes ? SPL_VERDICT_BLENDED : SPL_VERDICT_ALL;
+    return !soft           ? SPL_VERDICT_NONE
+           : soft < codes  ? SPL_VERDICT_SOME
+           : whole < codes ? SPL_VERDICT_BLENDED
+                           : SPL_VERDICT_ALL;
 }
 
 static double distance_to(const struct spl_marks_term *term, const struct spl_marks_view *view,
@@ -236,8 +234,9 @@ static void turn_axes(const double degrees[3], double axes[9])
     memcpy(axes, rows, sizeof rows);
 }
 
-/* From where to where a shape reaches along a world axis: its middle, and half of it. Of an inside that is much larger than
- * the dataset only what lies around the dataset: from a middle far away floats would not tell where the near end is. */
+/* From where to where a shape reaches along a world axis: its middle, and half of it. Of an inside that is much larger
+ * than the dataset only what lies around the dataset: from a middle far away floats would not tell where the near end
+ * is. */
 static void place_extent(const struct spl_marks *marks, const struct spl_marks_term *term, int axis, double least,
                          double most, double *middle, double *half)
 {
@@ -273,8 +272,8 @@ static void place_polygon(const struct spl_marks *marks, const struct spl_marks_
         place_extent(marks, term, 2, term->shape[0], term->shape[1], &middle[2], &half[2]);
 }
 
-/* The shape's axes and its middle, world; of a box how far it reaches from there; of a coordinate `base`, which is at one
- * of its ends, so that floats have what lies around it. */
+/* The shape's axes and its middle, world; of a box how far it reaches from there; of a coordinate `base`, which is at
+ * one of its ends, so that floats have what lies around it. */
 static void place_shape(const struct spl_marks *marks, const struct spl_marks_term *term,
                         const struct spl_camera *camera, struct spl_marks_view *view, struct spl_marks_shape *shape,
                         double axes[9], double middle[3])
@@ -311,7 +310,7 @@ static void place_shape(const struct spl_marks *marks, const struct spl_marks_te
 
 static uint32_t float_word(double value)
 {
-    return word_of((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
+    return spl_float_to_bits((float)fmax(fmin(value, FLT_MAX), -FLT_MAX));
 }
 
 static uint32_t kind_of(const struct spl_marks_term *term)

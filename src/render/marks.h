@@ -45,16 +45,17 @@ struct spl_marks {
     double middle[3], reach;          /* a sphere that holds it; 0, 0 = not known */
 };
 
-/* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `common` is
- * what works with any dataset, `hint` what may be meant, or NULL. */
+/* The stream of attribute `name`, of a type that we know; -1 = none. refuse_name() says so, and what there is: `common`
+ * is what works with any dataset, `hint` what may be meant, or NULL. */
 int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name);
 int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *common,
                           const char *hint, struct spl_error *err);
-double spl_marks_value_at(const struct spl_stream_values *values, double q); /* that a share q of the splats are below */
+/* That a share q of the splats are below. */
+double spl_marks_value_at(const struct spl_stream_values *values, double q);
 
-/* Ends of a view's terms as values of a dataset: quantiles, and shares of the 99th percentile, are looked up. SPL_E_INPUT
- * (field "soft") where the dataset has no such attribute, or was packed before quantiles were kept. `ends` has room for
- * SPL_TERMS_MAX; may be NULL, to check only. */
+/* Ends of a view's terms as values of a dataset: quantiles, and shares of the 99th percentile, are looked up.
+ * SPL_E_INPUT (field "soft") where the dataset has no such attribute, or was packed before quantiles were kept. `ends`
+ * has room for SPL_TERMS_MAX; may be NULL, to check only. */
 int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_dataset_info *info,
                       struct spl_marks_term *ends, struct spl_error *err);
 
@@ -62,8 +63,8 @@ int spl_marks_resolve(const struct spl_soft_params *soft, const struct spl_datas
 struct spl_view;
 int spl_marks_check_view(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err);
 
-/* The terms of a view of a dataset, which is borrowed: what is soft; what is drawn at all. Errors as of resolve, of field
- * "clip" of the second. */
+/* The terms of a view of a dataset, which is borrowed: what is soft; what is drawn at all. Errors as of resolve, of
+ * field "clip" of the second. */
 int spl_marks_init(struct spl_marks *marks, const struct spl_soft_params *soft, const struct spl_dataset *dataset,
                    struct spl_error *err);
 int spl_marks_init_clip(struct spl_marks *marks, const struct spl_terms *clip, const struct spl_dataset *dataset,
@@ -125,13 +126,14 @@ struct spl_clip_chunk {
     uint32_t center_tests[SPL_TEST_WORDS * SPL_TERMS_MAX], value_tests[SPL_TEST_WORDS * SPL_TERMS_MAX];
 };
 
-/* Of chunk `index`, all of which lies within `box`, view space: centres, or discs and panels where these are cut. Vertices
- * of lines have no attributes. */
+/* Of chunk `index`, all of which lies within `box`, view space: centres, or discs and panels where these are cut.
+ * Vertices of lines have no attributes. */
 void spl_clip_judge(const struct spl_marks *clip, const struct spl_marks_view *view, const struct spl_tables *tables,
                     uint32_t index, const struct spl_view_box *box, struct spl_clip_chunk *out);
 
 /* Is nothing within `box` drawn, whatever attributes it has? */
-bool spl_clip_drops_box(const struct spl_marks *clip, const struct spl_marks_view *view, const struct spl_view_box *box);
+bool spl_clip_drops_box(const struct spl_marks *clip, const struct spl_marks_view *view,
+                        const struct spl_view_box *box);
 
 /* What samples are asked where the shapes of `cut` are open: words, and how many. */
 enum { SPL_CLIP_CUT_WORDS = 1 + 2 * SPL_TERMS_MAX };

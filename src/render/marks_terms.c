@@ -41,11 +41,12 @@ static int refuse_values(const struct spl_dataset_info *info, const struct spl_t
                          struct spl_error *err)
 {
     const bool quantile = term->measure == SPL_TERM_QUANTILE;
-    return spl_fail_field(err, SPL_E_INPUT, field,
-                          "dataset '%s' does not say how its values of '%s' are distributed, which %s of them needs: it "
-                          "was packed by a splatd from before; pack it again%s",
-                          info->id, term->name, quantile ? "a quantile" : "a share of the 99th percentile",
-                          quantile ? ", or give a value" : "");
+    return spl_fail_field(
+        err, SPL_E_INPUT, field,
+        "dataset '%s' does not say how its values of '%s' are distributed, which %s of them needs: it "
+        "was packed by a splatd from before; pack it again%s",
+        info->id, term->name, quantile ? "a quantile" : "a share of the 99th percentile",
+        quantile ? ", or give a value" : "");
 }
 
 /* The value that a share `q` of the splats have less than: between the nearest two of those that are kept, of which the

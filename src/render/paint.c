@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "dataset/streams.h"
 #include "render/marks.h"
 
@@ -15,10 +16,7 @@ enum { unknown_gray = 0x606060 };
 
 static uint32_t word_of(double value)
 {
-    const float f = (float)fmax(fmin(value, (double)FLT_MAX), -(double)FLT_MAX);
-    uint32_t word;
-    memcpy(&word, &f, sizeof word);
-    return word;
+    return spl_float_to_bits((float)fmax(fmin(value, (double)FLT_MAX), -(double)FLT_MAX));
 }
 
 static uint32_t pack(const uint8_t rgb[3])
@@ -53,7 +51,8 @@ static void bound_distance(const struct spl_paint *paint, const struct spl_datas
     }
 }
 
-/* All the heights that there are, but for those of few points far off the others: a bird, an echo from below the ground. */
+/* All the heights that there are, but for those of few points far off the others: a bird, an echo from below the
+ * ground. */
 static void bound_heights(const struct spl_stream_values *heights, double range[2])
 {
     static const double far = 0.5; /* of what most lie within */
@@ -66,9 +65,10 @@ static int find_ends(struct spl_paint *paint, const struct spl_color_params *col
                      struct spl_error *err)
 {
     const bool of_heights = color->by == SPL_COLOR_BY_HEIGHT;
-    const struct spl_stream_values *values = of_heights           ? info->heights
-                                             : paint->stream >= 0 ? spl_dataset_info_get_values(info, (uint32_t)paint->stream)
-                                                                  : NULL;
+    const struct spl_stream_values *values = of_heights ? info->heights
+                                             : paint->stream >= 0
+                                                 ? spl_dataset_info_get_values(info, (uint32_t)paint->stream)
+                                                 : NULL;
     double range[2] = {color->range[0], color->range[1]};
     const bool shares[2] = {color->has_range ? color->shares[0] : paint->stream >= 0,
                             color->has_range ? color->shares[1] : paint->stream >= 0};

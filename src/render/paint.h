@@ -1,5 +1,5 @@
-/* What colours of a view show in place of the splats' own: which value, and what becomes of it. Shared by selection, which
- * tells chunks where their codes are, recording, and legends. Pure functions; any thread. */
+/* What colours of a view show in place of the splats' own: which value, and what becomes of it. Shared by selection,
+ * which tells chunks where their codes are, recording, and legends. Pure functions; any thread. */
 #ifndef SPL_RENDER_PAINT_H
 #define SPL_RENDER_PAINT_H
 

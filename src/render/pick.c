@@ -1,8 +1,8 @@
 /* The geometry of picks, shared by the library and the service. The world position is the point on the pixel's ray at
  * the depth that was rendered, so it agrees with the depth layer to the bit; class and primitive are those of the
- * nearest splat, panel or mesh, the normal is its plane's; a mesh lies on no plane that a pick could name. Of a bent camera it
- * is the pixel of a face that the image is looked up in, with those around it, along which a range is carried: a ray of its own
- * would pass by what a coarse image shows. Pure functions; any thread. */
+ * nearest splat, panel or mesh, the normal is its plane's; a mesh lies on no plane that a pick could name. Of a bent
+ * camera it is the pixel of a face that the image is looked up in, with those around it, along which a range is
+ * carried: a ray of its own would pass by what a coarse image shows. Pure functions; any thread. */
 #include "render/pick.h"
 
 #include <math.h>
@@ -19,8 +19,8 @@
 enum { BLOCK = 3 /* pixels on a side of what is drawn of a face */ };
 static const double nowhere = 1e30; // view depth: nothing lies so far away
 
-/* The camera that sees pixel (x, y) of `camera`'s image at at[0], at[1] of its own: itself, or of a bent one the face that
- * is looked up there, of width 0 where no ray goes. SPL_E_LIMIT where the faces are too large to be drawn. */
+/* The camera that sees pixel (x, y) of `camera`'s image at at[0], at[1] of its own: itself, or of a bent one the face
+ * that is looked up there, of width 0 where no ray goes. SPL_E_LIMIT where the faces are too large to be drawn. */
 static int find_camera(const struct spl_camera *camera, double x, double y, struct spl_camera *out, double at[2],
                        struct spl_error *err)
 {
@@ -43,7 +43,8 @@ static int find_camera(const struct spl_camera *camera, double x, double y, stru
 int spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out, struct spl_error *err)
 {
     if (view->camera.projection == SPL_RAYS)
-        return spl_fail_field(err, SPL_E_USAGE, "projection", "a ray of a list is no pixel to pick; ask for the layers of it");
+        return spl_fail_field(err, SPL_E_USAGE, "projection",
+                              "a ray of a list is no pixel to pick; ask for the layers of it");
     struct spl_camera camera;
     double at[2];
     int rc = find_camera(&view->camera, x, y, &camera, at, err);

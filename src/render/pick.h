@@ -5,11 +5,10 @@
 #include <splatd/render.h>
 
 /* The view of one pixel whose centre is point (x, y) of `view`'s image: principal point moved, nothing else, so the
- * splats, their sizes and the level of detail are those of the whole image, of which it is a piece. Of a bent camera 3 x 3 pixels
- * of a face, in whose middle one the image is looked up. All layers but primitive,
- * which follows from the dataset; colours are the splats',
- * without textures. `out` may be `view`. SPL_E_LIMIT, as spl_faces_init() names it, of a camera whose faces are too large;
- * SPL_E_USAGE of rays. */
+ * splats, their sizes and the level of detail are those of the whole image, of which it is a piece. Of a bent camera 3
+ * x 3 pixels of a face, in whose middle one the image is looked up. All layers but primitive, which follows from the
+ * dataset; colours are the splats', without textures. `out` may be `view`. SPL_E_LIMIT, as spl_faces_init() names it,
+ * of a camera whose faces are too large; SPL_E_USAGE of rays. */
 int spl_pick_view(const struct spl_view *view, double x, double y, struct spl_view *out, struct spl_error *err);
 
 /* Reads the pixel of `frame`, whose layers are those of spl_pick_view() (normals may be missing); `camera` is the

@@ -1,5 +1,5 @@
-/* Pieces of a tile, as a stack: what a cut leaves lies below what is drawn first. Sides stay multiples of `even` as long
- * as they are larger, since what lies around a piece is drawn too, in steps of cells. */
+/* Pieces of a tile, as a stack: what a cut leaves lies below what is drawn first. Sides stay multiples of `even` as
+ * long as they are larger, since what lies around a piece is drawn too, in steps of cells. */
 #include "render/pieces.h"
 
 #include "base/error.h"

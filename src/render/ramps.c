@@ -1,5 +1,6 @@
 /* Colours of values: ramps by name, and the usual ones of the classes of laser scans (ASPRS). viridis and turbo are
- * polynomials near the tables they are known by: a level to four, at turbo's dark ends up to 32. Pure functions; any thread. */
+ * polynomials near the tables they are known by: a level to four, at turbo's dark ends up to 32. Pure functions; any
+ * thread. */
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/* Tile words to image pixels: rows are copied as they are, but for normals, which come as one octahedral word, and depths
- * of parallel rays, which are from where their eye was brought to. */
+/* Tile words to image pixels: rows are copied as they are, but for normals, which come as one octahedral word, and
+ * depths of parallel rays, which are from where their eye was brought to. */
 #include "render/readback.h"
 
 #include <math.h>

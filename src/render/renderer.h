@@ -101,8 +101,9 @@ enum spl_stage {
 int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t samples,
                      const struct spl_renderer_options *options, struct spl_error *err);
 void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu);
-/* Copies the draw list into the mapped buffers, growing them, and that of its marks, where it does not fit, at the cost of pages that the frame
- * has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left to take. */
+/* Copies the draw list into the mapped buffers, growing them, and that of its marks, where it does not fit, at the cost
+ * of pages that the frame has not asked for. SPL_E_LIMIT where there are too few of these, or only a first page is left
+ * to take. */
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err);
 /* Makes room for the factors of a shaded tile of so many samples; 0 needs none. Errors as of upload. */
@@ -118,9 +119,9 @@ void spl_tile_end_group(struct spl_tile *tile); /* ends what holds until a group
 /* What every dispatch of the tile may see: the draw list, and the areas that hold. */
 void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT]);
 
-/* To be called before dispatches of `work` are recorded: where they would be too much for the device's patience together
- * with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody waits for
- * the tile any more. */
+/* To be called before dispatches of `work` are recorded: where they would be too much for the device's patience
+ * together with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody
+ * waits for the tile any more. */
 int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err);
 /* Runs what was recorded, for the host to read; errors as of spl_tile_add_work(). */
 int spl_tile_run(struct spl_tile *tile, struct spl_error *err);
@@ -143,9 +144,11 @@ int spl_tile_take_rounds(struct spl_tile *tile, struct spl_error *err);
  * but for marks and cuts. */
 enum { SPL_ENDS_CLIPPED = 1, SPL_ENDS_TRIMMED = 2, SPL_ENDS_MARKED = 4 };
 /* From bit SPL_ENDS_CUT on: what cuts them; one shape alone has kernels of its own, as SPL_SHAPE_*. */
-enum spl_cut_by { SPL_CUT_BY_NONE, SPL_CUT_BY_SHAPES, SPL_CUT_BY_AXIS, SPL_CUT_BY_PLANE, SPL_CUT_BY_BOX, SPL_CUT_BY_COUNT };
+enum spl_cut_by { SPL_CUT_BY_NONE, SPL_CUT_BY_SHAPES, SPL_CUT_BY_AXIS, SPL_CUT_BY_PLANE, SPL_CUT_BY_BOX,
+                  SPL_CUT_BY_COUNT };
 enum { SPL_ENDS_CUT = 3, SPL_ENDS_COUNT = SPL_CUT_BY_COUNT << SPL_ENDS_CUT };
-/* The constants that say whether a kernel looks at marks, what colours show (SPL_PAINT_*), and at shapes of which kinds. */
+/* The constants that say whether a kernel looks at marks, what colours show (SPL_PAINT_*), and at shapes of which
+ * kinds. */
 enum { SPL_CONSTANT_MARKED = 3, SPL_CONSTANT_PAINT = 4, SPL_CONSTANT_CUT = 5 };
 struct spl_disc_kernels {
     struct spl_gpu_kernel *of[SPL_ENDS_COUNT];

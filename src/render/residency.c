@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/array.h"
 #include "base/memory.h"
 #include "render/hold.h"
 #include "render/slot.h"
@@ -64,36 +65,18 @@ void spl_residency_finish(struct spl_residency *residency)
     *residency = (struct spl_residency){0};
 }
 
-/* Room for what a walk through a dataset of so many slots may ask for. */
-static int reserve_asked(struct spl_residency *residency, size_t slots, struct spl_error *err)
-{
-    if (slots <= residency->asked_capacity)
-        return SPL_OK;
-    uint32_t *larger = spl_realloc(residency->asked, slots, sizeof *larger, err);
-    if (!larger)
-        return SPL_E_NOMEM;
-    residency->asked = larger;
-    residency->asked_capacity = slots;
-    return SPL_OK;
-}
-
 int spl_residency_add(struct spl_residency *residency, const struct spl_dataset *dataset, struct spl_error *err)
 {
     if (spl_residency_get(residency, dataset))
         return SPL_OK;
-    if (residency->dataset_count == residency->dataset_capacity) {
-        size_t capacity = residency->dataset_capacity * 2 + 4;
-        void *larger = spl_realloc(residency->datasets, capacity, sizeof *residency->datasets, err);
-        if (!larger)
-            return SPL_E_NOMEM;
-        residency->datasets = larger;
-        residency->dataset_capacity = capacity;
-    }
+    if (spl_array_reserve(residency->datasets, residency->dataset_capacity, residency->dataset_count + 1, err))
+        return SPL_E_NOMEM;
     struct spl_resident_dataset resident = {.dataset = dataset,
                                             .page_count = spl_dataset_get_info(dataset)->pages,
                                             .slot_count = spl_slot_count(dataset),
                                             .device_slots = spl_slot_count_resident(dataset)};
-    int rc = reserve_asked(residency, resident.slot_count, err);
+    // a walk through it may ask for all of its slots
+    int rc = spl_array_reserve(residency->asked, residency->asked_capacity, resident.slot_count, err);
     resident.pages = rc ? NULL : spl_alloc(resident.slot_count, sizeof *resident.pages, err);
     if (!resident.pages)
         return SPL_E_NOMEM;

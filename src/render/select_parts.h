@@ -21,7 +21,7 @@ struct spl_walk {
     struct spl_clip_chunk clipped; /* the same; nothing where there is no clip */
     uint32_t soft_marks; /* where its marks as soft are, if they are not those as solid */
     bool lined;      /* the node being drawn has lines that stand for its linear splats */
-    bool unlined;    /* it has lines that are not drawn, since some of its linear splats may be soft, or dropped by values */
+    bool unlined;    /* it has lines that are not drawn: some of its linear splats may be soft, or dropped by values */
     double line_width; /* of its lines, the largest; 0 = not known, or nothing is soft */
     double *covered; /* spl_select_spacing(): samples^2 by spacing, SPACING_CLASSES of them; else NULL */
     struct spl_walk_found *found; /* nodes that are drawn once all are known (select_share.c); NULL = at once */
@@ -78,23 +78,24 @@ int spl_walk_draw_found(struct spl_walk *w, struct spl_error *err);
 int spl_walk_begin_marks(struct spl_walk *w, struct spl_error *err);
 /* Fills in `judged`: of a chunk whose positions lie in `box`, view space. */
 void spl_walk_judge(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
-/* Fills in `clipped`: of a chunk all of which lies in `box`, discs and all where these are cut. False where nothing of it
- * is drawn. */
+/* Fills in `clipped`: of a chunk all of which lies in `box`, discs and all where these are cut. False where nothing of
+ * it is drawn. */
 bool spl_walk_clip(struct spl_walk *w, const struct spl_chunk *chunk, const struct spl_view_box *box);
 /* Is nothing of the node and of those below drawn? `box` is spl_walk_node_box(). */
 bool spl_walk_drops_node(const struct spl_walk *w, const struct spl_node *node, const struct spl_view_box *box);
-/* The shapes that cut the chunk's samples, as its origin says them: 0 where methods draw centres. SPL_E_NOMEM below 0. */
+/* The shapes that cut the chunk's samples, as its origin says them: 0 where methods draw centres. SPL_E_NOMEM below
+ * 0. */
 int spl_walk_get_cut(struct spl_walk *w, struct spl_error *err);
 /* May any linear splat of the node be soft, or dropped by its values? */
 bool spl_walk_has_soft_lines(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3]);
 /* How wide the node's lines are, at most, where anything may be soft. */
 double spl_walk_line_width(const struct spl_walk *w, const struct spl_node *node);
-/* Where `judged` or `clipped` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it is
- * listed otherwise. */
+/* Where `judged` or `clipped` needs marks: lists the chunk to be marked, and says in it where its marks are. Before it
+ * is listed otherwise. */
 int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, struct spl_draw_chunk *chunk,
                         struct spl_error *err);
-/* Where it has soft cells of panels: says in it where the cube of its node is, to which they are held along the plane of
- * `normal`. */
+/* Where it has soft cells of panels: says in it where the cube of its node is, to which they are held along the plane
+ * of `normal`. */
 int spl_walk_hold_cells(struct spl_walk *w, const struct spl_node *node, const double node_to_eye[3],
                         const float normal[3], struct spl_draw_chunk *chunk, struct spl_error *err);
 /* Where it has soft splats and these are drawn: lists them, of panels their cells, each a sphere of `radius` at most;
@@ -113,7 +114,8 @@ double spl_walk_largest_radius(const struct spl_chunk *chunk);
 
 /* How a chunk is listed (select_list.c). What any kind of chunk is drawn by, radii as they are: */
 struct spl_draw_chunk spl_walk_begin(const struct spl_walk *w, const struct spl_chunk *chunk, const double origin[3]);
-/* Where its box lies; its splats or panels are counted for all samples that they may reach (`counted` NULL: nowhere). */
+/* Where its box lies; its splats or panels are counted for all samples that they may reach (`counted` NULL:
+ * nowhere). */
 struct spl_walk_reach spl_walk_project(const struct spl_walk *w, struct spl_occupancy *counted,
                                        const struct spl_view_box *box, uint32_t count);
 /* Marks the cells that the stations of a chunk, whose box is `box`, give colours to; returns the station that trims it,

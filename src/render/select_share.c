@@ -1,6 +1,6 @@
 /* Listing by several cores: a GPU draws a million splats while one core lists them. The walk through the tree, which
- * asks for pages, stays in turn and says which nodes are drawn; what each lists depends on nothing but itself. Pieces of
- * neighbouring nodes have lists of their own, which are put together in the order of the walk, and each core counts
+ * asks for pages, stays in turn and says which nodes are drawn; what each lists depends on nothing but itself. Pieces
+ * of neighbouring nodes have lists of their own, which are put together in the order of the walk, and each core counts
  * what may fall on a sample by itself: sums of integers. So the list is the same for any number of cores. */
 #include <stdlib.h>
 

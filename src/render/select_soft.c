@@ -1,5 +1,6 @@
-/* What of a chunk is soft, as it is listed: solid, soft, or both with marks, which are made once for all windows; and what
- * of it is drawn at all. Where nothing is soft, or nothing of a chunk, and all of it is drawn, it is listed as ever. */
+/* What of a chunk is soft, as it is listed: solid, soft, or both with marks, which are made once for all windows; and
+ * what of it is drawn at all. Where nothing is soft, or nothing of a chunk, and all of it is drawn, it is listed as
+ * ever. */
 #include <math.h>
 #include <string.h>
 
@@ -22,7 +23,8 @@ bool spl_walk_clip(struct spl_walk *w, const struct spl_chunk *chunk, const stru
 {
     if (!w->params->clip)
         return true;
-    spl_clip_judge(w->params->clip, &w->clip_shapes, w->tables, (uint32_t)(chunk - w->tables->chunks), box, &w->clipped);
+    spl_clip_judge(w->params->clip, &w->clip_shapes, w->tables, (uint32_t)(chunk - w->tables->chunks), box,
+                   &w->clipped);
     return !w->clipped.dropped;
 }
 
@@ -146,8 +148,8 @@ int spl_walk_list_marks(struct spl_walk *w, const struct spl_draw_origin *from, 
     w->soft_marks = 0;
     if (w->judged.soft && w->params->draws_soft)
         rc = list_clips(w, from, chunk, clip->center_tests, clip->at_center,
-                        w->judged.solid || w->judged.test_words ? SPL_TESTS_OF_SOFT : SPL_TESTS_OF_ALL_SOFT, &w->soft_marks,
-                        err);
+                        w->judged.solid || w->judged.test_words ? SPL_TESTS_OF_SOFT : SPL_TESTS_OF_ALL_SOFT,
+                        &w->soft_marks, err);
     const uint32_t *tests = cut ? clip->value_tests : clip->center_tests;
     const uint32_t count = cut ? clip->by_value : clip->at_center;
     if (!rc && w->judged.solid && (count || w->judged.test_words))

@@ -19,9 +19,11 @@ enum { name_count = sizeof names / sizeof *names };
 
 static int refuse(const char *text, const char *why, struct spl_error *err)
 {
-    return spl_fail_field(err, SPL_E_INPUT, "shade",
-                          "shade '%.48s': %s; write auto, none, edl, headlight, sun:AZIMUTH,ELEVATION, or several of the "
-                          "last three joined by +", text, why);
+    return spl_fail_field(
+        err, SPL_E_INPUT, "shade",
+        "shade '%.48s': %s; write auto, none, edl, headlight, sun:AZIMUTH,ELEVATION, or several of the "
+        "last three joined by +",
+        text, why);
 }
 
 /* ":120,35"; where it ends, NULL where it is none. */

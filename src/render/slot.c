@@ -28,7 +28,8 @@ uint32_t spl_slot_count(const struct spl_dataset *dataset)
     return spl_slot_of_tables(dataset, by_page ? spl_dataset_get_info(dataset)->pages : 0);
 }
 
-bool spl_slot_is_tables(const struct spl_dataset *dataset, uint32_t slot)
+/* Are they a page's tables? They lie behind all others. */
+static bool is_tables(const struct spl_dataset *dataset, uint32_t slot)
 {
     return slot >= spl_slot_count_resident(dataset);
 }
@@ -36,7 +37,7 @@ bool spl_slot_is_tables(const struct spl_dataset *dataset, uint32_t slot)
 size_t spl_slot_get_bytes(const struct spl_dataset *dataset, uint32_t slot)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    if (spl_slot_is_tables(dataset, slot))
+    if (is_tables(dataset, slot))
         return spl_dataset_get_tables_bytes(dataset, slot - spl_slot_of_tables(dataset, 0));
     if (slot >= spl_slot_of_map(dataset, 0))
         return spl_dataset_get_map_bytes(dataset, slot - spl_slot_of_map(dataset, 0));
@@ -51,7 +52,7 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
 {
     const struct spl_dataset *dataset = source;
     uint32_t pages = spl_dataset_get_info(dataset)->pages;
-    if (spl_slot_is_tables(dataset, slot))
+    if (is_tables(dataset, slot))
         return spl_dataset_read_tables(dataset, slot - spl_slot_of_tables(dataset, 0), out, err);
     if (slot >= spl_slot_of_map(dataset, 0))
         return spl_dataset_read_map(dataset, slot - spl_slot_of_map(dataset, 0), out, err);

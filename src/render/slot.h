@@ -16,9 +16,6 @@ enum { SPL_FIRST_SLOT = 0 };
 
 uint32_t spl_slot_count(const struct spl_dataset *dataset);
 
-/* Are they a page's tables? They lie behind all others. */
-bool spl_slot_is_tables(const struct spl_dataset *dataset, uint32_t slot);
-
 /* How many slots are for the device, the slot of a station's map, and that of a page's tables. */
 uint32_t spl_slot_count_resident(const struct spl_dataset *dataset);
 uint32_t spl_slot_of_map(const struct spl_dataset *dataset, uint32_t map);

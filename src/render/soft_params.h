@@ -4,8 +4,8 @@
 
 #include <splatd/render.h>
 
-/* Does a view show soft spheres, if there are any? Not where nothing is soft, nothing of it is drawn, or its layers speak
- * of the solid alone. */
+/* Does a view show soft spheres, if there are any? Not where nothing is soft, nothing of it is drawn, or its layers
+ * speak of the solid alone. */
 bool spl_view_shows_soft(const struct spl_view *view);
 
 #endif

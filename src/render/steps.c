@@ -1,11 +1,11 @@
 /* A frame from its first tile to its last, one tile a step, or a piece of one that is too much work for a step.
  *
- * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of the
- * next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill plan, which
- * is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was drawn before
- * it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for its first pages
- * has none. A camera that is no one pinhole is drawn face by face, each as a frame of its own, and looked up in them at the
- * end (around.h). Belongs to the renderer's thread. */
+ * Invariant: between steps a frame holds nothing on the device and nothing of the scratch: its images, the places of
+ * the next tile and of the pieces of this one, what is walked of a piece that gave way (soft/pause.h), and the fill
+ * plan, which is the whole image's, are all on the host. So frames may take turns, and a tile is the same whatever was
+ * drawn before it, and in one or in pieces. Images are made when there is a tile to put into them: one that waits for
+ * its first pages has none. A camera that is no one pinhole is drawn face by face, each as a frame of its own, and
+ * looked up in them at the end (around.h). Belongs to the renderer's thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,17 +15,17 @@
 #include "base/sized.h"
 #include "geom/size.h"
 #include "image/enlarge.h"
-#include "image/rows.h"
 #include "render/advance.h"
 #include "render/around.h"
+#include "render/borrowed.h"
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
-#include "render/readback.h"
 #include "render/turns.h"
 #include "render/view.h"
 
-enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 }; /* a step; 10 ms of a core or two */
+/* A step: 10 ms of a core or two. */
+enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 };
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
 enum { mapped_samples = 1 << 19 };
@@ -56,54 +56,6 @@ static bool is_enlarged(const struct spl_frame_steps *steps)
 static struct spl_frame *get_made(struct spl_frame_steps *steps)
 {
     return is_enlarged(steps) ? &steps->enlarged : &steps->frame;
-}
-
-static int check_image(const struct spl_image *image, const struct spl_view *view, struct spl_error *err)
-{
-    const uint32_t unit = sizeof(uint32_t); /* pixels are stored as words */
-    if ((unsigned)image->layer >= SPL_LAYER_COUNT || !(view->layers >> image->layer & 1))
-        return spl_fail_field(err, SPL_E_USAGE, "images", "an image is of layer %d, which the view does not have",
-                              (int)image->layer);
-    if (image->type != spl_readback_type(image->layer) || image->width != view->camera.width ||
-        image->height != view->camera.height)
-        return spl_fail_field(err, SPL_E_USAGE, "images",
-                              "the image of layer %s has another type or size than the view",
-                              spl_layer_name(image->layer));
-    if (!image->pixels || (uintptr_t)image->pixels % unit || image->row_bytes % unit ||
-        spl_image_row_bytes(image) < (size_t)image->width * spl_pixel_bytes(image->type) ||
-        image->row_bytes > SIZE_MAX / 2 / image->height)
-        return spl_fail_field(err, SPL_E_USAGE, "images",
-                              "the image of layer %s has no pixels, or pixels or row_bytes that are no multiple of %u, "
-                              "or rows that overlap or do not fit into memory",
-                              spl_layer_name(image->layer), unit);
-    return SPL_OK;
-}
-
-static int borrow_images(struct spl_frame_steps *steps, const struct spl_render_options *options,
-                         struct spl_error *err)
-{
-    if (options->image_count && !options->images)
-        return spl_fail_field(err, SPL_E_USAGE, "images", "there are %zu images, but images is NULL",
-                              options->image_count);
-    for (size_t i = 0; i < options->image_count; i++) {
-        const struct spl_image *image = &options->images[i];
-        int rc = check_image(image, &steps->wanted, err);
-        if (rc)
-            return rc;
-        if (steps->borrowed >> image->layer & 1)
-            return spl_fail_field(err, SPL_E_USAGE, "images", "there are two images of layer %s",
-                                  spl_layer_name(image->layer));
-        get_made(steps)->images[image->layer] = *image;
-        steps->borrowed |= 1u << image->layer;
-    }
-    return SPL_OK;
-}
-
-static void give_images_back(struct spl_frame_steps *steps)
-{
-    for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
-        if (steps->borrowed >> layer & 1)
-            get_made(steps)->images[layer] = (struct spl_image){0};
 }
 
 /* A share of the size, to be enlarged. */
@@ -183,7 +135,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!rc && steps->around && spl_around_is_empty(steps->around))
         steps->y = steps->view.camera.height; // there is nothing to draw
     if (!rc && options)
-        rc = borrow_images(steps, options, err);
+        rc = spl_frame_borrow_images(get_made(steps), &steps->wanted, options, &steps->borrowed, err);
     if (!rc && !handed_out && steps->borrowed != steps->wanted.layers)
         rc = spl_fail_field(err, SPL_E_USAGE, "images", "layers %#x have neither an image nor a frame",
                             steps->wanted.layers & ~steps->borrowed);
@@ -390,7 +342,7 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
     if (!steps)
         return;
     struct spl_frame *made = get_made(steps);
-    give_images_back(steps);
+    spl_frame_give_images_back(made, steps->borrowed);
     if (frame && !spl_frame_get_samples_left(steps)) {
         steps->enlarged.stats = steps->frame.stats;
         *frame = *made;

@@ -10,7 +10,8 @@ enum { SPL_TERM_FAULT_MAX = 128 };
 /* What a shape is called in terms: "axis", "plane", "box", "polygon", "z" for any coordinate; NULL for attributes. */
 const char *spl_term_shape_name(enum spl_term_measure measure);
 
-/* Is it in range? Else `fault` goes on from "the term": "has a direction without length". `corners`: x, y of all terms. */
+/* Is it in range? Else `fault` goes on from "the term": "has a direction without length". `corners`: x, y of all
+ * terms. */
 bool spl_term_check(const struct spl_term *term, const double *corners, char fault[SPL_TERM_FAULT_MAX]);
 
 /* Is it the inside of a box or a polygon, as it is where nothing more is said? */

@@ -103,7 +103,8 @@ bool spl_terms_hint_name(const struct spl_term *term, const struct spl_dataset_i
         const bool above = isfinite(term->least) || !isfinite(term->most);
         const double end = above ? term->least : term->most;
         spl_decimal_print(isfinite(end) && term->measure == SPL_TERM_ATTRIBUTE ? end : 0, at);
-        snprintf(hint, SPL_TERMS_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<', at);
+        snprintf(hint, SPL_TERMS_HINT_MAX, "coordinates are x, y and z: write '%c%c%s'", 'x' + axis, above ? '>' : '<',
+                 at);
         return true;
     }
     if (near)

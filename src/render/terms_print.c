@@ -1,5 +1,5 @@
-/* Writes terms so that they read as the same terms (splatd/terms.h has the syntax). Like snprintf(), writes what there is
- * room for and says how long the whole is; nothing is allocated. Pure functions, any thread. */
+/* Writes terms so that they read as the same terms (splatd/terms.h has the syntax). Like snprintf(), writes what there
+ * is room for and says how long the whole is; nothing is allocated. Pure functions, any thread. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>

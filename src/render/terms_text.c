@@ -398,7 +398,8 @@ int spl_terms_parse_classes(const char *text, struct spl_terms *out, struct spl_
         const struct spl_term *one = &read.terms[i];
         const double ends[2] = {one->least, one->most};
         for (int k = 0; k < 2; k++)
-            if (one->measure != SPL_TERM_ATTRIBUTE || (isfinite(ends[k]) && !(ends[k] >= 0 && ends[k] <= UINT32_MAX && ends[k] == floor(ends[k]))))
+            if (one->measure != SPL_TERM_ATTRIBUTE ||
+                (isfinite(ends[k]) && !(ends[k] >= 0 && ends[k] <= UINT32_MAX && ends[k] == floor(ends[k]))))
                 return fail(&r, "classes are whole numbers from 0 on; write 2,6 or 3-5");
     }
     skip_blanks(&r);

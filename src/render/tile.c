@@ -65,27 +65,36 @@ static bool is_of(const struct spl_dispatch *what, const struct spl_draw_key *ke
            (!what->by_texture || (what->planes == key->planes && what->smooth == key->smooth));
 }
 
-int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
-                              struct spl_error *err)
+/* Those of each bit of `needed`, a set of chunks' ends; `clips`: they are told which they cut. */
+static int get_kernels(struct spl_tile *tile, struct spl_kernel_key *key, uint64_t needed, bool clips,
+                       struct spl_disc_kernels *out, struct spl_error *err)
 {
     enum { clipped_constant = 2 };
     struct spl_renderer *r = tile->renderer;
-    uint64_t needed = 1;
     int rc = SPL_OK;
+    for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
+        if (clips)
+            key->constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
+        key->constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
+        key->constants[SPL_CONSTANT_CUT] = cut_constant(&r->list, ends);
+        key->trims = ends & SPL_ENDS_TRIMMED;
+        if (needed >> ends & 1)
+            rc = spl_kernels_get(&r->kernels, r->gpu, key, &out->of[ends], err);
+    }
+    return rc;
+}
+
+int spl_tile_get_disc_kernels(struct spl_tile *tile, struct spl_kernel_key key, struct spl_disc_kernels *out,
+                              struct spl_error *err)
+{
+    struct spl_renderer *r = tile->renderer;
+    uint64_t needed = 1;
     for (size_t i = 0; i < r->list.batch_count; i++)
         if (r->list.batches[i].key.role == SPL_ROLE_SOLID)
             needed |= UINT64_C(1) << ends_of(&r->list, &r->list.batches[i].key);
     *out = (struct spl_disc_kernels){.lanes = r->shares ? SPL_WORKGROUP : 0};
     key.shared = r->shares;
-    for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
-        key.constants[clipped_constant] = ends & SPL_ENDS_CLIPPED;
-        key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
-        key.constants[SPL_CONSTANT_CUT] = cut_constant(&r->list, ends);
-        key.trims = ends & SPL_ENDS_TRIMMED;
-        if (needed >> ends & 1)
-            rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
-    }
-    return rc;
+    return get_kernels(tile, &key, needed, true, out, err);
 }
 
 int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key, const struct spl_dispatch *what,
@@ -93,22 +102,15 @@ int spl_tile_get_plain_kernels(struct spl_tile *tile, struct spl_kernel_key key,
 {
     struct spl_renderer *r = tile->renderer;
     uint64_t needed = 0;
-    int rc = SPL_OK;
     for (size_t i = 0; i < r->list.batch_count; i++)
         if (is_of(what, &r->list.batches[i].key))
             needed |= UINT64_C(1) << (ends_of(&r->list, &r->list.batches[i].key) & ~(uint32_t)SPL_ENDS_CLIPPED);
     *out = (struct spl_disc_kernels){0};
-    for (uint32_t ends = 0; ends < SPL_ENDS_COUNT && !rc; ends++) {
-        key.constants[SPL_CONSTANT_MARKED] = ends & SPL_ENDS_MARKED ? 1 : 0;
-        key.constants[SPL_CONSTANT_CUT] = cut_constant(&r->list, ends);
-        key.trims = ends & SPL_ENDS_TRIMMED;
-        if (needed >> ends & 1)
-            rc = spl_kernels_get(&r->kernels, r->gpu, &key, &out->of[ends], err);
-    }
-    return rc;
+    return get_kernels(tile, &key, needed, false, out, err);
 }
 
-/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks or cuts. */
+/* The kernel of chunks with `ends`: one that looks for fewer of them does, but never one without their marks or
+ * cuts. */
 static struct spl_gpu_kernel *kernel_of(const struct spl_disc_kernels *kernels, uint32_t ends)
 {
     if (!kernels->of[ends])

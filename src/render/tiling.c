@@ -54,8 +54,8 @@ static void widen(const struct spl_reach *reach, uint32_t side, uint32_t size, u
     *to = *to > (int64_t)size * side + reach->guard ? (int64_t)size * side + reach->guard : *to;
 }
 
-/* Do backs of discs lie behind what faces the eye? Only where sides are not guessed: a room turned inside out would show
- * its neighbours' walls. */
+/* Do backs of discs lie behind what faces the eye? Only where sides are not guessed: a room turned inside out would
+ * show its neighbours' walls. */
 static bool has_sides(const struct spl_dataset_info *info, const struct spl_view *view)
 {
     return info->has_sides || info->panels || info->meshes || (info->maps && spl_view_get_maps(view));

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/sized.h"
+#include "geom/distortion.h"
 #include "geom/faces.h"
 #include "geom/ray_list.h"
 #include "geom/size.h"
@@ -39,8 +40,7 @@ static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
 {
     return a->projection == b->projection && a->width == b->width && a->height == b->height && a->fx == b->fx &&
            a->fy == b->fy && a->cx == b->cx && a->cy == b->cy && a->near == b->near && a->far == b->far &&
-           a->lens.kind == b->lens.kind && a->lens.reach == b->lens.reach &&
-           !memcmp(a->lens.k, b->lens.k, sizeof a->lens.k) && !memcmp(a->lens.p, b->lens.p, sizeof a->lens.p);
+           spl_distortion_is_same(&a->lens, &b->lens);
 }
 
 /* What samples are taken of. */
@@ -58,8 +58,8 @@ bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b)
     return is_same_lens(&mine, &other);
 }
 
-/* Pixels of the faces that the view is looked up in; 0 where it is in none. Tracing a lens takes up to two milliseconds,
- * and is asked for several times of a request and of each view of a batch: the last ones are kept. */
+/* Pixels of the faces that the view is looked up in; 0 where it is in none. Tracing a lens takes up to two
+ * milliseconds, and is asked for several times of a request and of each view of a batch: the last ones are kept. */
 static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, struct spl_error *err)
 {
     static _Thread_local struct {
@@ -124,8 +124,9 @@ static int check_around(const struct spl_view *view, struct spl_error *err)
                                                                         : spl_projection_name(camera->projection));
     int rc = count_face_pixels(view, &faces, err);
     if (!rc && faces > PIXELS_MAX)
-        rc = spl_fail_field(err, SPL_E_LIMIT, view->rays ? "resolution" : "width", "%llu pixels of a cube around the eye are more than %llu",
-                            (unsigned long long)faces, PIXELS_MAX);
+        rc = spl_fail_field(err, SPL_E_LIMIT, view->rays ? "resolution" : "width",
+                            "%llu pixels of a cube around the eye are more than %llu", (unsigned long long)faces,
+                            PIXELS_MAX);
     return rc;
 }
 
@@ -139,11 +140,11 @@ static int check_rays(const struct spl_view *view, struct spl_error *err)
     if (!view->rays)
         return SPL_OK;
     if (camera->width != 1 || camera->height != view->rays->count)
-        return spl_fail_field(err, SPL_E_USAGE, "rays", "%u rays are an image of 1 x %u pixels, not %u x %u", view->rays->count,
-                              view->rays->count, camera->width, camera->height);
+        return spl_fail_field(err, SPL_E_USAGE, "rays", "%u rays are an image of 1 x %u pixels, not %u x %u",
+                              view->rays->count, view->rays->count, camera->width, camera->height);
     if (view->supersample < 1)
-        return spl_fail_field(err, SPL_E_INPUT, "supersample", "supersample %g enlarges images; rays take a coarser resolution",
-                              view->supersample);
+        return spl_fail_field(err, SPL_E_INPUT, "supersample",
+                              "supersample %g enlarges images; rays take a coarser resolution", view->supersample);
     return SPL_OK;
 }
 
@@ -155,7 +156,8 @@ static int check(const struct spl_view *view, struct spl_error *err)
     if (view->camera.width > SPL_VIEW_SIDE_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "width", "width %u is above %d", view->camera.width, SPL_VIEW_SIDE_MAX);
     if (view->camera.height > SPL_VIEW_SIDE_MAX && !view->rays)
-        return spl_fail_field(err, SPL_E_LIMIT, "height", "height %u is above %d", view->camera.height, SPL_VIEW_SIDE_MAX);
+        return spl_fail_field(err, SPL_E_LIMIT, "height", "height %u is above %d", view->camera.height,
+                              SPL_VIEW_SIDE_MAX);
     if ((uint64_t)view->camera.width * view->camera.height > PIXELS_MAX)
         return spl_fail_field(err, SPL_E_LIMIT, "width", "%u x %u pixels are more than %llu", view->camera.width,
                               view->camera.height, PIXELS_MAX);

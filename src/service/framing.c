@@ -62,8 +62,9 @@ static bool follows(struct framing *framing, const char *name, size_t name_lengt
         return true;
     if (name < framing->begin || !value || value < name + name_length || value + value_length > framing->end)
         return false; // folded: it was put together elsewhere
-    bool plain = (!framing->at || (name > framing->at && name <= framing->at + line_end && is_blank(framing->at, name, ""))) &&
-                 is_blank(name + name_length, value, " \t");
+    bool plain =
+        (!framing->at || (name > framing->at && name <= framing->at + line_end && is_blank(framing->at, name, ""))) &&
+        is_blank(name + name_length, value, " \t");
     framing->at = value + value_length;
     return plain;
 }

@@ -48,7 +48,8 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
                            const struct spl_encoded *encoded)
 {
     enum spl_format format = spl_view_get_encoding(request, layer).format;
-    spl_headers_add(headers, "Content-Type", "%s", request->listed ? "application/json" : spl_format_media_type(format));
+    spl_headers_add(headers, "Content-Type", "%s",
+                    request->listed ? "application/json" : spl_format_media_type(format));
     if (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE)
         return;
     if (format == SPL_FORMAT_TIFF) { // heights
@@ -90,15 +91,18 @@ static void write_lens(const struct spl_camera *camera, char *out, size_t bytes)
     if (straight && lens->reach < M_PI)
         snprintf(out, bytes / 2, ",\"fov\":%.17g", lens->reach * 360 / M_PI);
     else if (fisheye && !straight)
-        snprintf(out, bytes / 2, ",\"model\":\"OPENCV_FISHEYE\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g]",
+        snprintf(out, bytes / 2,
+                 ",\"model\":\"OPENCV_FISHEYE\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g]",
                  camera->fx, camera->fy, camera->cx, camera->cy, k[0], k[1], k[2], k[3]);
     else if (lens->kind == SPL_DISTORTION_RADIAL)
         snprintf(out, bytes / 2,
-                 ",\"model\":\"FULL_OPENCV\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g]",
+                 ",\"model\":\"FULL_OPENCV\",\"params\":[%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%."
+                 "17g,%.17g]",
                  camera->fx, camera->fy, camera->cx, camera->cy, k[0], k[1], p[0], p[1], k[2], k[3], k[4], k[5]);
 }
 
-void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera)
+/* The camera that was used, as JSON. */
+static void add_camera(struct spl_headers *headers, const struct spl_camera *camera)
 {
     const double *r = camera->rotation, *eye = camera->eye;
     char far[32] = "null", lens[1024], text[2048]; // JSON has no infinity
@@ -168,7 +172,7 @@ void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_req
     else
         spl_headers_add_layer(headers, request, request->layer, encoded);
     spl_headers_add(headers, "Splatd-Unit", "%s", request->encode.unit);
-    spl_headers_add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
+    add_camera(headers, request->picks ? &request->pick.camera : &request->view.camera);
     if (request->view.soft.what.count)
         add_soft(headers, &request->view.soft);
     if (request->view.clip.count)

@@ -44,7 +44,4 @@ void spl_headers_add_layer(struct spl_headers *headers, const struct spl_view_re
 void spl_headers_add_view(struct spl_headers *headers, const struct spl_view_request *request,
                           const struct spl_encoded *encoded);
 
-/* The camera that was used, as JSON. */
-void spl_headers_add_camera(struct spl_headers *headers, const struct spl_camera *camera);
-
 #endif

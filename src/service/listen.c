@@ -104,9 +104,10 @@ int spl_listen(const char *field, const char *address, int *fd, char *url, size_
     int failed = errno;
     freeaddrinfo(found);
     if (*fd < 0)
-        return spl_fail_field(err, SPL_E_IO, field,
-                              "cannot listen on %s: %s; --%s takes another address, as 127.0.0.1:0 for any port that is free",
-                              address, strerror(failed), field);
+        return spl_fail_field(
+            err, SPL_E_IO, field,
+            "cannot listen on %s: %s; --%s takes another address, as 127.0.0.1:0 for any port that is free", address,
+            strerror(failed), field);
     spl_listen_print(*fd, url, url_capacity);
     return 0;
 }

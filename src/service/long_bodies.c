@@ -1,6 +1,6 @@
-/* The few bodies that may be long at a time. A place is taken once a body is longer than others may be, and kept only by
- * who goes on sending: a client that dawdles is cut as soon as another wants its place, and left alone while nobody does.
- * So whoever would keep all places has to send 256 KiB to each of them every 5 s. Owned by the loop's thread. */
+/* The few bodies that may be long at a time. A place is taken once a body is longer than others may be, and kept only
+ * by who goes on sending: a client that dawdles is cut as soon as another wants its place, and left alone while nobody
+ * does. So whoever would keep all places has to send 256 KiB to each of them every 5 s. Owned by the loop's thread. */
 #include <stdlib.h>
 
 #include "base/clock.h"

@@ -16,8 +16,8 @@ void spl_reply_error(struct request *request, const struct spl_error *err); /* s
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
 void spl_reply_empty(struct request *request, unsigned status);
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
-/* 200; `release` gets `context` once `bytes` have been sent, not after failure. What is long is handed on in pieces: the
- * kernel takes all it is given and carries it to a near client at once, 16 MB in 18 ms of the loop. */
+/* 200; `release` gets `context` once `bytes` have been sent, not after failure. What is long is handed on in pieces:
+ * the kernel takes all it is given and carries it to a near client at once, 16 MB in 18 ms of the loop. */
 void spl_reply_bytes(struct request *request, const void *bytes, size_t length, void (*release)(void *), void *context);
 /* 200, of a length that nobody knows when it begins; `destroy` gets `context` with the last of the reply, not after
  * failure. The only way to such a reply, HEAD included. */

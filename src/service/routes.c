@@ -68,8 +68,8 @@ static void show_status(struct request *request, const struct spl_call *call)
     spl_reply_json(request, spl_describe_status(request));
 }
 
-/* "{id}" stands for a dataset, "{n}" for a number, "{z}/{x}/{y}" for a tile, "{name}" for any other segment. Methods of one pattern that need
- * different scopes are rows of their own. */
+/* "{id}" stands for a dataset, "{n}" for a number, "{z}/{x}/{y}" for a tile, "{name}" for any other segment. Methods of
+ * one pattern that need different scopes are rows of their own. */
 static const struct route {
     const char *pattern;
     unsigned methods;
@@ -98,7 +98,7 @@ static const struct route {
     {"/v1/datasets/{id}/tiles/{z}/{x}/{y}", GET, SPL_SCOPE_VIEW, true, spl_make_tile},
     {"/v1/datasets/{id}/view", GET | POST, SPL_SCOPE_VIEW, true, spl_make_view},
     {"/v1/datasets/{id}/thumbnail.jpg", GET, SPL_SCOPE_VIEW, true, spl_make_thumbnail},
-    {"/v1/datasets/{id}/views/{name}", PUT, SPL_SCOPE_ADMIN, false, spl_put_saved_view}, // before the body, and behind it
+    {"/v1/datasets/{id}/views/{name}", PUT, SPL_SCOPE_ADMIN, false, spl_put_saved_view}, // before and behind the body
     {"/v1/datasets/{id}/views/{name}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_saved_view},
     {"/v1/datasets/{id}/tours", POST, SPL_SCOPE_TOUR, false, spl_create_tour},
     {"/v1/tours", GET, SPL_SCOPE_TOUR, false, spl_list_tours},
@@ -111,7 +111,7 @@ static const struct route {
     {"/v1/tours/{name}/video.mp4", GET, SPL_SCOPE_TOUR, false, spl_show_tour_video},
     {"/v1/datasets/{id}/views", POST, SPL_SCOPE_VIEW, false, spl_make_views},
     {"/v1/datasets/{id}/pick", GET | POST, SPL_SCOPE_VIEW, true, spl_pick},
-    {"/v1/datasets/{id}/rays", POST, SPL_SCOPE_VIEW, true, spl_make_rays}, // before the body, and behind it; its query goes with NPY
+    {"/v1/datasets/{id}/rays", POST, SPL_SCOPE_VIEW, true, spl_make_rays}, // the same; its query goes with NPY
 };
 
 /* What a path has in the holes of a pattern, still encoded. */

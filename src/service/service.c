@@ -316,7 +316,8 @@ done:
         close(service->http->listen_fd);
     finish_loop(service);
     spl_tours_close(service->tours);
-    bool idle = spl_remote_wait_idle(spl_now_ns() + 1500 * SPL_NS_PER_MS); // they have been cancelled, and look at the library's flag
+    // reads from servers have been cancelled, and look at the library's flag
+    bool idle = spl_remote_wait_idle(spl_now_ns() + 1500 * SPL_NS_PER_MS);
     end_in(service, 0);
     if (!idle)
         return rc; // with what they look at: the process is about to end

@@ -48,10 +48,7 @@ struct spl_training {
 /* Bits that a further atom is taken to cost while training. */
 float spl_training_price(const struct spl_training *t);
 
-/* The unit in which atom a's coefficients are stored, and an estimate of their bits. Rounding by steps of Δ adds Δ²/12
- * a coefficient to the error of each use, times its squared weight; with a further bit a coefficient 3/4 of that go.
- * With lambda the step is where that is worth its bits, d(error)/d(bits) = 2 ln 2 · power · Δ²/12 = lambda. */
-float spl_training_step(const struct spl_training *t, uint32_t a);
+/* An estimate of the bits of atom a's coefficients. */
 double spl_training_atom_bits(const struct spl_training *t, uint32_t a);
 
 /* Squared error at which a texture needs no atom. */

@@ -4,7 +4,7 @@
  * some five times cheaper than a walk through the hierarchy. */
 #include "synth/beam.h"
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 enum { stack_max = 128 }; /* as deep as the hierarchy */
 

@@ -7,7 +7,7 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 uint32_t spl_build_object(struct spl_scene *scene, const char *name)
 {

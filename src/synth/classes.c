@@ -67,8 +67,9 @@ static int mark_list(const struct spl_scene *scene, const char *field, const cha
             for (size_t i = 0; i < scene->object_count; i++)
                 if (strlen(names) + strlen(scene->objects[i]) + 3 < sizeof names)
                     strcat(strcat(names, i ? ", " : ""), scene->objects[i]);
-            return spl_fail_field(err, SPL_E_USAGE, field, "%s has no object '%.*s'; it has: %s; or class:5 and the like",
-                                  scene->name, (int)length, at, names);
+            return spl_fail_field(err, SPL_E_USAGE, field,
+                                  "%s has no object '%.*s'; it has: %s; or class:5 and the like", scene->name,
+                                  (int)length, at, names);
         }
         at = at[length] ? at + length + 1 : NULL;
     }

@@ -6,7 +6,7 @@
 
 #include "synth/footprint.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double separation = 0.5;     /* metres between two returns of a pulse */
 static const double brightest_weak = 0.5; /* albedo below which a surface loses more returns */

@@ -19,7 +19,7 @@
 #include "synth/lens.h"
 #include "synth/light.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 enum {
     base_samples = 16,   /* a pixel without edges gets these */

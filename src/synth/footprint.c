@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double finest = 0.006; /* metres between samples; edges of textures are ramps of 5 mm */
 static const double longest = 4;    /* of a patch at a grazing angle, times its width across the ray */

@@ -1,7 +1,8 @@
 /* LAS 1.4, point format 7 (colour, GPS time): what mobile and airborne scans come in. Coordinates are whole tenths of a
  * millimetre around the scene's offset, which reaches 214 km. Colours are the 8 bit ones times 257, which is what the
- * format asks for. The coordinate system is one of the scene's own, in metres. Classes are 0, "never classified", unless they were asked for; a point's source is its pass, counted from 1. Written for
- * little-endian and other machines alike. Pure functions; any thread. */
+ * format asks for. The coordinate system is one of the scene's own, in metres. Classes are 0, "never classified",
+ * unless they were asked for; a point's source is its pass, counted from 1. Written for little-endian and other
+ * machines alike. Pure functions; any thread. */
 #include "synth/format.h"
 
 #include <endian.h>
@@ -11,7 +12,8 @@
 
 enum { header_bytes = 375, record_bytes = 36 };
 enum { record_header_bytes = 54, wkt_record = 2112, records_end = header_bytes + record_header_bytes };
-static const char wkt[] = "LOCAL_CS[\"splatd synth\",UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH]]"; /* with its NUL */
+/* With its NUL. */
+static const char wkt[] = "LOCAL_CS[\"splatd synth\",UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH]]";
 static const double scale = 0.0001;
 static const double pulse_seconds = 1e-6;
 

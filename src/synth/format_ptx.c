@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static char *put_digits(char *to, uint64_t value, int at_least)
 {

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 struct spl_lens spl_lens_of_camera(const struct spl_camera *camera, const double offset[3])
 {

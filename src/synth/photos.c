@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 enum { tries = 64, ways = 3 };
 static const double clearance = 0.5;   /* metres */

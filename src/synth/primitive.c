@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static bool nearer(double candidate, double *t)
 {

@@ -4,7 +4,7 @@
 
 #include "base/error.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double lowest = -60, highest = 90; /* elevations of a tripod, degrees */
 

@@ -6,7 +6,7 @@
 #include <stdatomic.h>
 
 #include "base/parallel.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 enum {
     coarse_pulses = 1440 * 600,    /* a pass; 3.5 million over four stations tell the share of returns within 0.1 % */

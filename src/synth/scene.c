@@ -10,7 +10,7 @@
 #include "base/memory.h"
 #include "synth/build.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const struct {
     const char *name, *help;

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double ramp = 0.005;
 static const double finest_wave = 0.016;

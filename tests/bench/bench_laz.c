@@ -37,13 +37,13 @@ static int open_file(struct opened *f, const char *path)
     struct spl_laz_fault fault;
     if (spl_source_open(&f->source, path, NULL) || spl_source_peek(&f->source, 1 << 16, &head, &available, NULL))
         return -1;
-    uint64_t at = spl_laz_get16(head + 94);
-    f->points_at = spl_laz_get32(head + 96);
-    f->points = spl_laz_get32(head + 107) ? spl_laz_get32(head + 107) : spl_laz_get64(head + 247);
+    uint64_t at = spl_le_get16(head + 94);
+    f->points_at = spl_le_get32(head + 96);
+    f->points = spl_le_get32(head + 107) ? spl_le_get32(head + 107) : spl_le_get64(head + 247);
     while (at + 54 < available && memcmp(head + at + 2, "laszip encoded", 14) != 0)
-        at += 54u + spl_laz_get16(head + at + 20);
-    return spl_laz_format_read(&f->format, head + at + 54, spl_laz_get16(head + at + 20), head[104] & 0x3f,
-                               spl_laz_get16(head + 105), &fault);
+        at += 54u + spl_le_get16(head + at + 20);
+    return spl_laz_format_read(&f->format, head + at + 54, spl_le_get16(head + at + 20), head[104] & 0x3f,
+                               spl_le_get16(head + 105), &fault);
 }
 
 /* Milliseconds of processor and wall for a pass over the file, all of it several times if it is small. */

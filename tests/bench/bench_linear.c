@@ -15,7 +15,7 @@
 #include "pack/points.h"
 #include "pack/wires/wires.h"
 #include "synth/scene.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static double processor_seconds(void)
 {

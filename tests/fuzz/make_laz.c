@@ -42,8 +42,8 @@ int main(int argc, char **argv)
             uint8_t head[6] = {0, (uint8_t)points, (uint8_t)(later | 4), (uint8_t)extra, records - 1, 0};
             keep(laz, "chunk", points, version, head, sizeof head, chunk.bytes, chunk.count);
             if (points % 5 == 0) {
-                uint64_t start = spl_laz_get32(file.bytes + offset_to_points);
-                uint64_t table = later ? spl_laz_get64(file.bytes + file.count - 8) : spl_laz_get64(file.bytes + start);
+                uint64_t start = spl_le_get32(file.bytes + offset_to_points);
+                uint64_t table = later ? spl_le_get64(file.bytes + file.count - 8) : spl_le_get64(file.bytes + start);
                 head[0] = 1;
                 head[2] = (uint8_t)(later | (later ? 0 : 2));
                 head[4] = later ? records - 1 : 6; /* chunks of 7 */

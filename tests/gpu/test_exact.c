@@ -19,7 +19,7 @@
 #include "support/make_dataset.h"
 #include "synth/build.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double tolerance = 0.03; /* of a splat radius */
 static const double radius_of_spacing = 1.128379;

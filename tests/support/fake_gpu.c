@@ -57,10 +57,9 @@ static int fake_begin(struct spl_gpu *gpu, struct spl_error *err)
 }
 
 static void fake_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel,
-                          const struct spl_gpu_arguments *arguments, uint32_t workgroups,
-                          struct spl_gpu_buffer *counts, uint64_t offset)
+                          const struct spl_gpu_arguments *arguments, uint32_t workgroups)
 {
-    (void)gpu, (void)arguments, (void)workgroups, (void)counts, (void)offset;
+    (void)gpu, (void)arguments, (void)workgroups;
     fake.dispatches += kernel->code->storages.count;
 }
 

@@ -1,6 +1,7 @@
 /* See folder.h. */
 #include "support/folder.h"
 
+#include <dirent.h>
 #include <ftw.h>
 #include <stdio.h>
 #include <string.h>
@@ -36,6 +37,18 @@ const char *in_folder(const char *name)
     char *path = paths[next++ % 8];
     snprintf(path, sizeof *paths, "%s/%s", test_folder, name);
     return path;
+}
+
+size_t folder_count(const char *path)
+{
+    size_t count = 0;
+    DIR *dir = opendir(path);
+    if (!dir)
+        return 0;
+    for (struct dirent *entry; (entry = readdir(dir));)
+        count += entry->d_name[0] != '.';
+    closedir(dir);
+    return count;
 }
 
 void folder_put(const char *name, const void *bytes, size_t length)

@@ -14,6 +14,9 @@ int folder_remove(void **state);
 /* The path of `name` there; the eighth call from now writes over it. */
 const char *in_folder(const char *name);
 
+/* How many are in a folder, but for those that begin with a dot; 0 where it is none. */
+size_t folder_count(const char *path);
+
 void folder_put(const char *name, const void *bytes, size_t length);
 void folder_put_text(const char *name, const char *text);
 

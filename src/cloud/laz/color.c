@@ -100,7 +100,7 @@ static void v1_begin(void *state, unsigned bytes, const uint8_t *first)
 {
     struct rgb_v1 *s = state;
     for (unsigned k = 0; k < bytes / 2; k++)
-        s->rgb[k] = spl_laz_get16(first + 2 * k);
+        s->rgb[k] = spl_le_get16(first + 2 * k);
     spl_laz_integer_init(&s->byte, 8);
 }
 
@@ -135,7 +135,7 @@ static void v2_begin(void *state, unsigned bytes, const uint8_t *first)
 {
     struct rgb_v2 *s = state;
     for (unsigned k = 0; k < bytes / 2; k++)
-        s->rgb[k] = spl_laz_get16(first + 2 * k);
+        s->rgb[k] = spl_le_get16(first + 2 * k);
 }
 
 static void v2_read(void *state, struct spl_laz_coder *coder, struct spl_laz_arena *arena, uint8_t *item)

@@ -1,14 +1,14 @@
 /* The table of chunks where it lies: its offset stands before the first chunk, or, of writers that could not go back,
  * in the file's last eight bytes. A writer that was interrupted left none.
  *
- * Nothing of the file is trusted: no more is read of a table than its chunks can need, each of which has a point that is
- * stored as it is. The cloud's thread. */
+ * Nothing of the file is trusted: no more is read of a table than its chunks can need, each of which has a point that
+ * is stored as it is. The cloud's thread. */
 #include "cloud/laz/find_table.h"
 
 #include <stdlib.h>
 
 #include "base/memory.h"
-#include "cloud/laz/items.h"
+#include "cloud/little.h"
 
 enum { table_entry_bytes = 24 };
 
@@ -22,12 +22,12 @@ int spl_laz_table_find(struct spl_source *source, const struct spl_laz_format *f
     if (size - points_at < sizeof bytes)
         return spl_source_fail_at(source, points_at, "chunk table", err, "the file ends before the table's offset");
     int code = spl_source_read_at(source, points_at, bytes, sizeof bytes, err);
-    if (code == SPL_OK && spl_laz_get64(bytes) == UINT64_MAX)
+    if (code == SPL_OK && spl_le_get64(bytes) == UINT64_MAX)
         code = spl_source_read_at(source, size - sizeof bytes, bytes, sizeof bytes, err);
     if (code < 0)
         return code;
     out->begin = points_at + sizeof bytes;
-    at = spl_laz_get64(bytes);
+    at = spl_le_get64(bytes);
     bool interrupted = at == out->begin || at == points_at;
     if (!interrupted && at > out->begin && at < size) {
         uint64_t left = size - at, most = 8 + table_entry_bytes * ((at - out->begin) / format->record_bytes + 1);

@@ -6,7 +6,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "cloud/laz/items.h"
+#include "cloud/little.h"
 
 enum { head_bytes = 34, item_bytes = 6, at_coder = 2, at_chunk = 12, at_count = 32 };
 static const uint32_t variable_chunks = UINT32_MAX;
@@ -56,7 +56,7 @@ int spl_laz_fail(struct spl_laz_fault *fault, int code, uint64_t at, const char 
 static int read_item(struct spl_laz_format *format, const uint8_t *bytes, size_t at, unsigned points,
                      struct spl_laz_fault *fault)
 {
-    unsigned kind = spl_laz_get16(bytes), size = spl_laz_get16(bytes + 2), version = spl_laz_get16(bytes + 4);
+    unsigned kind = spl_le_get16(bytes), size = spl_le_get16(bytes + 2), version = spl_le_get16(bytes + 4);
     unsigned index = format->item_count, extra = points < 6 ? SPL_LAZ_BYTE : SPL_LAZ_BYTE14;
     unsigned wanted = index < 4 && items_of[points][index] ? items_of[points][index] : extra;
     if (index > 0 && format->items[index - 1].kind == extra)
@@ -87,8 +87,8 @@ int spl_laz_format_read(struct spl_laz_format *format, const uint8_t *bytes, siz
     if (length < head_bytes)
         return spl_laz_fail(fault, SPL_E_INPUT, 0, "LASzip record", "%zu bytes are fewer than its %d", length,
                             head_bytes);
-    unsigned compressor = spl_laz_get16(bytes), coder = spl_laz_get16(bytes + at_coder),
-             count = spl_laz_get16(bytes + at_count), expected = 0;
+    unsigned compressor = spl_le_get16(bytes), coder = spl_le_get16(bytes + at_coder),
+             count = spl_le_get16(bytes + at_count), expected = 0;
     if (compressor < SPL_LAZ_STREAM || compressor > SPL_LAZ_LAYERS)
         return spl_laz_fail(fault, SPL_E_UNSUPPORTED, 0, "compressor", "%u is not known here (1, 2 and 3 are)",
                             compressor);
@@ -106,7 +106,7 @@ int spl_laz_format_read(struct spl_laz_format *format, const uint8_t *bytes, siz
         return spl_laz_fail(fault, SPL_E_INPUT, at_count, "number of items", "%u do not fit the record's %zu bytes",
                             count, length);
     format->compressor = (uint8_t)compressor;
-    format->chunk_points = spl_laz_get32(bytes + at_chunk);
+    format->chunk_points = spl_le_get32(bytes + at_chunk);
     if (format->chunk_points == variable_chunks)
         format->chunk_points = 0;
     for (unsigned i = 0; i < count; i++) {

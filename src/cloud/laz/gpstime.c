@@ -114,7 +114,7 @@ static size_t v2_model_bytes(unsigned bytes)
 static void v2_begin(void *state, unsigned bytes, const uint8_t *first)
 {
     (void)bytes;
-    spl_laz_gpstime_begin(state, spl_laz_get64(first), true);
+    spl_laz_gpstime_begin(state, spl_le_get64(first), true);
 }
 
 static void v2_read(void *state, struct spl_laz_coder *coder, struct spl_laz_arena *arena, uint8_t *item)
@@ -145,7 +145,7 @@ static void v1_begin(void *state, unsigned bytes, const uint8_t *first)
 {
     struct gpstime_v1 *s = state;
     (void)bytes;
-    s->time = spl_laz_get64(first);
+    s->time = spl_le_get64(first);
     spl_laz_integer_init(&s->difference, 32);
 }
 

@@ -5,6 +5,7 @@
 
 #include "cloud/laz/coder.h"
 #include "cloud/laz/integer.h"
+#include "cloud/little.h"
 
 struct spl_laz_codec {
     size_t (*state_bytes)(unsigned bytes); /* of an item of so many bytes */
@@ -17,28 +18,7 @@ struct spl_laz_codec {
 extern const struct spl_laz_codec spl_laz_point10_v1, spl_laz_point10_v2, spl_laz_gpstime_v1, spl_laz_gpstime_v2,
     spl_laz_rgb_v1, spl_laz_rgb_v2, spl_laz_wavepacket_v1, spl_laz_bytes_v1, spl_laz_bytes_v2;
 
-/* Numbers of a record: little-endian, anywhere. */
-static inline uint16_t spl_laz_get16(const uint8_t *p)
-{
-    uint16_t v;
-    memcpy(&v, p, sizeof v);
-    return le16toh(v);
-}
-
-static inline uint32_t spl_laz_get32(const uint8_t *p)
-{
-    uint32_t v;
-    memcpy(&v, p, sizeof v);
-    return le32toh(v);
-}
-
-static inline uint64_t spl_laz_get64(const uint8_t *p)
-{
-    uint64_t v;
-    memcpy(&v, p, sizeof v);
-    return le64toh(v);
-}
-
+/* Numbers of a record, as those of cloud/little.h. */
 static inline void spl_laz_put16(uint8_t *p, uint16_t v)
 {
     v = htole16(v);

@@ -121,11 +121,11 @@ int spl_laz_layers_begin(struct spl_laz_layers *l, const uint8_t *bytes, size_t 
                             head);
     l->begin = bytes;
     l->begun = false;
-    l->left = spl_laz_get32(bytes + record);
+    l->left = spl_le_get32(bytes + record);
     uint64_t at = head;
     const uint8_t *size_at = bytes + record + 4;
     for (unsigned i = 0; i < layers; i++) {
-        uint32_t size = has_layer(l, i) ? spl_laz_get32(size_at) : 0,
+        uint32_t size = has_layer(l, i) ? spl_le_get32(size_at) : 0,
                  row = i < SPL_LAZ_LAYER_BYTES ? i : SPL_LAZ_LAYER_BYTES;
         if (size > length - at)
             return spl_laz_fail(fault, SPL_E_INPUT, (uint64_t)(size_at - bytes), name_layer(i),

@@ -6,15 +6,15 @@
 void spl_laz_fields_begin(struct spl_laz_channel *c, const uint8_t *record)
 {
     for (int k = 0; k < 8; k++) {
-        c->z_of[k] = spl_laz_get32(record + SPL_LAZ_AT_Z);
-        c->intensity_of[k] = spl_laz_get16(record + SPL_LAZ_AT_INTENSITY);
+        c->z_of[k] = spl_le_get32(record + SPL_LAZ_AT_Z);
+        c->intensity_of[k] = spl_le_get16(record + SPL_LAZ_AT_INTENSITY);
     }
     c->class = record[SPL_LAZ_AT_CLASS];
     c->flags = (uint8_t)((record[SPL_LAZ_AT_FLAGS] & 15) | (record[SPL_LAZ_AT_FLAGS] >> 6) << 4);
     c->user = record[SPL_LAZ_AT_USER];
-    c->angle = spl_laz_get16(record + SPL_LAZ_AT_ANGLE);
-    c->source = spl_laz_get16(record + SPL_LAZ_AT_SOURCE);
-    spl_laz_gpstime_begin(&c->time, spl_laz_get64(record + SPL_LAZ_AT_TIME), false);
+    c->angle = spl_le_get16(record + SPL_LAZ_AT_ANGLE);
+    c->source = spl_le_get16(record + SPL_LAZ_AT_SOURCE);
+    spl_laz_gpstime_begin(&c->time, spl_le_get64(record + SPL_LAZ_AT_TIME), false);
 }
 
 static void read_z(struct spl_laz_coder *coder, struct spl_laz_arena *arena, struct spl_laz_channel *c, uint32_t note,

@@ -64,9 +64,9 @@ void spl_laz_others_begin(struct spl_laz_layers *l, const uint8_t *first)
     copy_color(l, now, now, 0);
     copy_infrared(l, now, now, 0);
     for (unsigned k = 0; l->color_at && k < 3; k++)
-        l->rgb[now][k] = spl_laz_get16(first + l->color_at + 2 * k);
+        l->rgb[now][k] = spl_le_get16(first + l->color_at + 2 * k);
     if (l->infrared_at)
-        l->nir[now] = spl_laz_get16(first + l->infrared_at);
+        l->nir[now] = spl_le_get16(first + l->infrared_at);
     if (l->wavepacket_at)
         memcpy(l->packet[now], first + l->wavepacket_at, sizeof l->packet[now]);
     memset(&l->wavepacket[now], 0, sizeof l->wavepacket[now]);

@@ -32,8 +32,8 @@ void spl_laz_returns_begin(struct spl_laz_layers *l, const uint8_t *first)
     l->now = first[SPL_LAZ_AT_FLAGS] >> 4 & 3;
     struct spl_laz_channel *c = &l->channels[l->now];
     begin_channel(c);
-    c->x = spl_laz_get32(first + SPL_LAZ_AT_X);
-    c->y = spl_laz_get32(first + SPL_LAZ_AT_Y);
+    c->x = spl_le_get32(first + SPL_LAZ_AT_X);
+    c->y = spl_le_get32(first + SPL_LAZ_AT_Y);
     c->number = first[SPL_LAZ_AT_RETURNS] & 15;
     c->count = first[SPL_LAZ_AT_RETURNS] >> 4;
     spl_laz_fields_begin(c, first);

@@ -95,16 +95,16 @@ static void v1_read(void *state, struct spl_laz_coder *coder, struct spl_laz_are
     unsigned k = s->dx.k;
     int32_t dy = (int32_t)spl_laz_integer_read(&s->dy, coder, arena, (uint32_t)median3(s->y), k < 19 ? k : 19);
     k = (k + s->dy.k) / 2;
-    spl_laz_put32(last + at_x, spl_laz_get32(last + at_x) + (uint32_t)dx);
-    spl_laz_put32(last + at_y, spl_laz_get32(last + at_y) + (uint32_t)dy);
-    spl_laz_put32(last + at_z, spl_laz_integer_read(&s->z, coder, arena, spl_laz_get32(last + at_z), k < 19 ? k : 19));
+    spl_laz_put32(last + at_x, spl_le_get32(last + at_x) + (uint32_t)dx);
+    spl_laz_put32(last + at_y, spl_le_get32(last + at_y) + (uint32_t)dy);
+    spl_laz_put32(last + at_z, spl_laz_integer_read(&s->z, coder, arena, spl_le_get32(last + at_z), k < 19 ? k : 19));
     s->x[s->oldest] = dx;
     s->y[s->oldest] = dy;
     s->oldest = s->oldest == 2 ? 0 : s->oldest + 1;
     unsigned changed = spl_laz_symbol(coder, spl_laz_model_get(arena, &s->changed, 64));
     if (changed & 32)
         spl_laz_put16(last + at_intensity, (uint16_t)spl_laz_integer_read(&s->intensity, coder, arena,
-                                                                          spl_laz_get16(last + at_intensity), 0));
+                                                                          spl_le_get16(last + at_intensity), 0));
     if (changed & 16)
         read_by_value(s->by_value.returns, coder, arena, &last[at_returns]);
     if (changed & 8)
@@ -115,7 +115,7 @@ static void v1_read(void *state, struct spl_laz_coder *coder, struct spl_laz_are
         read_by_value(s->by_value.user, coder, arena, &last[at_user]);
     if (changed & 1)
         spl_laz_put16(last + at_source,
-                      (uint16_t)spl_laz_integer_read(&s->source, coder, arena, spl_laz_get16(last + at_source), 0));
+                      (uint16_t)spl_laz_integer_read(&s->source, coder, arena, spl_le_get16(last + at_source), 0));
     memcpy(item, last, point_bytes);
 }
 
@@ -155,7 +155,7 @@ SPL_LAZ_HOT static void v2_read(void *state, struct spl_laz_coder *shared, struc
         read_by_value(s->by_value.user, coder, arena, &last[at_user]);
     if (changed & 1)
         spl_laz_put16(last + at_source,
-                      (uint16_t)spl_laz_integer_read(&s->source, coder, arena, spl_laz_get16(last + at_source), 0));
+                      (uint16_t)spl_laz_integer_read(&s->source, coder, arena, spl_le_get16(last + at_source), 0));
     int32_t dx = (int32_t)spl_laz_integer_read(&s->dx, coder, arena, (uint32_t)s->x[kind].value[2], single);
     spl_laz_median_add(&s->x[kind], dx);
     unsigned k = s->dx.k;
@@ -164,8 +164,8 @@ SPL_LAZ_HOT static void v2_read(void *state, struct spl_laz_coder *shared, struc
     spl_laz_median_add(&s->y[kind], dy);
     k = (k + s->dy.k) / 2;
     s->z_of[level] = spl_laz_integer_read(&s->z, coder, arena, s->z_of[level], single + (k < 18 ? k & ~1u : 18));
-    spl_laz_put32(last + at_x, spl_laz_get32(last + at_x) + (uint32_t)dx);
-    spl_laz_put32(last + at_y, spl_laz_get32(last + at_y) + (uint32_t)dy);
+    spl_laz_put32(last + at_x, spl_le_get32(last + at_x) + (uint32_t)dx);
+    spl_laz_put32(last + at_y, spl_le_get32(last + at_y) + (uint32_t)dy);
     spl_laz_put32(last + at_z, s->z_of[level]);
     memcpy(item, last, point_bytes);
     *shared = local;

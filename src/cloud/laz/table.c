@@ -9,7 +9,7 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "cloud/laz/integer.h"
-#include "cloud/laz/items.h"
+#include "cloud/little.h"
 
 enum { head_bytes = 8, context_points = 0, context_bytes = 1 };
 
@@ -35,7 +35,7 @@ int spl_laz_table_read(struct spl_laz_table *table, const uint8_t *bytes, size_t
     if (length < head_bytes)
         return spl_laz_fail(fault, SPL_E_INPUT, 0, "chunk table", "%zu bytes are fewer than its head of %d", length,
                             head_bytes);
-    uint32_t version = spl_laz_get32(bytes), count = spl_laz_get32(bytes + 4);
+    uint32_t version = spl_le_get32(bytes), count = spl_le_get32(bytes + 4);
     if (version != 0)
         return spl_laz_fail(fault, SPL_E_INPUT, 0, "chunk table", "version %u is not known here (0 is)", version);
     /* a chunk has a record, at least */

@@ -26,8 +26,8 @@ void spl_laz_wavepacket_begin(struct spl_laz_wavepacket *w)
 void spl_laz_wavepacket_read(struct spl_laz_wavepacket *w, struct spl_laz_coder *coder, struct spl_laz_arena *arena,
                              uint8_t packet[SPL_LAZ_WAVEPACKET_BYTES])
 {
-    uint64_t offset = spl_laz_get64(packet + at_offset);
-    uint32_t size = spl_laz_get32(packet + at_size);
+    uint64_t offset = spl_le_get64(packet + at_offset);
+    uint32_t size = spl_le_get32(packet + at_size);
     packet[0] = (uint8_t)spl_laz_symbol(coder, spl_laz_model_get(arena, &w->index, 256));
     w->way = spl_laz_symbol(coder, spl_laz_model_get(arena, &w->ways[w->way], 4));
     if (w->way == way_next) {
@@ -41,10 +41,10 @@ void spl_laz_wavepacket_read(struct spl_laz_wavepacket *w, struct spl_laz_coder 
     spl_laz_put64(packet + at_offset, offset);
     spl_laz_put32(packet + at_size, spl_laz_integer_read(&w->size, coder, arena, size, 0));
     spl_laz_put32(packet + at_place,
-                  spl_laz_integer_read(&w->place, coder, arena, spl_laz_get32(packet + at_place), 0));
+                  spl_laz_integer_read(&w->place, coder, arena, spl_le_get32(packet + at_place), 0));
     for (unsigned k = 0; k < 3; k++) {
         uint8_t *p = packet + at_direction + 4 * k;
-        spl_laz_put32(p, spl_laz_integer_read(&w->direction, coder, arena, spl_laz_get32(p), k));
+        spl_laz_put32(p, spl_laz_integer_read(&w->direction, coder, arena, spl_le_get32(p), k));
     }
 }
 

@@ -42,7 +42,7 @@ int gl_begin(struct spl_gpu *base, struct spl_error *err)
 }
 
 void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
-                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset)
+                 uint32_t workgroups)
 {
     struct gl_gpu *gpu = (struct gl_gpu *)base;
     gl_use(gpu);
@@ -55,12 +55,7 @@ void gl_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *kernel, const stru
         gpu->gl.BindImageTexture(i, ((const struct gl_buffer *)arguments->texels[i])->texels, 0, GL_FALSE, 0,
                                  GL_READ_ONLY, GL_R32UI);
     gpu->gl.UseProgram(((struct gl_kernel *)kernel)->program);
-    if (counts) {
-        gpu->gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, ((const struct gl_buffer *)counts)->name);
-        gpu->gl.DispatchComputeIndirect((GLintptr)offset);
-    } else {
-        gpu->gl.DispatchCompute(workgroups, 1, 1);
-    }
+    gpu->gl.DispatchCompute(workgroups, 1, 1);
 }
 
 void gl_barrier(struct spl_gpu *base)

@@ -32,7 +32,6 @@
     FUNCTION(PFNGLDELETESYNCPROC, DeleteSync)                                                                          \
     FUNCTION(PFNGLDELETETEXTURESPROC, DeleteTextures)                                                                  \
     FUNCTION(PFNGLDISPATCHCOMPUTEPROC, DispatchCompute)                                                                \
-    FUNCTION(PFNGLDISPATCHCOMPUTEINDIRECTPROC, DispatchComputeIndirect)                                                \
     FUNCTION(PFNGLENABLEPROC, Enable)                                                                                  \
     FUNCTION(PFNGLFENCESYNCPROC, FenceSync)                                                                            \
     FUNCTION(PFNGLFLUSHPROC, Flush)                                                                                    \
@@ -124,7 +123,7 @@ void gl_frames_init(struct gl_gpu *gpu);
 void gl_frames_finish(struct gl_gpu *gpu);
 int gl_begin(struct spl_gpu *gpu, struct spl_error *err);
 void gl_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
-                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
+                 uint32_t workgroups);
 void gl_barrier(struct spl_gpu *gpu);
 void gl_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
              uint64_t to_offset, uint64_t bytes);

@@ -51,7 +51,6 @@ int vk_buffer_create(struct spl_gpu *base, enum spl_gpu_buffer_kind kind, uint64
                                                            .size = bytes,
                                                            .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
                                                                     VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT |
-                                                                    VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
                                                                     VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
                                                                     VK_BUFFER_USAGE_TRANSFER_DST_BIT},
                                      NULL, &buffer->buffer);

@@ -48,7 +48,7 @@ void vk_barrier(struct spl_gpu *base)
         .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
         .srcStageMask = work,
         .srcAccessMask = VK_ACCESS_2_MEMORY_WRITE_BIT,
-        .dstStageMask = work | VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT | VK_PIPELINE_STAGE_2_HOST_BIT,
+        .dstStageMask = work | VK_PIPELINE_STAGE_2_HOST_BIT,
         .dstAccessMask = VK_ACCESS_2_MEMORY_READ_BIT | VK_ACCESS_2_MEMORY_WRITE_BIT,
     };
     vkCmdPipelineBarrier2(gpu->list.commands, &(VkDependencyInfo){.sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
@@ -75,7 +75,7 @@ int vk_begin(struct spl_gpu *base, struct spl_error *err)
 }
 
 void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *base_kernel, const struct spl_gpu_arguments *arguments,
-                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset)
+                 uint32_t workgroups)
 {
     struct vk_gpu *gpu = (struct vk_gpu *)base;
     const struct vk_kernel *kernel = (const struct vk_kernel *)base_kernel;
@@ -108,10 +108,7 @@ void vk_dispatch(struct spl_gpu *base, struct spl_gpu_kernel *base_kernel, const
     }
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel->pipeline);
     gpu->push_descriptors(commands, VK_PIPELINE_BIND_POINT_COMPUTE, kernel->layout, 0, count, writes);
-    if (counts)
-        vkCmdDispatchIndirect(commands, ((const struct vk_buffer *)counts)->buffer, offset);
-    else
-        vkCmdDispatch(commands, workgroups, 1, 1);
+    vkCmdDispatch(commands, workgroups, 1, 1);
 }
 
 void vk_copy(struct spl_gpu *base, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,

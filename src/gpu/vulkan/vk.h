@@ -75,7 +75,7 @@ int vk_frames_init(struct vk_gpu *gpu, struct spl_error *err);
 void vk_frames_finish(struct vk_gpu *gpu);
 int vk_begin(struct spl_gpu *gpu, struct spl_error *err);
 void vk_dispatch(struct spl_gpu *gpu, struct spl_gpu_kernel *kernel, const struct spl_gpu_arguments *arguments,
-                 uint32_t workgroups, struct spl_gpu_buffer *counts, uint64_t offset);
+                 uint32_t workgroups);
 void vk_barrier(struct spl_gpu *gpu);
 void vk_copy(struct spl_gpu *gpu, struct spl_gpu_buffer *from, uint64_t from_offset, struct spl_gpu_buffer *to,
              uint64_t to_offset, uint64_t bytes);

@@ -10,7 +10,8 @@
 #include "pack/export/shapes.h"
 
 /* Whether `path` names a kind of file that can be written, in a folder where one can be made, and is none of the
- * `count` scans; else SPL_E_USAGE with the field "export-primitives", or SPL_E_IO. Before any work begins. Any thread. */
+ * `count` scans; else SPL_E_USAGE with the field "export-primitives", or SPL_E_IO. Before any work begins. Any
+ * thread. */
 int spl_export_check(const char *path, const char *const *scans, size_t count, struct spl_error *err);
 
 /* The file of the planes and the wires, by the ending of `path`: PLY, OBJ or DXF. *text (owned by the caller, free();

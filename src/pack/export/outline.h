@@ -31,8 +31,8 @@ struct spl_outline {
 
 /* The outline of `count` >= 1 points of the plane with the radii of discs that reach their neighbours. Vertices are
  * left out as long as the border moves by no more than `tolerance`, or by the spacing of the points along it: closer
- * the scan does not say where it lies. Holes and islands of a few points are left out. Whoever calls finishes `outline`, on
- * failure too. SPL_E_NOMEM; SPL_E_LIMIT beyond 2^32 vertices. Any thread. */
+ * the scan does not say where it lies. Holes and islands of a few points are left out. Whoever calls finishes
+ * `outline`, on failure too. SPL_E_NOMEM; SPL_E_LIMIT beyond 2^32 vertices. Any thread. */
 int spl_outline_find(struct spl_outline *outline, const double (*points)[2], const float *radius, size_t count,
                      double tolerance, struct spl_error *err);
 

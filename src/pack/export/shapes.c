@@ -9,6 +9,7 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "geom/vector.h"
 #include "pack/export/simplify.h"
 
 static const double noise_sigmas = 4, spacing_share = 0.2; /* that vertices may be off a line, as of planes */
@@ -32,16 +33,10 @@ void spl_shape_place(const struct spl_shape_plane *plane, const double at[2], do
         world[c] = plane->plane->origin[c] + at[0] * plane->u[c] + at[1] * plane->v[c];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    for (int c = 0; c < 3; c++)
-        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-}
-
 double spl_shape_inclination(const double normal[3], const double up[3])
 {
     double level[3];
-    cross(up, normal, level);
+    cross3(up, normal, level);
     return atan2(sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]),
                  normal[0] * up[0] + normal[1] * up[1] + normal[2] * up[2]) *
            180 / M_PI;
@@ -51,7 +46,7 @@ static void set_axes(struct spl_shape_plane *shape, const double up[3])
 {
     const double *normal = shape->plane->normal, east[3] = {1, 0, 0}, north[3] = {0, 1, 0};
     double length = 0;
-    cross(up, normal, shape->u);
+    cross3(up, normal, shape->u);
     for (int c = 0; c < 3; c++)
         length += shape->u[c] * shape->u[c];
     shape->inclination = spl_shape_inclination(normal, up);
@@ -65,7 +60,7 @@ static void set_axes(struct spl_shape_plane *shape, const double up[3])
     }
     for (int c = 0; c < 3; c++)
         shape->u[c] /= sqrt(length);
-    cross(normal, shape->u, shape->v);
+    cross3(normal, shape->u, shape->v);
 }
 
 static int outline(const struct outlining *o, uint32_t k)

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 
 enum { unknowns = 8, most = 60000, few = 4000, angles = 72, bands = 12 };
 
@@ -139,19 +140,12 @@ static bool solve(double m[unknowns][unknowns], double b[unknowns], double inver
     return true;
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 /* One equation: brightness of a point by that of the map around its direction, over `wide` radians. */
 static double make_row(const struct work *w, const struct point *point, const double shift[3], const double turn[3],
                        double wide, double row[unknowns])
 {
     double own[3], swing[3], d[3], e[2][3], range = 0, middle;
-    cross(turn, point->own, swing);
+    cross3(turn, point->own, swing);
     for (int k = 0; k < 3; k++) {
         own[k] = point->own[k] - shift[k] - swing[k];
         range += own[k] * own[k];
@@ -160,11 +154,11 @@ static double make_row(const struct work *w, const struct point *point, const do
     for (int k = 0; k < 3; k++)
         d[k] = own[k] / range;
     const double axis[3] = {fabs(d[0]) < 0.6, fabs(d[0]) >= 0.6, 0};
-    cross(d, axis, e[0]);
+    cross3(d, axis, e[0]);
     double length = sqrt(e[0][0] * e[0][0] + e[0][1] * e[0][1] + e[0][2] * e[0][2]);
     for (int k = 0; k < 3; k++)
         e[0][k] /= length;
-    cross(d, e[0], e[1]);
+    cross3(d, e[0], e[1]);
     memset(row, 0, unknowns * sizeof *row);
     middle = look_up(w, d);
     for (int a = 0; a < 2; a++) {
@@ -175,7 +169,7 @@ static double make_row(const struct work *w, const struct point *point, const do
         }
         double far = look_up(w, ahead), near = look_up(w, behind), slope = (far - near) / (2 * wide);
         middle += far + near;
-        cross(d, e[a], around);
+        cross3(d, e[a], around);
         for (int k = 0; k < 3; k++) {
             row[2 + k] -= slope * e[a][k] / range;
             row[5 + k] -= slope * around[k];
@@ -247,9 +241,9 @@ static void find_other(struct spl_agreement *agreement, const struct work *w)
     }
 }
 
-int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas, const struct spl_station *station,
-                       uint32_t index, bool scanned, const struct spl_map_sight *map, const struct spl_samples *samples,
-                       struct spl_error *err)
+int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas,
+                       const struct spl_station *station, uint32_t index, bool scanned, const struct spl_map_sight *map,
+                       const struct spl_samples *samples, struct spl_error *err)
 {
     struct work w;
     double shift[3] = {0}, turn[3] = {0}, errors[2];

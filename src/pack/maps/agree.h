@@ -22,8 +22,8 @@ enum { SPL_AGREEMENT_LEAST = 500 };
 /* `atlas` without holes, of `station`, whose ranges are `map`; samples of other stations do not count where `scanned`.
  * Least squares over the map's gradient (Lucas and Kanade, "An iterative image registration technique", 1981) for six
  * unknowns of the pose beside brightness and contrast, coarse to fine, outliers weighed down. The caller's thread. */
-int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas, const struct spl_station *station,
-                       uint32_t index, bool scanned, const struct spl_map_sight *map, const struct spl_samples *samples,
-                       struct spl_error *err);
+int spl_agreement_find(struct spl_agreement *agreement, const struct spl_atlas *atlas,
+                       const struct spl_station *station, uint32_t index, bool scanned, const struct spl_map_sight *map,
+                       const struct spl_samples *samples, struct spl_error *err);
 
 #endif

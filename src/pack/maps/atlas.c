@@ -82,7 +82,8 @@ static void halve_rows(void *context, size_t begin, size_t end, unsigned worker)
             memset(out, 0, sizeof *to->texels);
             if (spl_polar_is_proper(to->side, apron, x, y)) {
                 uint32_t cap = to->side + 2 * apron, chart = x < cap ? 0 : x < 2 * cap ? 1 : 2;
-                uint32_t fx = 2 * x - (2 * chart + 1) * apron, fy = 2 * y - apron; /* charts begin at multiples of both */
+                // charts begin at multiples of both
+                uint32_t fx = 2 * x - (2 * chart + 1) * apron, fy = 2 * y - apron;
                 for (uint32_t k = 0; k < 4; k++)
                     for (int c = 0; c < 4; c++)
                         out[c] += 0.25f * from->texels[(size_t)(fy + k / 2) * from->width + fx + k % 2][c];
@@ -90,7 +91,8 @@ static void halve_rows(void *context, size_t begin, size_t end, unsigned worker)
             }
             for (int k = 0; k < 4; k++) {
                 double d[3], place[2];
-                spl_polar_direction(to->side, apron, (double[2]){x + 0.25 + 0.5 * (k % 2), y + 0.25 + 0.5 * (k / 2)}, d);
+                spl_polar_direction(to->side, apron, (double[2]){x + 0.25 + 0.5 * (k % 2), y + 0.25 + 0.5 * (k / 2)},
+                                    d);
                 spl_polar_place(from->side, apron, d, place);
                 add_bilinear(from, place, 0.25f, out);
             }

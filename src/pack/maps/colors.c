@@ -204,8 +204,8 @@ static void add_rows(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t row = begin; row < end; row++)
         for (uint32_t left = 0; left < atlas->width; left += block) {
             double d[3];
-            spl_polar_direction(atlas->side, SPL_MAP_APRON, (double[2]){left + 0.5 * block, ((double)row + 0.5) * block},
-                                d);
+            spl_polar_direction(atlas->side, SPL_MAP_APRON,
+                                (double[2]){left + 0.5 * block, ((double)row + 0.5) * block}, d);
             if (d[0] * job->axis[0] + d[1] * job->axis[1] + d[2] * job->axis[2] < job->within)
                 continue;
             for (uint32_t i = 0; i < block * block; i++) {

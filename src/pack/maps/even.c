@@ -1,7 +1,7 @@
 /* In turns samples take the mean of what maps make of them, and maps the mean of what their samples say. What differs
- * for another reason, as what moved or shines does, counts less the more it differs. Own colours are one voice of little
- * weight: of each scan they have that scan's exposure, and what is to agree is the maps. Sums go by the order of the
- * samples. The caller's thread. */
+ * for another reason, as what moved or shines does, counts less the more it differs. Own colours are one voice of
+ * little weight: of each scan they have that scan's exposure, and what is to agree is the maps. Sums go by the order of
+ * the samples. The caller's thread. */
 #include "pack/maps/even.h"
 
 #include <math.h>

@@ -26,8 +26,8 @@ int spl_sightings_add(struct spl_sightings *sightings, const struct spl_atlas *a
 void spl_sightings_finish(struct spl_sightings *sightings);
 
 /* Factors of linear light, 1/8 to 8, for each of `rows` maps: robust least squares of the logarithms over samples that
- * several maps show (api/photographs.md, step 3). The splats' own colours, where they have any, hold the maps' mean where
- * it is; else that stays. A map that shares nothing keeps 1. */
+ * several maps show (api/photographs.md, step 3). The splats' own colours, where they have any, hold the maps' mean
+ * where it is; else that stays. A map that shares nothing keeps 1. */
 int spl_sightings_even_out(const struct spl_sightings *sightings, const struct spl_samples *samples, uint32_t rows,
                            float (*factors)[3], struct spl_error *err);
 

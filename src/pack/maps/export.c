@@ -1,6 +1,6 @@
-/* Exported maps. Each file is there as a whole or not at all; maps.json comes last, so a folder that has it is complete.
- * A map is found again by its name, and refused where its station stands elsewhere: then the scans, or how they were
- * packed, have changed. Owned by the caller's thread. */
+/* Exported maps. Each file is there as a whole or not at all; maps.json comes last, so a folder that has it is
+ * complete. A map is found again by its name, and refused where its station stands elsewhere: then the scans, or how
+ * they were packed, have changed. Owned by the caller's thread. */
 #include "pack/maps/export.h"
 
 #include <dirent.h>
@@ -132,10 +132,11 @@ int spl_map_export_add(struct spl_map_export *out, const struct spl_map_row *row
 int spl_map_export_commit(struct spl_map_export *out, struct spl_error *err)
 {
     static const char layout[] =
-        "NAME.color.png is 6 side x side: bottom cap, top cap, band (4 side wide). (x, y) in shares of a chart, from its "
-        "upper left corner: a cap's u = x - 0.5, v = y - 0.5 (of the bottom cap 0.5 - y), r = |(u, v)| has direction d = "
-        "(u / r sin(pi r / 2), v / r sin(pi r / 2), cos(pi r / 2)), of the bottom cap -cos; the band's has azimuth 2 pi "
-        "(1 - x) and elevation (0.5 - y) pi / 2. p = rotation * range * d + position. NAME.range.png: code 0 not "
+        "NAME.color.png is 6 side x side: bottom cap, top cap, band (4 side wide). (x, y) in shares of a chart, from "
+        "its upper left corner: a cap's u = x - 0.5, v = y - 0.5 (of the bottom cap 0.5 - y), r = |(u, v)| has "
+        "direction d = (u / r sin(pi r / 2), v / r sin(pi r / 2), cos(pi r / 2)), of the bottom cap -cos; the band's "
+        "has azimuth 2 pi (1 - x) and elevation (0.5 - y) pi / 2. p = rotation * range * d + position. NAME.range.png: "
+        "code 0 not "
         "scanned, 65535 nothing came back, else range = near / (1 - (code - 1) / 65533)";
     json_t *document = json_pack("{s:s, s:O}", "layout", layout, "maps", out->list);
     char *text = document ? json_dumps(document, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
@@ -261,16 +262,17 @@ int spl_map_edits_apply(struct spl_map_edits *edits, uint32_t index, const struc
     if (!entry)
         return SPL_OK;
     if (!(compare(entry, row) <= 1))
-        return spl_fail_field(err, SPL_E_INPUT, "position",
-                              "%s/%s: %s stands elsewhere now, or is turned: export the maps of these scans and options "
-                              "anew",
-                              edits->folder, list_name, name);
+        return spl_fail_field(
+            err, SPL_E_INPUT, "position",
+            "%s/%s: %s stands elsewhere now, or is turned: export the maps of these scans and options "
+            "anew",
+            edits->folder, list_name, name);
     char *path = join(edits->folder, json_string_value(json_object_get(entry, "color")), err);
     int rc = path ? spl_image_load(path, SPL_LAYER_COLOR, &edited, err) : SPL_E_NOMEM;
     if (!rc && (edited.width != picture->width || edited.height != picture->height))
         rc = spl_fail_field(err, SPL_E_INPUT, "side",
-                            "%s: %u x %u pixels; this map has %u x %u: export it anew from these scans and options", path,
-                            edited.width, edited.height, picture->width, picture->height);
+                            "%s: %u x %u pixels; this map has %u x %u: export it anew from these scans and options",
+                            path, edited.width, edited.height, picture->width, picture->height);
     if (!rc) {
         put_over(picture, &edited);
         edits->taken++;

@@ -1,7 +1,7 @@
 /* Maps as pictures that people edit: a folder with NAME.color.png and NAME.range.png of each station, and maps.json.
  *
- * A picture is a map's atlas without aprons, 6 side x side: bottom cap, top cap, band, each turned so that it looks as it
- * did from the station: the band upright (in the atlas it stands on its head), the ground not mirrored. Colours are
+ * A picture is a map's atlas without aprons, 6 side x side: bottom cap, top cap, band, each turned so that it looks as
+ * it did from the station: the band upright (in the atlas it stands on its head), the ground not mirrored. Colours are
  * sRGB; ranges are the codes of the map (shaders/shared.h) as 16 bit grey: 0 not scanned, 65535 nothing came back.
  * Ranges are for looking at: what is taken back is colours alone. */
 #ifndef SPL_PACK_MAPS_EXPORT_H

@@ -1,4 +1,5 @@
-/* Two rounds over the chunks: the first counts, so that each chunk knows where its hits go and threads change nothing. */
+/* Two rounds over the chunks: the first counts, so that each chunk knows where its hits go and threads change
+ * nothing. */
 #include "pack/maps/hits.h"
 
 #include <math.h>

@@ -63,15 +63,6 @@ void spl_map_sources_finish(struct spl_map_sources *sources)
     *sources = (struct spl_map_sources){0};
 }
 
-static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
-{
-    struct spl_image_info info;
-    int rc = spl_image_get_info(path, &info, err);
-    *width = info.width;
-    *height = info.height;
-    return rc;
-}
-
 static int check_header(const struct spl_named_view *view, struct spl_error *err)
 {
     struct spl_image_info info;
@@ -117,7 +108,11 @@ int spl_map_pictures_load(const struct spl_map_picture_options *options, struct 
                           struct spl_error *err)
 {
     const struct spl_photograph_options how = {
-        .images = options->images, .get_size = get_size, .refuse = options->refuse, .context = options->context};
+        .images = options->images,
+        .get_size = spl_image_get_size,
+        .refuse = options->refuse,
+        .context = options->context,
+    };
     int rc = SPL_OK;
     *list = (struct spl_view_list){0};
     for (size_t i = 0; i < options->count && !rc; i++) {

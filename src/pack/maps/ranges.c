@@ -85,8 +85,8 @@ static double find_share(const struct spl_hits *hits, uint32_t side, uint8_t *te
     return taken[1] ? (double)taken[0] / (double)taken[1] : 0;
 }
 
-int spl_ranges_find_side(struct spl_hits *hits, uint32_t side_max, unsigned threads, uint32_t *side,
-                         struct spl_error *err)
+/* The side at which nine texels of ten within what was scanned are hit, a multiple of 4 of at most `side_max`. */
+static int find_side(struct spl_hits *hits, uint32_t side_max, unsigned threads, uint32_t *side, struct spl_error *err)
 {
     uint32_t low = side_min / 4, high = side_max / 4 + 1; /* in blocks; `low` will do, `high` will not */
     uint8_t *texels = spl_alloc_raw(texels_of(side_max, 0), 1, err);
@@ -286,7 +286,7 @@ int spl_ranges_init(struct spl_ranges *ranges, struct spl_hits *hits, uint32_t s
 {
     float *texels = NULL, *discs = NULL;
     *ranges = (struct spl_ranges){0};
-    int rc = spl_ranges_find_side(hits, side_max < side_min ? side_min : side_max, threads, &ranges->side, err);
+    int rc = find_side(hits, side_max < side_min ? side_min : side_max, threads, &ranges->side, err);
     if (!rc) {
         size_t count = texels_of(ranges->side, reach);
         texels = spl_alloc_raw(count, sizeof *texels, err);

@@ -13,15 +13,11 @@ struct spl_ranges {
     double near; /* as of struct spl_map_row: one hit of some thousands is nearer */
 };
 
-/* Of `side_max` texels (>= 4) at most, fewer where the hits are too far apart for it: nine texels of ten within what was
- * scanned are hit. Parallel; blocks. Uses hits->texel. On failure nothing is held. */
+/* Of `side_max` texels (>= 4) at most, fewer where the hits are too far apart for it: nine texels of ten within what
+ * was scanned are hit. Parallel; blocks. Uses hits->texel. On failure nothing is held. */
 int spl_ranges_init(struct spl_ranges *ranges, struct spl_hits *hits, uint32_t side_max, unsigned threads,
                     struct spl_error *err);
 void spl_ranges_finish(struct spl_ranges *ranges);
-
-/* The side at which nine texels of ten within what was scanned are hit, a multiple of 4 of at most `side_max`. */
-int spl_ranges_find_side(struct spl_hits *hits, uint32_t side_max, unsigned threads, uint32_t *side,
-                         struct spl_error *err);
 
 /* 1 / range in that direction (unit, the station's frame), between texels; 0 where nothing came back. What was not
  * scanned is as far as the nearest that was. */

@@ -15,6 +15,7 @@
 #include "dataset/panels.h"
 #include "geom/station.h"
 #include "geom/unit.h"
+#include "geom/vector.h"
 #include "pack/maps/pictures.h"
 #include "pack/maps/sight.h"
 
@@ -44,11 +45,6 @@ void spl_station_to_own(const struct spl_station *station, const double world[3]
     const double from[3] = {world[0] - station->position[0], world[1] - station->position[1],
                             world[2] - station->position[2]};
     spl_station_turn(station, from, own);
-}
-
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 static int add(struct spl_stations *stations, size_t *capacity, const double position[3], const double rotation[9],
@@ -113,7 +109,7 @@ static int take_eyes(struct spl_stations *stations, const struct spl_view_list *
         double rotation[9];
         bool panorama = find_axes(&views->views[v], rotation), known = false;
         for (uint32_t s = stations->count; s-- && !known;)
-            known = distance(stations->list[s].position, views->views[v].camera.eye) <=
+            known = distance3(stations->list[s].position, views->views[v].camera.eye) <=
                     (panorama ? hair_m : tripod_m) * metre;
         if (!known)
             rc = add(stations, &capacity, views->views[v].camera.eye, panorama ? rotation : NULL, err);
@@ -130,7 +126,7 @@ static int place_views(struct spl_stations *stations, const struct spl_view_list
     for (size_t v = 0; v < views->count; v++) {
         double nearest = INFINITY;
         for (uint32_t s = 0; s < stations->count; s++) {
-            double far = distance(stations->list[s].position, views->views[v].camera.eye);
+            double far = distance3(stations->list[s].position, views->views[v].camera.eye);
             if (far < nearest) {
                 nearest = far;
                 stations->of_view[v] = s;
@@ -286,11 +282,12 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_splats *sp
     *stations = (struct spl_stations){.scanned = json_array_size(known) == 1 || (json_array_size(known) && scan >= 0)};
     rc = json_array_size(known) ? take_scanned(stations, known, err) : take_eyes(stations, views, metre, err);
     if (!rc && !stations->count)
-        rc = spl_fail_field(err, SPL_E_INPUT, "panoramas",
-                            "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
-                            "is no panorama; name one by --panoramas, or a panoramas.json that says the place alone: "
-                            "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
-                            "\"quaternion\": [1, 0, 0, 0]}]}");
+        rc =
+            spl_fail_field(err, SPL_E_INPUT, "panoramas",
+                           "nothing says where a scanner stood: the scan has no stations (PTX and E57 have), and there "
+                           "is no panorama; name one by --panoramas, or a panoramas.json that says the place alone: "
+                           "{\"panoramas\": [{\"name\": \"a\", \"color\": null, \"position\": [0, 0, 1.8], "
+                           "\"quaternion\": [1, 0, 0, 0]}]}");
     if (!rc)
         rc = place_views(stations, views, metre, nowhere, context, err);
     if (!rc)

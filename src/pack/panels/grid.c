@@ -1,4 +1,5 @@
 /* Where the discs of a plane's points lie on its cells. Pure; any thread. */
+#include "geom/vector.h"
 #include "pack/panels/raster_parts.h"
 
 #include <math.h>
@@ -27,18 +28,13 @@ static void init_grid(struct spl_panel_grid *g, const struct spl_panel_group *gr
     }
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* How a disc of that normal rises: no steeper than pieces are. */
 static void get_tilt(const struct spl_panel_grid *g, const float normal[3], double tilt[2])
 {
     const double n[3] = {normal[0], normal[1], normal[2]};
-    double up = dot(n, g->normal);
-    tilt[0] = -dot(n, g->u) / copysign(fmax(fabs(up), least_up), up);
-    tilt[1] = -dot(n, g->v) / copysign(fmax(fabs(up), least_up), up);
+    double up = dot3(n, g->normal);
+    tilt[0] = -dot3(n, g->u) / copysign(fmax(fabs(up), least_up), up);
+    tilt[1] = -dot3(n, g->v) / copysign(fmax(fabs(up), least_up), up);
 }
 
 /* Ends the disc of point i at the line in which its plane meets `other`. In a corner, which is seen from within, it
@@ -53,9 +49,9 @@ static void end_at_crease(const struct spl_panel_grid *g, size_t i, const struct
     double off[3];
     for (int c = 0; c < 3; c++)
         off[c] = p->axis[c][i] - other->origin[c];
-    double above = dot(off, other->normal), side = above > 0 ? -1 : 1;
+    double above = dot3(off, other->normal), side = above > 0 ? -1 : 1;
     double cut = !known ? cut_at_either : above > 0 ? cut_in_corner : cut_at_edge;
-    double along[2] = {side * dot(other->normal, g->u), side * dot(other->normal, g->v)};
+    double along[2] = {side * dot3(other->normal, g->u), side * dot3(other->normal, g->v)};
     double sine = hypot(along[0], along[1]);
     d->clip[0] = along[0] / sine;
     d->clip[1] = along[1] / sine;
@@ -75,8 +71,8 @@ void spl_panel_grid_shape(const struct spl_panel_grid *g, size_t i, struct spl_p
         end_at_crease(g, i, &g->group->planes->list[crease], d);
     else if (g->group->leaf && clip && (clip->direction[0] || clip->direction[1] || clip->direction[2])) {
         double direction[3] = {clip->direction[0] / 127.0, clip->direction[1] / 127.0, clip->direction[2] / 127.0};
-        d->clip[0] = dot(direction, g->u) + d->tilt[0] * dot(direction, g->normal);
-        d->clip[1] = dot(direction, g->v) + d->tilt[1] * dot(direction, g->normal);
+        d->clip[0] = dot3(direction, g->u) + d->tilt[0] * dot3(direction, g->normal);
+        d->clip[1] = dot3(direction, g->v) + d->tilt[1] * dot3(direction, g->normal);
         d->clip_offset = d->radius * clip->offset / 255;
     }
 }

@@ -6,6 +6,7 @@
  * Cells are counted from the plane's own origin: those of one plane and one size lie on one grid in all nodes, though
  * panels, the squares of 16, begin where a node's cells do.
  * One worker's, in the order of the points: the same for any number of threads. */
+#include "geom/vector.h"
 #include "pack/panels/raster_parts.h"
 
 #include <math.h>
@@ -62,11 +63,6 @@ bool spl_node_panels_settle(struct spl_node_panels *panels, struct spl_spill *sp
     return true;
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 /* A chunk while it is made. */
 struct making {
     const struct spl_panel_raster *raster;
@@ -117,7 +113,7 @@ static struct distances measure(const struct making *m, const struct spl_panel_p
                 double y = at[1] - g->first[1] - side * m->raster->places[m->order[k]].row;
                 height = (double)spl_relief_height(&m->reliefs[k], (float)x, (float)y, NULL);
             }
-            double distance = fabs(dot(off, g->normal) - height);
+            double distance = fabs(dot3(off, g->normal) - height);
             sum.squared += distance * distance;
             sum.most = fmax(sum.most, distance);
             sum.points++;

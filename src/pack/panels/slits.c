@@ -1,8 +1,8 @@
-/* Slits between scan lines, which panels close. Where points lie much closer along a scan line than lines lie apart, the
- * discs of two lines may not meet, though the plane is known on both sides: bundles of lines, the far lines of a road,
- * the rings around a scanner. A cell is closed where it lies in a gap of few cells between two borders whose points lie
- * closer than cells ask for; or where the four cells beside it are there. At the border of a window, a slat or a door
- * points lie as densely as their cells ask for, so these stay open; and so does what is wider.
+/* Slits between scan lines, which panels close. Where points lie much closer along a scan line than lines lie apart,
+ * the discs of two lines may not meet, though the plane is known on both sides: bundles of lines, the far lines of a
+ * road, the rings around a scanner. A cell is closed where it lies in a gap of few cells between two borders whose
+ * points lie closer than cells ask for; or where the four cells beside it are there. At the border of a window, a slat
+ * or a door points lie as densely as their cells ask for, so these stay open; and so does what is wider.
  *
  * Cells are judged by what discs cover, never by what was closed: the same in any order. One worker's. */
 #include "pack/panels/raster_parts.h"

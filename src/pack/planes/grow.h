@@ -8,8 +8,8 @@
 /* Gives points without a label (of regions) that of a region which lies beside them, when they lie on it. Uses the
  * levels' lists. Parallel; SPL_E_NOMEM, SPL_E_CANCELLED. */
 int spl_planes_grow(uint32_t *label, const struct spl_regions *regions, struct spl_plane_levels *levels,
-                    const struct spl_points *points, const struct spl_plane_limits_list *limits, struct spl_stage *stage,
-                    struct spl_error *err);
+                    const struct spl_points *points, const struct spl_plane_limits_list *limits,
+                    struct spl_stage *stage, struct spl_error *err);
 
 /* Fits each region's plane to all of its points, lets those go that are off by more than the bound, dissolves planes of
  * too few points, and numbers what is left: labels become indices into planes->list. Parallel. What it allocates in

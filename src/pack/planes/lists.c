@@ -32,7 +32,8 @@ int spl_plane_levels_init(struct spl_plane_levels *levels, const struct spl_poin
             break;
         rc = spl_cells_init_above(&levels->cells[levels->count++], below, threads, err);
     }
-    if (!rc && !(levels->lists = spl_spill_alloc_raw(points->spill, levels->cells[0].count, sizeof *levels->lists, err)))
+    if (!rc &&
+        !(levels->lists = spl_spill_alloc_raw(points->spill, levels->cells[0].count, sizeof *levels->lists, err)))
         rc = SPL_E_NOMEM;
     return rc;
 }

@@ -2,6 +2,7 @@
  * say how high the surface is and how it is tilted: a step or a kink shows there. */
 #include <math.h>
 
+#include "geom/vector.h"
 #include "pack/planes/quadratic.h"
 #include "pack/planes/regions.h"
 
@@ -18,11 +19,6 @@ struct state {
     double sum[3];  /* of the normals of its points */
 };
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static double half_width_of(const struct spl_patch *p)
 {
     return p->curve.scale / 1.7320508 * half_width;
@@ -35,7 +31,7 @@ static void extend(const struct spl_patch *p, const double at[3], double place[3
     double off[3], slope[2];
     for (int c = 0; c < 3; c++)
         off[c] = (at[c] - k->origin[c]) / k->scale;
-    double x = dot(off, k->u), y = dot(off, k->v), height = spl_quadratic_height(k->q, x, y);
+    double x = dot3(off, k->u), y = dot3(off, k->v), height = spl_quadratic_height(k->q, x, y);
     spl_quadratic_slope(k->q, x, y, slope);
     double length = sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
     for (int c = 0; c < 3; c++) {
@@ -60,7 +56,7 @@ static bool goes_on(const struct state *s, const struct spl_patch *a, const stru
         step += (place[1][c] - place[0][c]) * (normal[0][c] + normal[1][c]) / 2;
     double limit = 2 * spl_plane_limits_at(s->limits, b->first)->step +
                    2 * (a->rms / sqrt(a->moments.count) + b->rms / sqrt(b->moments.count));
-    return dot(normal[0], normal[1]) >= unbroken && fabs(step) <= limit;
+    return dot3(normal[0], normal[1]) >= unbroken && fabs(step) <= limit;
 }
 
 static double spacing_of(const struct state *s, const struct spl_patch *p)
@@ -81,7 +77,7 @@ static bool takes(const void *state, const struct spl_region *r, const struct sp
 {
     const struct state *s = state;
     double ratio = spacing_of(s, next) / s->spacing;
-    return dot(next->normal, r->normal) >= tilted && ratio <= alike && ratio >= 1 / alike && goes_on(s, from, next);
+    return dot3(next->normal, r->normal) >= tilted && ratio <= alike && ratio >= 1 / alike && goes_on(s, from, next);
 }
 
 static void took(void *state, struct spl_region *r, const struct spl_patch *q)
@@ -89,7 +85,7 @@ static void took(void *state, struct spl_region *r, const struct spl_patch *q)
     struct state *s = state;
     for (int c = 0; c < 3; c++)
         s->sum[c] += q->normal[c] * q->moments.count;
-    double length = sqrt(dot(s->sum, s->sum));
+    double length = sqrt(dot3(s->sum, s->sum));
     for (int c = 0; c < 3; c++)
         r->normal[c] = s->sum[c] / length;
 }

@@ -43,8 +43,8 @@ int spl_photo_image_get_info(const struct spl_named_view *view, struct spl_image
 
 enum { black = 6 };
 
-/* Bilinear at `place` of an image that may close around, colours by their alpha; texels beyond its edges repeat those at
- * the edge. */
+/* Bilinear at `place` of an image that may close around, colours by their alpha; texels beyond its edges repeat those
+ * at the edge. */
 static void sample(const struct spl_image *from, bool closed, const double place[2], uint8_t rgba[4])
 {
     const uint8_t(*texels)[4] = from->pixels;

@@ -29,15 +29,6 @@ static void refuse_pose(void *context, const struct spl_error *why)
     reading->options->refused(reading->options->context, why);
 }
 
-static int get_size(const char *path, uint32_t *width, uint32_t *height, struct spl_error *err)
-{
-    struct spl_image_info info;
-    int rc = spl_image_get_info(path, &info, err);
-    *width = info.width;
-    *height = info.height;
-    return rc;
-}
-
 static int check_file(const struct spl_named_view *view, struct spl_error *err)
 {
     struct spl_image_info info;
@@ -58,7 +49,7 @@ int spl_photos_load(const struct spl_photo_options *options, struct spl_view_lis
     struct reading reading = {options, report};
     const struct spl_photograph_options how = {
         .images = options->images,
-        .get_size = get_size,
+        .get_size = spl_image_get_size,
         .refuse = options->refused ? refuse_pose : NULL,
         .context = &reading,
     };

@@ -2,9 +2,9 @@
  * the ground where a scanner or a camera stood, since a court has no ceiling. Rooms without either are found by their
  * floors: a column of cells with a floor, a ceiling and somebody's height between them is a place to stand.
  *
- * Of these places and of all ways to look the one with the longest free way is taken, by the mean of its rays: it stands
- * at one end of the largest room and shows it lengthwise. What is close before the eye, and holes, count against it. One
- * thread; the outcome depends on the points alone. */
+ * Of these places and of all ways to look the one with the longest free way is taken, by the mean of its rays: it
+ * stands at one end of the largest room and shows it lengthwise. What is close before the eye, and holes, count against
+ * it. One thread; the outcome depends on the points alone. */
 #include "pack/view/inside.h"
 
 #include <math.h>

@@ -1,6 +1,7 @@
-/* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much of
- * its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it, a
- * street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal view. */
+/* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much
+ * of its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it,
+ * a street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal
+ * view. */
 #include "pack/view/outside.h"
 
 #include <float.h>
@@ -9,15 +10,11 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 
 enum { raster = 96, azimuths = 24, elevations = 3, spread_most = 3 };
 static const double aspect = 16.0 / 9, margin = 1.06;
 static const double beyond = 0.002; /* of the sample may lie beyond the frame */
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* Right, up and forward of a picture taken from azimuth and elevation. */
 static void get_axes(double azimuth, double elevation, double axes[3][3])
@@ -37,7 +34,7 @@ static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (size_t i = 0; i < s->count; i++)
         for (int c = 0; c < 2; c++) {
-            double x = dot(axes[c], s->at[i]);
+            double x = dot3(axes[c], s->at[i]);
             low[c] = fmin(low[c], x);
             high[c] = fmax(high[c], x);
         }
@@ -51,16 +48,17 @@ static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
 enum { rows = raster * 9 / 16 + 2 };
 
 /* The nearest depth of each cell. */
-static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame, double depth[rows][raster])
+static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame,
+                 double depth[rows][raster])
 {
     for (int y = 0; y < rows; y++)
         for (int x = 0; x < raster; x++)
             depth[y][x] = INFINITY;
     for (size_t i = 0; i < s->count; i++) {
-        double z = dot(axes[2], s->at[i]);
+        double z = dot3(axes[2], s->at[i]);
         int spread = (int)fmin(spread_most, 0.7 * sqrt((double)s->area[i]) / frame->cell);
-        int cx = (int)((dot(axes[0], s->at[i]) - frame->low[0]) / frame->cell),
-            cy = (int)((dot(axes[1], s->at[i]) - frame->low[1]) / frame->cell);
+        int cx = (int)((dot3(axes[0], s->at[i]) - frame->low[0]) / frame->cell),
+            cy = (int)((dot3(axes[1], s->at[i]) - frame->low[1]) / frame->cell);
         for (int y = cy - spread; y <= cy + spread; y++)
             for (int x = cx - spread; x <= cx + spread; x++)
                 if (x >= 0 && x < raster && y >= 0 && y < rows && z < depth[y][x])
@@ -78,8 +76,8 @@ static double judge(const struct spl_view_sample *s, double azimuth, double elev
     static bool filled[rows][raster];
     memset(filled, 0, sizeof filled);
     for (size_t i = 0; i < s->count; i++) {
-        int x = (int)((dot(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
-            y = (int)((dot(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
+        int x = (int)((dot3(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
+            y = (int)((dot3(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
         double facing = 1, weight = (double)s->area[i];
         if (s->sides)
             facing = -((double)s->normal[i][0] * axes[2][0] + (double)s->normal[i][1] * axes[2][1] +
@@ -87,7 +85,7 @@ static double judge(const struct spl_view_sample *s, double azimuth, double elev
         all += weight;
         weight *= pow(fmax(facing, 0), 1.5); /* from straight ahead it shows most */
         if (facing <= 0 || x < 0 || x >= raster || y < 0 || y >= rows ||
-            dot(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
+            dot3(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
             continue;
         filled[y][x] = true;
         seen += weight;
@@ -112,8 +110,8 @@ static double most_of(double *values, size_t count, double share)
     return values[count - 1 - (size_t)(share * (double)count)];
 }
 
-/* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and the
- * eye is where the narrower pair meets, in the middle of the other. */
+/* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and
+ * the eye is where the narrower pair meets, in the middle of the other. */
 static void find_eye(const struct spl_view_sample *s, double axes[3][3], const double tangent[2], double *values,
                      double eye[3])
 {
@@ -121,7 +119,7 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
     for (int c = 0; c < 2; c++)
         for (int k = 0; k < 2; k++) {
             for (size_t i = 0; i < s->count; i++)
-                values[i] = (k ? -1 : 1) * dot(axes[c], s->at[i]) - tangent[c] * dot(axes[2], s->at[i]);
+                values[i] = (k ? -1 : 1) * dot3(axes[c], s->at[i]) - tangent[c] * dot3(axes[2], s->at[i]);
             side[c][k] = most_of(values, s->count, beyond);
         }
     for (int c = 0; c < 2; c++) {
@@ -133,8 +131,10 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
         eye[c] = axes[0][c] * local[0] + axes[1][c] * local[1] + axes[2][c] * local[2];
 }
 
-int spl_view_fit(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
-                 double share, double least, double most, double fit[2], struct spl_error *err)
+/* The angles that the sample takes up around `target` from `eye`, in the frame, but for what `share` of it may lie
+ * beyond; with a margin, within [least, most] degrees. SPL_E_NOMEM. */
+static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3],
+                      const double up[3], double share, double least, double most, double fit[2], struct spl_error *err)
 {
     struct spl_camera camera = {0};
     int rc = spl_camera_look_at(&camera, eye, target, up, err);
@@ -145,9 +145,9 @@ int spl_view_fit(const struct spl_view_sample *s, const double eye[3], const dou
         size_t count = 0;
         for (size_t i = 0; i < s->count; i++) {
             double arm[3] = {s->at[i][0] - eye[0], s->at[i][1] - eye[1], s->at[i][2] - eye[2]};
-            double z = dot(&camera.rotation[6], arm);
+            double z = dot3(&camera.rotation[6], arm);
             if (z > 0)
-                values[count++] = fabs(dot(&camera.rotation[3 * c], arm)) / z;
+                values[count++] = fabs(dot3(&camera.rotation[3 * c], arm)) / z;
         }
         double tangent = count ? margin * most_of(values, count, share) : 0;
         fit[c] = fmin(most, fmax(least, 2 * atan(tangent) * 180 / M_PI));
@@ -156,7 +156,8 @@ int spl_view_fit(const struct spl_view_sample *s, const double eye[3], const dou
     return 0;
 }
 
-/* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from before. */
+/* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from
+ * before. */
 static double first_elevation(const struct spl_view_sample *s)
 {
     double height = s->high[2] - s->low[2], width = spl_view_sample_width(s);
@@ -166,7 +167,8 @@ static double first_elevation(const struct spl_view_sample *s)
 int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_view *view, struct spl_error *err)
 {
     static const double tangent[2] = {0.41421356237309503 * 16 / 9, 0.41421356237309503}; /* of 45 degrees upright */
-    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err), *values = spl_alloc_raw(s->count, sizeof *values, err);
+    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err),
+    *values = spl_alloc_raw(s->count, sizeof *values, err);
     double best = -1, axes[3][3], eye[3], target[3], up[3] = {0, 0, 1};
     double azimuth = 0, elevation = 0;
     int rc = depth && values ? 0 : SPL_E_NOMEM;
@@ -188,12 +190,12 @@ int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_vi
             middle[c] = 0.5 * (s->low[c] + s->high[c]) - eye[c];
             square += 0.25 * (s->high[c] - s->low[c]) * (s->high[c] - s->low[c]);
         }
-        double at = dot(axes[2], middle), depth_of = fmax(margin * at, sqrt(square)); /* not in a single point */
+        double at = dot3(axes[2], middle), depth_of = fmax(margin * at, sqrt(square)); /* not in a single point */
         for (int c = 0; c < 3; c++) {
             eye[c] -= (depth_of - at) * axes[2][c];
             target[c] = eye[c] + depth_of * axes[2][c];
         }
-        rc = spl_view_fit(s, eye, target, up, beyond, 20, 90, view->fit, err);
+        rc = fit_sample(s, eye, target, up, beyond, 20, 90, view->fit, err);
     }
     if (!rc) {
         spl_view_to_world(s, eye, view->eye);

@@ -1,6 +1,6 @@
 /* Where the points are, by quantiles: the box begins at a hundredth of them from either end and goes on outwards as
- * long as there is no gap, so that a mast or a wire that few points show belongs to it, and a bird or noise far off does
- * not. One thread; the outcome depends on the points alone. */
+ * long as there is no gap, so that a mast or a wire that few points show belongs to it, and a bird or noise far off
+ * does not. One thread; the outcome depends on the points alone. */
 #include "pack/view/sample.h"
 
 #include <math.h>
@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 #include "pack/up.h"
 
 enum { sample_max = 200000, tail = 100 };
@@ -19,11 +20,6 @@ static int compare_doubles(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 void spl_view_to_world(const struct spl_view_sample *s, const double local[3], double world[3])
 {
     for (int c = 0; c < 3; c++)
@@ -33,7 +29,7 @@ void spl_view_to_world(const struct spl_view_sample *s, const double local[3], d
 void spl_view_to_frame(const struct spl_view_sample *s, const double world[3], double local[3])
 {
     for (int a = 0; a < 3; a++)
-        local[a] = dot(s->frame[a], world);
+        local[a] = dot3(s->frame[a], world);
 }
 
 double spl_view_sample_width(const struct spl_view_sample *s)
@@ -116,8 +112,9 @@ int spl_view_sample_init(struct spl_view_sample *s, const struct spl_points *p, 
         spl_view_to_frame(s, (double[]){p->axis[0][i], p->axis[1][i], p->axis[2][i]}, s->at[k]);
         s->area[k] = p->radius[i] * p->radius[i];
         for (int a = 0; s->normal && a < 3; a++)
-            s->normal[k][a] = (float)(s->frame[a][0] * (double)p->normal[i][0] + s->frame[a][1] * (double)p->normal[i][1] +
-                                      s->frame[a][2] * (double)p->normal[i][2]);
+            s->normal[k][a] =
+                (float)(s->frame[a][0] * (double)p->normal[i][0] + s->frame[a][1] * (double)p->normal[i][1] +
+                        s->frame[a][2] * (double)p->normal[i][2]);
     }
     int rc = find_box(s, p, count, err);
     if (!rc)

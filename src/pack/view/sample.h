@@ -16,7 +16,8 @@ struct spl_view_sample {
     bool sides;            /* normals show to where the surface was seen from */
 };
 
-/* `unit_m` as of the coordinate system, 0 = not known. The caller finishes *sample, also after an error. SPL_E_NOMEM. */
+/* `unit_m` as of the coordinate system, 0 = not known. The caller finishes *sample, also after an error.
+ * SPL_E_NOMEM. */
 int spl_view_sample_init(struct spl_view_sample *sample, const struct spl_points *points, double unit_m, bool sides,
                          struct spl_error *err);
 void spl_view_sample_finish(struct spl_view_sample *sample);

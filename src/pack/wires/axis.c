@@ -1,12 +1,11 @@
 /* The axes of chains, and how thick what they run along is. A scan has points of a wire's surface, off by its noise; a
  * chain of them zigzags. Each point is moved to where a parabola through those before and behind it in its stretch has
- * it, over windows that are several times as long as the chain is wide. Then all points that belong to the chain, also those
- * that lie beside it, say by how far they are spread across: along the direction in which they are most, between the
- * quantiles at 5 and 95 %. Of a cylinder that is seen from one side these are 0.90 of its diameter apart, from all
- * sides 0.99. What the scan's noise adds is taken off: it lies along
- * the rays, so where it is about as large as the spread, which may then be either's, it is taken off those of both
- * directions together. Chains that are not long beside their width are no lines.
- * Owned by the thread that joins. */
+ * it, over windows that are several times as long as the chain is wide. Then all points that belong to the chain, also
+ * those that lie beside it, say by how far they are spread across: along the direction in which they are most, between
+ * the quantiles at 5 and 95 %. Of a cylinder that is seen from one side these are 0.90 of its diameter apart, from all
+ * sides 0.99. What the scan's noise adds is taken off: it lies along the rays, so where it is about as large as the
+ * spread, which may then be either's, it is taken off those of both directions together. Chains that are not long
+ * beside their width are no lines. Owned by the thread that joins. */
 #include "pack/wires/axis.h"
 
 #include <math.h>
@@ -14,11 +13,12 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/vector.h"
 
 static const double share_seen = 0.945;     /* of the diameter, between the quantiles */
 static const double quantile = 0.05, noise_span = 3.29; /* between them, of a normal distribution: sigma */
 static const double noise_small = 0.4;      /* of the square of the spread: what the noise adds there */
-static const double share_both = 0.93;      /* the sum of both spreads' squares, of the diameter's, seen from one side */
+static const double share_both = 0.93;      /* both spreads' squares in sum, of the diameter's, seen from one side */
 static const double break_at = 6;           /* spacings: beyond, another stretch begins */
 static const double window_wide = 8;        /* a window is so many times as long as the chain is spread */
 static const double length_least = 4;       /* widths, of a line */
@@ -32,11 +32,6 @@ struct chain {
     uint32_t count, off_count;
 };
 
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 /* Does the chain go on without a gap from its point `i` to the next? */
 static bool goes_on(const struct chain *c, uint32_t i)
 {
@@ -44,7 +39,7 @@ static bool goes_on(const struct chain *c, uint32_t i)
     if (i + 1 == c->count)
         return false;
     b = &c->points[c->order[i + 1]];
-    return distance(a->position, b->position) <= break_at * fmax(a->spacing, b->spacing);
+    return distance3(a->position, b->position) <= break_at * fmax(a->spacing, b->spacing);
 }
 
 /* Points [*first, *last] around `i` of its stretch: `half` on either side, more on one where the other has fewer. */
@@ -101,7 +96,7 @@ static void fit(const struct chain *c, uint32_t i, uint32_t half, double at[3], 
     if (last - first < 4 || !(length > 0))
         return;
     for (uint32_t j = first; j <= last; j++)
-        most = fmax(most, distance(c->points[c->order[j]].position, own));
+        most = fmax(most, distance3(c->points[c->order[j]].position, own));
     for (uint32_t j = first; j <= last; j++) {
         const double *p = c->points[c->order[j]].position;
         double t = 0, power = 1;

@@ -31,8 +31,8 @@ int spl_wires_grid_add(struct spl_wires_grid *grid, const double position[3], ui
 /* Then: sorts them, and each once. */
 void spl_wires_grid_sort(struct spl_wires_grid *grid);
 
-/* The cells [*first, the result) of what lies in the cell that is `shift` cells off that of `position`. Those of another
- * cell may be among them where a scan is wider than 2^21 cells. */
+/* The cells [*first, the result) of what lies in the cell that is `shift` cells off that of `position`. Those of
+ * another cell may be among them where a scan is wider than 2^21 cells. */
 size_t spl_wires_grid_find(const struct spl_wires_grid *grid, const double position[3], const int shift[3],
                            size_t *first);
 

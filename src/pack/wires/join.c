@@ -12,7 +12,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/array.h"
 #include "base/memory.h"
+#include "geom/vector.h"
 #include "pack/wires/grid.h"
 
 static const double near = 3;      /* spacings within which a point that is alone is joined */
@@ -108,18 +110,13 @@ static void lay_grid(struct join *j, uint32_t count, double edge, const uint8_t 
     qsort(j->cells, j->cell_count, sizeof *j->cells, compare_cells);
 }
 
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 double spl_wires_heading(const struct spl_wire_point *points, uint32_t point, uint32_t avoid, double reach,
                          double heading[3], struct spl_wires_work *work)
 {
     uint32_t before = point, at = points[point].next[points[point].next[0] == avoid];
     double length = 0;
     while (at != SPL_WIRE_END && step(work)) {
-        length = distance(points[point].position, points[at].position);
+        length = distance3(points[point].position, points[at].position);
         for (int c = 0; c < 3; c++)
             heading[c] = (points[point].position[c] - points[at].position[c]) / length;
         if (length >= reach)
@@ -155,7 +152,7 @@ static bool aim(const struct join *j, uint32_t a, uint32_t b, double length, dou
 static double cost_of(const struct join *j, uint32_t a, uint32_t b)
 {
     const struct spl_wire_point *p = j->points;
-    double length = distance(p[a].position, p[b].position), spacing = fmax(p[a].spacing, p[b].spacing);
+    double length = distance3(p[a].position, p[b].position), spacing = fmax(p[a].spacing, p[b].spacing);
     double aside[2][3] = {{0}}, differ = 0, out = 0;
     bool knows[2];
     if (p[a].other == b || length > spacing * far ||
@@ -186,19 +183,13 @@ static int find_pairs(struct join *j, double reach, uint64_t share, struct spl_e
             for (size_t m = first; m < j->cell_count && m < first + looks_most && j->cells[m].key == key; m++) {
                 uint32_t b = j->cells[m].point;
                 step(j->work);
-                if (b <= a || distance(j->points[a].position, j->points[b].position) > reach)
+                if (b <= a || distance3(j->points[a].position, j->points[b].position) > reach)
                     continue;
                 double cost = cost_of(j, a, b);
                 if (cost == INFINITY)
                     continue;
-                if (j->pair_count == j->pair_capacity) {
-                    size_t larger = 2 * j->pair_capacity + 1024;
-                    struct pair *pairs = spl_realloc(j->pairs, larger, sizeof *pairs, err);
-                    if (!pairs)
-                        return SPL_E_NOMEM;
-                    j->pairs = pairs;
-                    j->pair_capacity = larger;
-                }
+                if (spl_array_reserve(j->pairs, j->pair_capacity, j->pair_count + 1, err))
+                    return SPL_E_NOMEM;
                 j->pairs[j->pair_count++] = (struct pair){cost, a, b};
                 take(j->work, pair_steps);
             }
@@ -220,7 +211,7 @@ static int join_pairs(struct join *j)
             return rc;
         if (p[a].next[1] != SPL_WIRE_END || p[b].next[1] != SPL_WIRE_END || cost_of(j, a, b) == INFINITY)
             continue;
-        double length = p[a].length + p[b].length + distance(p[a].position, p[b].position);
+        double length = p[a].length + p[b].length + distance3(p[a].position, p[b].position);
         p[a].next[p[a].next[0] != SPL_WIRE_END] = b;
         p[b].next[p[b].next[0] != SPL_WIRE_END] = a;
         for (int k = 0; k < 2; k++) {
@@ -251,7 +242,7 @@ static int thin_out(struct join *j, uint32_t count, double edge, uint8_t *kept)
                 step(j->work);
                 if (b >= i)
                     break;
-                if (kept[b] && distance(p[i].position, p[b].position) < limit) {
+                if (kept[b] && distance3(p[i].position, p[b].position) < limit) {
                     kept[i] = 0;
                     p[i].beside = b;
                     break;

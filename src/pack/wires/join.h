@@ -47,9 +47,10 @@ static inline bool spl_wires_is_begin(const struct spl_wire_point *p, uint32_t i
     return p[i].next[0] != SPL_WIRE_END && p[i].next[1] == SPL_WIRE_END && p[i].other >= i;
 }
 
-/* Sets the links of `count` points (`next`, `other`, `length`, `beside`, which need no value before): chains without branches or
- * loops. Points that lie beside another one are left alone. Adds up to 2 `count` items to the stage. SPL_E_NOMEM; else
- * as spl_wires_check(): the links hold then, but are not all. Pure function but for `work`; any thread. */
+/* Sets the links of `count` points (`next`, `other`, `length`, `beside`, which need no value before): chains without
+ * branches or loops. Points that lie beside another one are left alone. Adds up to 2 `count` items to the stage.
+ * SPL_E_NOMEM; else as spl_wires_check(): the links hold then, but are not all. Pure function but for `work`; any
+ * thread. */
 int spl_wires_join(struct spl_wire_point *points, uint32_t count, struct spl_wires_work *work, struct spl_error *err);
 
 /* How `point` lies off what it is joined with on the other side of `avoid` (one of its links; SPL_WIRE_END at an end):

@@ -3,8 +3,8 @@
  * row of points lies on nothing says how thick it is; but it is thicker than a wire, so no line is made of what stands
  * upright.
  *
- * The search for linear points judges cells, and misses points at a wire's joints, ends and gaps: each would be a disc, as
- * large as the points are apart, on the line that runs through it. */
+ * The search for linear points judges cells, and misses points at a wire's joints, ends and gaps: each would be a disc,
+ * as large as the points are apart, on the line that runs through it. */
 #include "pack/wires/sides.h"
 
 #include <math.h>
@@ -34,7 +34,8 @@ static bool is_accompanied(const struct spl_wires_grid *grid, const struct spl_w
     double reach = fmin(around * p[i].spacing, grid->edge), limit = aside * p[i].spacing;
     uint32_t beside = 0;
     for (int k = 0; k < 27; k++) {
-        size_t first, end = spl_wires_grid_find(grid, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}, &first);
+        size_t first,
+            end = spl_wires_grid_find(grid, p[i].position, (int[3]){k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}, &first);
         end = end - first > looks_most ? first + looks_most : end;
         for (size_t m = first; m < end; m++) {
             double squared = 0, along = 0;

@@ -6,8 +6,8 @@
 #include "pack/wires/join.h"
 #include "pack/wires/wires.h"
 
-/* Sets the width of chains to 0 that are no wires: those that stand, along `up` of length 1, and those whose points have
- * others beside them, of something that is a surface. SPL_E_NOMEM, SPL_E_CANCELLED. One thread. */
+/* Sets the width of chains to 0 that are no wires: those that stand, along `up` of length 1, and those whose points
+ * have others beside them, of something that is a surface. SPL_E_NOMEM, SPL_E_CANCELLED. One thread. */
 int spl_wires_drop_thick(struct spl_wire_point *points, uint32_t count, const double up[3], struct spl_wires_work *work,
                          struct spl_error *err);
 

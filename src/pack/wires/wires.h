@@ -34,8 +34,8 @@ struct spl_wires_options {
 /* Joins the linear ones of `points`, which are sorted and have radii. Takes some 5 us and 120 bytes a linear point, of
  * which 60 stay, and never more than a bounded number of steps of each. SPL_E_NOMEM, SPL_E_CANCELLED, SPL_E_LIMIT where
  * there are more vertices than can be numbered. On failure too, `wires` is finished by the caller.
- * With `options` (NULL: without), lines are the axes of what was scanned and have widths, and points that no line stands
- * for are linear no more. */
+ * With `options` (NULL: without), lines are the axes of what was scanned and have widths, and points that no line
+ * stands for are linear no more. */
 int spl_wires_find(struct spl_wires *wires, struct spl_points *points, const struct spl_wires_options *options,
                    struct spl_stage *stage, struct spl_error *err);
 
@@ -50,12 +50,12 @@ struct spl_node_lines {
     size_t piece_capacity;
 };
 
-/* The pieces of points [begin, end), as lines. With `spacing` 0 as they were joined, those with widths but for vertices that
- * their bound does not need (of `error` 0 width * SPL_WIRES_WIDTH_ERROR); else simplified for a level whose
- * splats lie so far apart: no vertex that is left out lies farther off than spacing * SPL_WIRES_ERROR, lines of less
- * than spacing * SPL_WIRES_SHORTEST are left out whole, colours and normals are means, and radii are those of the
- * level. Where that is more than SPL_NODE_VERTICES vertices, as of a coarser level. Ends of a node's lines at pieces of
- * other nodes stay as they are, so lines meet whatever levels stand beside each other. False: no memory. Any thread. */
+/* The pieces of points [begin, end), as lines. With `spacing` 0 as they were joined, those with widths but for vertices
+ * that their bound does not need (of `error` 0 width * SPL_WIRES_WIDTH_ERROR); else simplified for a level whose splats
+ * lie so far apart: no vertex that is left out lies farther off than spacing * SPL_WIRES_ERROR, lines of less than
+ * spacing * SPL_WIRES_SHORTEST are left out whole, colours and normals are means, and radii are those of the level.
+ * Where that is more than SPL_NODE_VERTICES vertices, as of a coarser level. Ends of a node's lines at pieces of other
+ * nodes stay as they are, so lines meet whatever levels stand beside each other. False: no memory. Any thread. */
 #define SPL_WIRES_ERROR 0.25
 #define SPL_WIRES_SHORTEST 0.5
 #define SPL_WIRES_WIDTH_ERROR 0.25

@@ -113,7 +113,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
     struct spl_renderer *r = tile->renderer;
     struct spl_disc_kernels kernels;
     bool mapped = spl_tile_has_map_colors(tile, group);
-    const struct spl_kernel_key key = {"splat_shade", true, {group, [SPL_CONSTANT_PAINT] = spl_tile_get_paint(tile, group)}};
+    const struct spl_kernel_key key = {
+        "splat_shade", true, {group, [SPL_CONSTANT_PAINT] = spl_tile_get_paint(tile, group)}};
     int rc = spl_tile_get_disc_kernels(tile, key, &kernels, err);
     if (rc)
         return rc;

@@ -17,7 +17,8 @@ _Static_assert(SPL_SOFT_FIND_SHELLS >= 3 * SPL_SOFT_SHELLS_MAX + 1, "three integ
 bool spl_soft_is_found(const struct spl_view *view)
 {
     const uint32_t blended = 1u << SPL_LAYER_COLOR | 1u << SPL_LAYER_COVERAGE;
-    return view->soft.of != SPL_SOFT_OF_SOLID && view->soft.what.count && view->soft.opacity > 0 && view->layers & ~blended;
+    return view->soft.of != SPL_SOFT_OF_SOLID && view->soft.what.count && view->soft.opacity > 0 &&
+           view->layers & ~blended;
 }
 
 static uint32_t kernel_of(const struct spl_soft_params *soft)

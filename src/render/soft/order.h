@@ -1,12 +1,13 @@
 /* The order of soft spheres: items that a kernel gathered in the order of their ids are sorted by view depth (stable,
  * so that ties fall to the lower id), listed by the tiles of SPL_SOFT_TILE samples that they reach, and blended front
- * to back over what is solid. Counting sorts throughout: integers, the same order on every driver. Everything belongs to the renderer's thread.
+ * to back over what is solid. Counting sorts throughout: integers, the same order on every driver. Everything belongs
+ * to the renderer's thread.
  *
  *   items (ids) ── sort_count, sort_scan, sort_move, a digit of the depth at a time ──► pairs (depth, item) in order
  *         ── soft_list ──► count by tile ── the host: where lists start ──► lists of items ── soft_blend ──► samples
  *
- * GPUs take a sort in place of the second line's count: soft_entries, sort_…, soft_tiles. They have kernels sort_…_many:
- * blocks are short and scans shared by a workgroup.
+ * GPUs take a sort in place of the second line's count: soft_entries, sort_…, soft_tiles. They have kernels
+ * sort_…_many: blocks are short and scans shared by a workgroup.
  */
 #ifndef SPL_RENDER_SOFT_ORDER_H
 #define SPL_RENDER_SOFT_ORDER_H
@@ -42,7 +43,7 @@ enum spl_soft_buffer {
     SPL_SOFT_UNTILED,
     SPL_SOFT_COUNTS,
     SPL_SOFT_SLOTS,   /* what they have, for the host: where `many`, by way of SPL_SOFT_TOLD */
-    SPL_SOFT_TOLD,    /* counted there, since a GPU's atomics and scattered words are slow in the host's memory; else NULL */
+    SPL_SOFT_TOLD,    /* counted there: a GPU's atomics and scattered words are slow in the host's memory; else NULL */
     SPL_SOFT_FIRSTS,  /* their first items, from the host */
     SPL_SOFT_DIGITS,  /* totals of a sort */
     SPL_SOFT_TOTALS,  /* of tiles, for the host; then whether groups of walks are done */

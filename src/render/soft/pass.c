@@ -8,6 +8,7 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "base/float.h"
 #include "base/memory.h"
 #include "base/work.h"
 #include "render/frame.h"
@@ -181,15 +182,8 @@ static int draw_thick(struct pass *pass, const struct spl_soft_range *all, float
     return rc;
 }
 
-static uint32_t word_of(float number)
-{
-    uint32_t word;
-    memcpy(&word, &number, sizeof word);
-    return word;
-}
-
-/* Gives walks back that were kept. What they are of follows from what is to be drawn: where pages have come or gone since,
- * it is drawn anew. */
+/* Gives walks back that were kept. What they are of follows from what is to be drawn: where pages have come or gone
+ * since, it is drawn anew. */
 static int go_on(struct pass *pass, const struct spl_soft_counted *sum, struct spl_error *err)
 {
     struct spl_tile *tile = pass->tile;
@@ -204,7 +198,7 @@ static int go_on(struct pass *pass, const struct spl_soft_counted *sum, struct s
                                         .low = sum->low,
                                         .high = sum->high,
                                         .most = sum->most,
-                                        .reach = word_of(sum->reach)};
+                                        .reach = spl_float_to_bits(sum->reach)};
     if (!is_walked(pass))
         return SPL_OK;
     const float from = tile->pause->from;
@@ -247,10 +241,7 @@ int spl_soft_record(struct spl_tile *tile, uint32_t group, struct spl_error *err
                                   .run = tile_run},
                         .blends = group == SPL_SUMS_COLOR,
                         .finds = spl_soft_is_found(tile->view)};
-    const float near = tile->params.near, far = tile->params.far;
-    uint32_t low, high;
-    memcpy(&low, &near, sizeof low);
-    memcpy(&high, &far, sizeof high);
+    const uint32_t low = spl_float_to_bits(tile->params.near), high = spl_float_to_bits(tile->params.far);
     const struct spl_soft_range all = {(uint64_t)low << 32, (uint64_t)(high + 1) << 32};
     struct spl_soft_counted sum;
     pass.order.context = &pass;

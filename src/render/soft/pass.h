@@ -18,7 +18,8 @@ bool spl_soft_is_drawn(const struct spl_tile *tile);
 /* Records and runs it, once the solid depth is there: blends it where the layers of this `group` (SPL_SUMS_*) are
  * colours, and finds what the other layers of the view speak of. Of a tile's first group alone: the colours, where it
  * has any. SPL_FRAME_TOO_MUCH: the tile has more than a pixel, and more spheres overlap in it than are held at once;
- * its pieces are to be drawn instead. SPL_FRAME_PAUSED: tile->pause was due. SPL_E_LIMIT, field soft_model, where a pixel has so many. */
+ * its pieces are to be drawn instead. SPL_FRAME_PAUSED: tile->pause was due. SPL_E_LIMIT, field soft_model, where a
+ * pixel has so many. */
 int spl_soft_record(struct spl_tile *tile, uint32_t group, struct spl_error *err);
 
 #endif

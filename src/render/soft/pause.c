@@ -1,6 +1,6 @@
 /* Keeping walks while others have the device; see pause.h. They go by the memory that a tile is read back through, and
- * come by that of its parameters, behind which nothing else is recorded at that moment: so nothing is taken for it on the
- * device. */
+ * come by that of its parameters, behind which nothing else is recorded at that moment: so nothing is taken for it on
+ * the device. */
 #include "render/soft/pause.h"
 
 #include <stdlib.h>
@@ -49,8 +49,8 @@ void spl_soft_pause_drop(struct spl_soft_pause *pause)
     pause->words = NULL;
 }
 
-int spl_soft_pause_keep(struct spl_soft_pause *pause, struct spl_tile *tile, const struct spl_soft_walked *of, float from,
-                        struct spl_error *err)
+int spl_soft_pause_keep(struct spl_soft_pause *pause, struct spl_tile *tile, const struct spl_soft_walked *of,
+                        float from, struct spl_error *err)
 {
     const struct spl_scratch *scratch = &tile->renderer->scratch;
     const uint64_t state = sizeof(uint32_t) * SPL_SOFT_STATE_WORDS * tile->samples;

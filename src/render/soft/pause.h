@@ -43,8 +43,8 @@ void spl_soft_pause_walk(struct spl_soft_pause *pause);
 bool spl_soft_pause_is_due(struct spl_soft_pause *pause, const struct spl_tile *tile);
 
 /* Keeps the tile's walks where it has not too many samples. SPL_E_NOMEM, and as spl_tile_run(). */
-int spl_soft_pause_keep(struct spl_soft_pause *pause, struct spl_tile *tile, const struct spl_soft_walked *of, float from,
-                        struct spl_error *err);
+int spl_soft_pause_keep(struct spl_soft_pause *pause, struct spl_tile *tile, const struct spl_soft_walked *of,
+                        float from, struct spl_error *err);
 /* Gives them back to the device; *kept: whether there were some of the same. */
 int spl_soft_pause_give_back(struct spl_soft_pause *pause, struct spl_tile *tile, const struct spl_soft_walked *of,
                              bool *kept, struct spl_error *err);

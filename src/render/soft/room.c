@@ -128,8 +128,9 @@ int spl_soft_prepare(struct spl_renderer *renderer, const struct spl_camera *cam
     const uint64_t bytes = spl_soft_memory_bytes(&sizes, software);
     if (bytes > left) /* nothing that the view says alone: no field */
         return spl_fail(err, SPL_E_LIMIT,
-                        "soft spheres take at least %" PRIu64 " bytes of working memory in this view; of memory-limit, %"
-                        PRIu64 ", %" PRIu64 " are left beside the rest and the largest dataset's first page; a smaller "
+                        "soft spheres take at least %" PRIu64
+                        " bytes of working memory in this view; of memory-limit, %" PRIu64 ", %" PRIu64
+                        " are left beside the rest and the largest dataset's first page; a smaller "
                         "image or a higher lod takes less, or the service needs a memory-limit of %" PRIu64,
                         bytes, limits->memory_bytes, left, limits->memory_bytes + (bytes - left));
     spl_soft_memory_finish(memory, renderer->gpu);

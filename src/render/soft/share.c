@@ -40,8 +40,8 @@ static double share_of_values(const struct spl_marks_term *term, const struct sp
     return fmax(share, 0.5 / SPL_VALUES_QUANTILES); /* some are there: less than a quantile tells */
 }
 
-/* How far the bounds lie from a shape, as its term measures it: of a box that they reach, of one that is turned and of a
- * polygon, anything. Coordinates are measured from a plane through the origin. */
+/* How far the bounds lie from a shape, as its term measures it: of a box that they reach, of one that is turned and of
+ * a polygon, anything. Coordinates are measured from a plane through the origin. */
 static void measure_bounds(const struct spl_marks_term *term, const struct spl_dataset_info *info, double *low,
                            double *high)
 {
@@ -68,7 +68,7 @@ static void measure_bounds(const struct spl_marks_term *term, const struct spl_d
     *high = flat ? middle + reach : term->measure == SPL_TERM_AXIS ? from_axis + radius : INFINITY;
 }
 
-double spl_soft_share(const struct spl_marks_term *term, const struct spl_dataset_info *info)
+static double share_of(const struct spl_marks_term *term, const struct spl_dataset_info *info)
 {
     if (term->outside) /* of all terms of its list */
         return NAN;
@@ -94,7 +94,7 @@ double spl_soft_share_of_all(const struct spl_soft_params *soft, const struct sp
     if (spl_marks_resolve(soft, info, ends, &ignored))
         return NAN;
     for (uint32_t i = 0; i < soft->what.count; i++)
-        sum += spl_soft_share(&ends[i], info);
+        sum += share_of(&ends[i], info);
     return fmin(sum, 1) + (isnan(sum) ? sum : 0);
 }
 
@@ -114,7 +114,7 @@ void spl_soft_explain(const struct spl_term *term, const struct spl_dataset_info
     char text[96];
     size_t used = 0;
     *reason = '\0';
-    if (spl_marks_resolve(&one, info, &ends, &ignored) || !(spl_soft_share(&ends, info) == 0))
+    if (spl_marks_resolve(&one, info, &ends, &ignored) || !(share_of(&ends, info) == 0))
         return;
     const struct spl_stream_values *values =
         ends.stream >= 0 ? spl_dataset_info_get_values(info, (uint32_t)ends.stream) : NULL;

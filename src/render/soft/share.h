@@ -5,11 +5,9 @@
 
 #include "render/marks.h"
 
-/* The share, 0 to 1, of the leaf splats: of attributes exact where values are counted, else between quantiles; of shapes
- * 0 or 1 where the dataset's bounds lie on one side. NAN where it cannot be told. 0 is certain. */
-double spl_soft_share(const struct spl_marks_term *term, const struct spl_dataset_info *info);
-
-/* Of all terms of a view together: the sum of the shares, 1 at most; NAN as of one, SPL_E_INPUT in `err` included. */
+/* The share, 0 to 1, of the leaf splats that the terms of a view select: of attributes exact where values are counted,
+ * else between quantiles; of shapes 0 or 1 where the dataset's bounds lie on one side; of several terms their sum, 1 at
+ * most. NAN where it cannot be told. 0 is certain. */
 double spl_soft_share_of_all(const struct spl_soft_params *soft, const struct spl_dataset_info *info);
 
 /* Why no splat of the dataset is soft by the term: "class is 2, 5 or 6 in 'hall'". Empty where some may be. */

@@ -4,23 +4,9 @@
 #include "render/soft/thick.h"
 
 #include <math.h>
-#include <string.h>
 
+#include "base/float.h"
 #include "shared.h"
-
-static uint32_t key_of(float depth)
-{
-    uint32_t key;
-    memcpy(&key, &depth, sizeof key);
-    return key;
-}
-
-static float depth_of(uint32_t key)
-{
-    float depth;
-    memcpy(&depth, &key, sizeof depth);
-    return depth;
-}
 
 /* How far a sphere at such a depth may reach, with what kernels may be off. */
 static double slack(const struct spl_soft_thick *plan, double depth)
@@ -62,10 +48,10 @@ int spl_soft_thick_next(struct spl_soft_thick *plan, struct spl_soft_window *win
     const uint32_t first = (uint32_t)(plan->all.first >> 32), end = (uint32_t)(plan->all.end >> 32);
     if (plan->ended || first >= end)
         return SPL_OK;
-    const double from = (double)fmaxf(plan->from, depth_of(first)), back = from - slack(plan, from);
+    const double from = (double)fmaxf(plan->from, spl_float_of_bits(first)), back = from - slack(plan, from);
     uint32_t low = first, high = end;
-    if (plan->from > 0 && back > (double)depth_of(first))
-        low = key_of((float)(back * (1 - 1e-6)));
+    if (plan->from > 0 && back > (double)spl_float_of_bits(first))
+        low = spl_float_to_bits((float)(back * (1 - 1e-6)));
     low = low < first ? first : low < end ? low : end - 1;
     for (;;) {
         const uint32_t shift = shift_of(high - low), count = ((high - low - 1) >> shift) + 1;
@@ -82,7 +68,7 @@ int spl_soft_thick_next(struct spl_soft_thick *plan, struct spl_soft_window *win
         }
         const uint64_t behind = low + ((uint64_t)fits << shift), next = low + ((uint64_t)(fits + 1) << shift);
         const uint32_t cut = behind < high ? (uint32_t)behind : high, coarse = next < high ? (uint32_t)next : high;
-        const double depth = (double)depth_of(cut);
+        const double depth = (double)spl_float_of_bits(cut);
         const float until = (float)((depth - slack(plan, depth)) * (1 - 1e-7));
         const bool thick = (double)until > from + (double)plan->least;
         const bool filled = 2ull * sum.items >= plan->room.items || 2ull * sum.entries >= plan->room.entries;

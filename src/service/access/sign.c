@@ -76,7 +76,8 @@ static bool is_tile(const char *text, size_t length, bool holes)
         return false;
     at += sizeof tiles - 1;
     for (const char *hole = "zxy"; *hole; hole++) {
-        size_t taken = holes ? 3 * (size_t)(at + 3 <= end && at[0] == '{' && at[1] == *hole && at[2] == '}') : strspn(at, digits);
+        size_t taken =
+            holes ? 3 * (size_t)(at + 3 <= end && at[0] == '{' && at[1] == *hole && at[2] == '}') : strspn(at, digits);
         at += taken;
         if (!taken || (*hole != 'y' && *at++ != '/'))
             return false;
@@ -210,7 +211,8 @@ int spl_sign_check(const struct spl_sign_key *key, const char *path, const char 
     int64_t expires = parse_expiry(exp + 4, last - 1);
     if (expires < now_s)
         return spl_fail_field(err, SPL_E_INPUT, "exp", "the URL has expired; ask its author for a new one");
-    *out = (struct spl_signed){.kept = exp == query ? 0 : (size_t)(exp - query) - 1, .expires_s = expires, .grant = exp};
+    *out =
+        (struct spl_signed){.kept = exp == query ? 0 : (size_t)(exp - query) - 1, .expires_s = expires, .grant = exp};
     return 0;
 }
 
@@ -240,11 +242,12 @@ static int refuse(const char *url, const char *path, struct spl_error *err)
     size_t length = strcspn(path, "?#");
     bool page = find_id(path, pages);
     if (!spl_sign_covers(path, length) && !is_pyramid(path, length))
-        return spl_fail(err, SPL_E_USAGE,
-                        "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick, "
-                        "/place, /stations, /profile, /legend.svg and /thumbnail.jpg, its tiles /tiles/{z}/{x}/{y}.png, and the "
-                        "page /embed/ID; anything else needs a token",
-                        url);
+        return spl_fail(
+            err, SPL_E_USAGE,
+            "'%.200s' cannot be signed: a signature allows to GET /v1/datasets/ID, its /view, /pick, "
+            "/place, /stations, /profile, /legend.svg and /thumbnail.jpg, its tiles /tiles/{z}/{x}/{y}.png, and the "
+            "page /embed/ID; anything else needs a token",
+            url);
     if (page && path[length] == '?')
         return spl_fail(err, SPL_E_USAGE,
                         "'%.200s' cannot be signed: /embed/ID takes camera and settings behind '#', not behind '?'",

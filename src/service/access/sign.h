@@ -6,9 +6,9 @@
  * /embed/ID?exp=UNIX-SECONDS with the ID decoded, so it is no other URL's, and says of which dataset and how long. Pure
  * functions but for the reading of the key; any thread.
  *
- * The tiles of a dataset are signed together: the text is /v1/datasets/ID/tiles/?PARAMETERS&exp=UNIX-SECONDS, which is no
- * path of its own, and good for /v1/datasets/ID/tiles/Z/X/Y.png (.webp, @2x) of any Z, X and Y with these parameters, and
- * for /v1/datasets/ID/tiles.json with them. One tile can be signed by itself, as any other URL. */
+ * The tiles of a dataset are signed together: the text is /v1/datasets/ID/tiles/?PARAMETERS&exp=UNIX-SECONDS, which is
+ * no path of its own, and good for /v1/datasets/ID/tiles/Z/X/Y.png (.webp, @2x) of any Z, X and Y with these
+ * parameters, and for /v1/datasets/ID/tiles.json with them. One tile can be signed by itself, as any other URL. */
 #ifndef SPL_SERVICE_SIGN_H
 #define SPL_SERVICE_SIGN_H
 
@@ -49,8 +49,9 @@ int spl_sign_check(const struct spl_sign_key *key, const char *path, const char 
 const char *spl_sign_path_of(const char *url);
 
 /* Appends exp and sig to `url`, with or without scheme and host, and before its fragment, which only
- * a page has; a URL of tiles may be a template, with {z}/{x}/{y}; "<>' and what is not ASCII in its query become %22 and so on, as browsers write them.
- * The caller frees *out. SPL_E_USAGE for what is no URL, is signed already, or cannot be signed. */
+ * a page has; a URL of tiles may be a template, with {z}/{x}/{y}; "<>' and what is not ASCII in its query become %22
+ * and so on, as browsers write them. The caller frees *out. SPL_E_USAGE for what is no URL, is signed already, or
+ * cannot be signed. */
 int spl_sign_url(const struct spl_sign_key *key, const char *url, int64_t expires_s, char **out, struct spl_error *err);
 
 #endif

@@ -12,6 +12,7 @@
 
 #include "base/array.h"
 #include "base/memory.h"
+#include "base/text.h"
 #include "service/access/secret.h"
 
 enum { tokens_max = 4096, line_max = 1024, file_max = 1 << 20, token_least = 16, token_most = 256 };
@@ -35,14 +36,6 @@ struct place {
     size_t line;
 };
 
-static int hex_value(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
-
 static int parse_token(struct spl_token *token, const char *text, const struct place *at, struct spl_error *err)
 {
     static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~+/=";
@@ -50,7 +43,7 @@ static int parse_token(struct spl_token *token, const char *text, const struct p
     if (!strncmp(text, "sha256:", 7)) {
         bool good = length == 7 + 2 * SPL_DIGEST_BYTES;
         for (int i = 0; good && i < SPL_DIGEST_BYTES; i++) {
-            int high = hex_value(text[7 + 2 * i]), low = hex_value(text[8 + 2 * i]);
+            int high = spl_text_get_hex(text[7 + 2 * i]), low = spl_text_get_hex(text[8 + 2 * i]);
             good = high >= 0 && low >= 0;
             token->digest[i] = (uint8_t)(good ? 16 * high + low : 0);
         }

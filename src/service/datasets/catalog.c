@@ -111,7 +111,8 @@ void spl_catalog_hide_folder(char *out, size_t capacity, const char *message, co
 void spl_catalog_set_reason(struct spl_catalog_slot *slot, const char *message)
 {
     char shown[1024]; // as messages name a URL
-    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message, spl_remote_show(slot->path, shown, sizeof shown));
+    spl_catalog_hide_folder(slot->reason, sizeof slot->reason, message,
+                            spl_remote_show(slot->path, shown, sizeof shown));
 }
 
 bool spl_catalog_may_pass(const char *path, const struct spl_error *why)

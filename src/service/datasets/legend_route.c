@@ -12,7 +12,8 @@
 #include "service/reply.h"
 #include "service/request/values.h"
 
-enum { width = 280, margin = 12, bar = 18, row = 20, title = 22, ticks = 5, text_room = 5, stops = 17, kinds_most = 32 };
+enum { width = 280, margin = 12, bar = 18, row = 20, title = 22, ticks = 5, text_room = 5 };
+enum { stops = 17, kinds_most = 32 };
 
 static void begin(FILE *out, const char *name, const char *unit, int height)
 {

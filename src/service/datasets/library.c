@@ -136,7 +136,8 @@ static void open_slot(struct spl_service *service, struct spl_catalog_slot *slot
 static void open_far(struct spl_service *service)
 {
     struct spl_library *library = service->library;
-    for (size_t i = 0; i < library->catalog.count && !library->stopped && library->far_openings < SPL_FAR_OPENINGS_MAX; i++) {
+    for (size_t i = 0; i < library->catalog.count && !library->stopped && library->far_openings < SPL_FAR_OPENINGS_MAX;
+         i++) {
         struct spl_catalog_slot *slot = &library->catalog.slots[i];
         if (!slot->busy && !slot->current && !slot->reason[0] && spl_remote_is_url(slot->path))
             open_slot(service, slot);

@@ -40,7 +40,7 @@ enum { SPL_FAR_OPENINGS_MAX = 4, SPL_POOL_THREADS = 8 /* of which the rest is fo
 
 /* library.c: datasets that come, change and go while the service runs. init makes what the loop holds. */
 void spl_library_init(struct spl_service *service);
-void spl_library_start(struct spl_service *service);        /* once the pipeline is ready: opens what is on servers, too */
+void spl_library_start(struct spl_service *service);        /* once the pipeline is ready: opens what is on servers */
 void spl_library_take_changes(struct spl_service *service); /* what the gpu thread has added, refused and let go of */
 void spl_library_serve(struct spl_catalog_slot *slot, struct spl_catalog_entry *entry); /* takes the resident `entry` */
 struct spl_dataset_opening spl_library_get_opening(struct spl_service *service); /* as the operator says; any thread */

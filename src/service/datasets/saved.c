@@ -95,7 +95,8 @@ int spl_saved_create(const char *place, const struct spl_dataset_info *info, str
     saved->names.find = find;
     saved->info = info;
     if (parse_file(saved, &why)) {
-        spl_log_warn("views of dataset %s: %s is left out: %s", info->id, strrchr(saved->path, '/') ? strrchr(saved->path, '/') + 1 : saved->path, why.message);
+        spl_log_warn("views of dataset %s: %s is left out: %s", info->id,
+                     strrchr(saved->path, '/') ? strrchr(saved->path, '/') + 1 : saved->path, why.message);
         saved->broken = true;
         saved->count = 0;
     }
@@ -179,9 +180,10 @@ int spl_saved_prepare(struct spl_saved *saved, const char *name, const struct sp
     struct spl_saved_view views[SPL_SAVED_VIEWS_MAX];
     *text = NULL;
     if (saved->broken)
-        return spl_fail(err, SPL_E_CORRUPT,
-                        "the file of the dataset's views cannot be read, and is not written over; its operator mends or "
-                        "removes it, and starts the service again");
+        return spl_fail(
+            err, SPL_E_CORRUPT,
+            "the file of the dataset's views cannot be read, and is not written over; its operator mends or "
+            "removes it, and starts the service again");
     pthread_mutex_lock(&saved->mutex);
     uint32_t count = saved->count;
     memcpy(views, saved->views, sizeof views);

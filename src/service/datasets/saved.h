@@ -1,5 +1,5 @@
-/* The views of a dataset by name: those that it was packed with, and those that clients have saved, which lie beside its
- * file as NAME.views.json and stand before the others. A container that is served is never written to.
+/* The views of a dataset by name: those that it was packed with, and those that clients have saved, which lie beside
+ * its file as NAME.views.json and stand before the others. A container that is served is never written to.
  *
  * The list may be asked by any thread; it is changed by the loop's, after the pool has written the file. */
 #ifndef SPL_SERVICE_SAVED_H
@@ -15,8 +15,8 @@
 
 struct spl_saved;
 
-/* Reads the file beside the dataset at `place`, where there is one. One that is broken counts as none, and is not written
- * over. SPL_E_NOMEM. Blocks on disk. `info` is borrowed until destroy. */
+/* Reads the file beside the dataset at `place`, where there is one. One that is broken counts as none, and is not
+ * written over. SPL_E_NOMEM. Blocks on disk. `info` is borrowed until destroy. */
 int spl_saved_create(const char *place, const struct spl_dataset_info *info, struct spl_saved **out,
                      struct spl_error *err);
 void spl_saved_destroy(struct spl_saved *saved); /* NULL-safe */

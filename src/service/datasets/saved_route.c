@@ -1,8 +1,8 @@
-/* PUT and DELETE of a view by name: checked, written by the pool, then in use, then the reply. One that ends in an error
- * has changed nothing.
+/* PUT and DELETE of a view by name: checked, written by the pool, then in use, then the reply. One that ends in an
+ * error has changed nothing.
  *
- * Invariant: a saving belongs to the pool until after(), whether its request still waits or not; of a dataset one runs at
- * a time. Owned by the loop's thread, but for run(). */
+ * Invariant: a saving belongs to the pool until after(), whether its request still waits or not; of a dataset one runs
+ * at a time. Owned by the loop's thread, but for run(). */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -110,9 +110,10 @@ static bool may_change(struct request *request, const struct spl_call *call)
     } else if (!call->entry || !slot) {
         spl_fail_field(&err, SPL_E_NOT_FOUND, "id", "there is no dataset '%s'; /v1/datasets lists them", call->id);
     } else if (!slot->in_directory) {
-        spl_reply_problem(request, MHD_HTTP_CONFLICT, "conflict", "id",
-                          "this dataset's file was named itself when the service was started, so only its operator puts "
-                          "views beside it");
+        spl_reply_problem(
+            request, MHD_HTTP_CONFLICT, "conflict", "id",
+            "this dataset's file was named itself when the service was started, so only its operator puts "
+            "views beside it");
         return false;
     } else if (service->draining || slot->busy || call->entry->saving) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed; come back later", call->id);

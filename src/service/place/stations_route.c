@@ -23,8 +23,8 @@ static json_t *describe(const struct spl_catalog_entry *entry, uint32_t number, 
     return json;
 }
 
-static int read_query(const struct request *request, const struct spl_dataset_info *info, uint32_t *crs, uint32_t *first,
-                      uint32_t *count, struct spl_error *err)
+static int read_query(const struct request *request, const struct spl_dataset_info *info, uint32_t *crs,
+                      uint32_t *first, uint32_t *count, struct spl_error *err)
 {
     struct values values = {0};
     int rc = spl_values_from_query(&values, request->query, strlen(request->query), SPL_STATIONS, err);
@@ -34,8 +34,8 @@ static int read_query(const struct request *request, const struct spl_dataset_in
     if (most->given && !(most->n[0] >= 1 && most->n[0] <= at_once))
         return spl_fail_field(err, SPL_E_INPUT, "count", "count %.0f is outside 1 to %d", most->n[0], at_once);
     if (from->n[0] > info->station_count)
-        return spl_fail_field(err, SPL_E_INPUT, "first", "first %.0f is beyond the %u stations of dataset '%s'", from->n[0],
-                              info->station_count, info->id);
+        return spl_fail_field(err, SPL_E_INPUT, "first", "first %.0f is beyond the %u stations of dataset '%s'",
+                              from->n[0], info->station_count, info->id);
     *crs = (uint32_t)values.v[PARAM_crs].n[0];
     *first = (uint32_t)from->n[0];
     *count = most->given ? (uint32_t)most->n[0] : at_once;
@@ -62,7 +62,8 @@ void spl_show_stations(struct request *request, const struct spl_call *call)
             spl_reply_error(request, &err);
         return;
     }
-    json_t *json = json_pack("{s:i, s:i, s:o}", "count", (int)entry->info->station_count, "first", (int)first, "stations", list);
+    json_t *json =
+        json_pack("{s:i, s:i, s:o}", "count", (int)entry->info->station_count, "first", (int)first, "stations", list);
     if (crs)
         json_object_set_new(json, "crs", json_sprintf("EPSG:%u", crs));
     spl_reply_json(request, json);

@@ -2,8 +2,8 @@
  * so values are counted before it is asked: what stands outside strings tells how many there can be. It copies a long
  * text many times over, and reads a number of a million digits in 30 ms, so both have a limit too.
  *
- * Invariant: a document has no more values, is no deeper and has no longer text or number than was said. Pure functions,
- * any thread. */
+ * Invariant: a document has no more values, is no deeper and has no longer text or number than was said. Pure
+ * functions, any thread. */
 #include "service/request/body.h"
 
 #include <ctype.h>
@@ -65,9 +65,10 @@ json_t *spl_body_parse(const char *body, size_t length, size_t values_max, size_
     const struct size size = measure(body, length);
     json_error_t where;
     if (size.values > values_max || size.depth > depth_max || size.text > text_max) {
-        spl_fail_field(err, SPL_E_INPUT, "body",
-                       "the body has %zu values, is %zu deep and has a text of %zu bytes; the limits are %zu, %d and %zu",
-                       size.values, size.depth, size.text, values_max, depth_max, text_max);
+        spl_fail_field(
+            err, SPL_E_INPUT, "body",
+            "the body has %zu values, is %zu deep and has a text of %zu bytes; the limits are %zu, %d and %zu",
+            size.values, size.depth, size.text, values_max, depth_max, text_max);
         return NULL;
     }
     if (size.number > number_max) {

@@ -13,8 +13,8 @@ enum {
 };
 
 /* The document, the caller's; NULL for what is no JSON, has a key twice, has more than `values_max` values, a text of
- * more than `text_max` bytes or a number of more than 2 KiB (SPL_E_INPUT, field "body"). `body` need not end in NUL, and
- * may be NULL where length is 0. */
+ * more than `text_max` bytes or a number of more than 2 KiB (SPL_E_INPUT, field "body"). `body` need not end in NUL,
+ * and may be NULL where length is 0. */
 json_t *spl_body_parse(const char *body, size_t length, size_t values_max, size_t text_max, struct spl_error *err);
 
 #endif

@@ -67,7 +67,8 @@ int spl_values_from_object(struct values *values, json_t *object, enum spl_value
         }
         if (kind == SPL_KIND_COLOR_BY) {
             if (!json_is_string(json))
-                return spl_fail_field(err, SPL_E_INPUT, name, "%s must be text, not %s", name, spl_json_type_name(json));
+                return spl_fail_field(err, SPL_E_INPUT, name, "%s must be text, not %s", name,
+                                      spl_json_type_name(json));
             if ((rc = spl_values_set_color(values, json_string_value(json), err)))
                 return rc;
             continue;

@@ -29,7 +29,8 @@ static int resolve(struct values *values, const struct spl_camera_defaults *defa
         (rc = resolve_point(values, PARAM_x, "x", camera->width, &out->pick.x, err)) ||
         (rc = resolve_point(values, PARAM_y, "y", camera->height, &out->pick.y, err)))
         return rc;
-    struct spl_view_request picture = {.layer = SPL_LAYER_COLOR, .view.camera = *camera}; /* of which a pick has none: it is only checked */
+    // a pick has no picture: what is said of one is only checked
+    struct spl_view_request picture = {.layer = SPL_LAYER_COLOR, .view.camera = *camera};
     if ((rc = spl_values_resolve_encoding(values, &picture, err)))
         return rc;
     out->pick.crs = (uint32_t)values->v[PARAM_crs].n[0];

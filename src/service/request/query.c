@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "base/decimal.h"
+#include "base/text.h"
 #include "service/request/values.h"
 
 enum { name_max = 64, text_max = 512 };
@@ -19,8 +20,8 @@ int spl_percent_decode(const char *text, size_t length, char *out, size_t capaci
     for (size_t i = 0; i < length; i++) {
         int byte = (unsigned char)text[i];
         if (byte == '%') {
-            int high = i + 2 < length ? spl_hex_digit(text[i + 1]) : -1;
-            int low = i + 2 < length ? spl_hex_digit(text[i + 2]) : -1;
+            int high = i + 2 < length ? spl_text_get_hex(text[i + 1]) : -1;
+            int low = i + 2 < length ? spl_text_get_hex(text[i + 2]) : -1;
             if (high < 0 || low < 0)
                 return spl_fail_field(err, SPL_E_INPUT, field,
                                       "'%%' at byte %zu of %s is not followed by two hex digits", i + 1, field);

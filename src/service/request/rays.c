@@ -1,5 +1,5 @@
-/* Rays: a view whose pixels look where a list says. The list comes first, from NPY or JSON, and then the view around it, by
- * the parameters of any other. Pure functions, any thread. */
+/* Rays: a view whose pixels look where a list says. The list comes first, from NPY or JSON, and then the view around
+ * it, by the parameters of any other. Pure functions, any thread. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,7 +42,8 @@ int spl_rays_from_json(const json_t *list, struct spl_rays **out, struct spl_err
         return spl_fail_field(err, SPL_E_INPUT, "directions", "'directions' must be an array of [x, y, z], not %s",
                               list ? spl_json_type_name(list) : "missing");
     if (!count || count > SPL_RAYS_JSON_MAX)
-        return spl_fail_field(err, SPL_E_INPUT, "directions", "there are %zu directions; JSON takes 1 to %d, NPY up to %d", count,
+        return spl_fail_field(err, SPL_E_INPUT, "directions",
+                              "there are %zu directions; JSON takes 1 to %d, NPY up to %d", count,
                               (int)SPL_RAYS_JSON_MAX, (int)SPL_RAYS_MAX);
     double *directions = spl_alloc_raw(3 * count, sizeof *directions, err);
     int rc = directions ? 0 : SPL_E_NOMEM;
@@ -52,7 +53,8 @@ int spl_rays_from_json(const json_t *list, struct spl_rays **out, struct spl_err
             const json_t *number = json_array_get(one, k);
             directions[3 * i + k] = json_number_value(number);
             if (!json_is_number(number) || json_array_size(one) != 3)
-                rc = spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] must be three numbers, [x, y, z]", i);
+                rc = spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] must be three numbers, [x, y, z]",
+                                    i);
         }
     }
     rc = rc ? rc : spl_rays_create(directions, count, out, err);
@@ -94,8 +96,8 @@ int spl_rays_request_from(json_t *rest, const char *query, size_t length, const 
     for (int i = SPL_CAMERA_model; i <= SPL_CAMERA_height; i++)
         if (values.v[i].given) {
             const char *name = values.v[i].source ? values.v[i].source : spl_params[i].name;
-            return spl_fail_field(err, SPL_E_INPUT, name, "'%s' says where the pixels of an image look; here 'directions' do",
-                                  name);
+            return spl_fail_field(err, SPL_E_INPUT, name,
+                                  "'%s' says where the pixels of an image look; here 'directions' do", name);
         }
     if (rays->count > limits->pixels)
         return spl_fail_field(err, SPL_E_INPUT, "directions", "there are %u directions; the limit is %llu", rays->count,

@@ -138,7 +138,10 @@ static int check_cost(const struct spl_view *view, const struct spl_camera_limit
     uint64_t samples = spl_view_get_samples(view), bytes = spl_view_get_frame_bytes(view);
     const struct spl_camera *camera = &view->camera;
     if (limits->samples && samples > limits->samples)
-        return spl_fail_field(err, SPL_E_INPUT, view->supersample > 1 ? "supersample" : view->rays ? "resolution" : "width",
+        return spl_fail_field(err, SPL_E_INPUT,
+                              view->supersample > 1 ? "supersample"
+                              : view->rays          ? "resolution"
+                                                    : "width",
                               "%u x %u pixels with supersample %g are %llu samples; the limit is %llu", camera->width,
                               camera->height, view->supersample, (unsigned long long)samples,
                               (unsigned long long)limits->samples);
@@ -169,9 +172,10 @@ static int resolve_demand(const struct values *values, const struct spl_camera_l
                               "budget and psnr are about one layer; ask for it with 'layer'");
     out->planned = given(values, PARAM_budget) || given(values, PARAM_psnr);
     if (out->planned && spl_camera_is_bent(&out->view.camera))
-        return spl_fail_field(err, SPL_E_INPUT, given(values, PARAM_budget) ? "budget" : "psnr",
-                              "what settings cost and gain is known of pinholes and parallel rays; give method, lod and "
-                              "supersample");
+        return spl_fail_field(
+            err, SPL_E_INPUT, given(values, PARAM_budget) ? "budget" : "psnr",
+            "what settings cost and gain is known of pinholes and parallel rays; give method, lod and "
+            "supersample");
     demand->budget_ms = budget;
     demand->psnr = psnr;
     demand->width = out->view.camera.width;
@@ -224,12 +228,11 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
     out->named = given(values, PARAM_view);
     if ((rc = spl_values_choose_view(values, &defaults, &own, err)) ||
         (rc = spl_camera_from_values(values->v, defaults, limits, &out->view.camera, err)) ||
-        (values->rays && (rc = spl_view_set_rays(&out->view, values->rays, (enum spl_ray_frame)get(values, PARAM_frame, 0),
-                                                 get(values, PARAM_resolution, 0), err))) ||
-        (rc = resolve_drawing(values, out, err)) ||
-        (rc = spl_values_resolve_terms(values, defaults, out, err)) ||
-        (rc = spl_values_resolve_encoding(values, out, err)) ||
-        (rc = resolve_demand(values, limits, out, err)))
+        (values->rays &&
+         (rc = spl_view_set_rays(&out->view, values->rays, (enum spl_ray_frame)get(values, PARAM_frame, 0),
+                                 get(values, PARAM_resolution, 0), err))) ||
+        (rc = resolve_drawing(values, out, err)) || (rc = spl_values_resolve_terms(values, defaults, out, err)) ||
+        (rc = spl_values_resolve_encoding(values, out, err)) || (rc = resolve_demand(values, limits, out, err)))
         return rc;
     spl_values_resolve_version(values, out);
     out->view.partial = get(values, PARAM_wait, 1) == 0;

@@ -79,8 +79,8 @@ int spl_pick_request_from_json(const char *body, size_t length, const struct spl
                                struct spl_error *err);
 
 /* POST …/rays: directions to look along instead of an image's pixels. The list is read first: of NPY, or of JSON, whose
- * object loses its member "directions"; errors are of that field. JSON holds fewer, since it takes a hundred times as long.
- * Any thread; blocks for the reading. The caller destroys *out. */
+ * object loses its member "directions"; errors are of that field. JSON holds fewer, since it takes a hundred times as
+ * long. Any thread; blocks for the reading. The caller destroys *out. */
 enum { SPL_RAYS_JSON_MAX = 1 << 15, SPL_RAYS_BODY_VALUES = 4 * SPL_RAYS_JSON_MAX + (1 << 12) };
 int spl_rays_from_npy(FILE *file, uint64_t bytes, const char *name, struct spl_rays **out, struct spl_error *err);
 int spl_rays_from_json(const json_t *directions, struct spl_rays **out, struct spl_error *err);
@@ -104,8 +104,8 @@ int spl_views_request_from_json(const char *body, size_t length, const struct sp
                                 struct spl_error *err);
 void spl_views_request_finish(struct spl_views_request *request);
 
-/* Points of shapes from EPSG:`crs` to the world; directions are of the world's axes, as up is, and distances in its unit.
- * A box, which would not be one there, is refused, as x, y and z are. Errors are those of places->to_world(), or
+/* Points of shapes from EPSG:`crs` to the world; directions are of the world's axes, as up is, and distances in its
+ * unit. A box, which would not be one there, is refused, as x, y and z are. Errors are those of places->to_world(), or
  * SPL_E_INPUT, of `field`. */
 int spl_terms_to_world(struct spl_terms *terms, const char *field, uint32_t crs, const struct spl_camera_places *places,
                        struct spl_error *err);

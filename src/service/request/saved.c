@@ -1,5 +1,5 @@
-/* What a saved view says beside its camera: parameters of place SPL_SAVED, as JSON, which stand for those that a request
- * leaves out.
+/* What a saved view says beside its camera: parameters of place SPL_SAVED, as JSON, which stand for those that a
+ * request leaves out.
  *
  * Invariant: what is drawn is taken whole: a request's own clip takes the place of the view's, its class that of the
  * view's. Pure functions, any thread. */

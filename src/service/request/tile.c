@@ -18,7 +18,8 @@ int spl_tile_request_from_query(const char *query, size_t length, const struct s
                                 struct spl_view_request *out, struct spl_error *err)
 {
     struct values values = {0};
-    const double *eye = tile->eye, side = tile->side, format = tile->format, projection = SPL_ORTHOGRAPHIC, yes = 1, no = 0;
+    const double *eye = tile->eye, side = tile->side, format = tile->format, projection = SPL_ORTHOGRAPHIC, yes = 1,
+                 no = 0;
     int rc = spl_values_from_query(&values, query, length, SPL_TILE, err);
     if (rc)
         return rc;

@@ -23,13 +23,14 @@ const struct param_info spl_params[PARAM_COUNT] = {
 static const char *say_taken(enum spl_value_place place)
 {
     return place & (SPL_PICK | SPL_PICK_BODY) ? "a pick takes x, y, a camera, method, its settings and v"
-           : place == SPL_TILE ? "a tile's path says where it lies; it takes what is drawn (clip, class, soft), how (method, lod, color_by, "
-                                 "shade, supersample, …), background, quality, wait and v"
+           : place == SPL_TILE ? "a tile's path says where it lies; it takes what is drawn (clip, class, soft), how "
+                                 "(method, lod, color_by, shade, supersample, …), background, quality, wait and v"
            : place == SPL_THUMBNAIL ? "a thumbnail takes width, background, clip, class and v"
-           : place == SPL_SAVED     ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
-           : place == SPL_PLACE     ? "a dataset takes crs, a place crs and position or world"
-           : place == SPL_STATIONS  ? "a list of stations takes crs, first and count"
-                                    : NULL;
+           : place == SPL_SAVED
+               ? "a saved view keeps what is drawn (clip, class, soft), colours, shading and background"
+           : place == SPL_PLACE    ? "a dataset takes crs, a place crs and position or world"
+           : place == SPL_STATIONS ? "a list of stations takes crs, first and count"
+                                   : NULL;
 }
 
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
@@ -61,14 +62,6 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
     spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s", name,
                    taken ? taken : "/v1/openapi.json lists those of a view");
     return PARAM_COUNT;
-}
-
-int spl_hex_digit(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
 }
 
 static int parse_color(struct spl_value *value, const char *name, const char *text, struct spl_error *err)

@@ -69,9 +69,6 @@ int spl_ray_frame_from_name(const char *name); /* -1: unknown */
 /* JSON where a list of rays is sent, in place of a format. */
 enum { SPL_FORMAT_LISTED = SPL_FORMAT_COUNT };
 
-/* 0..15, -1 for anything else. */
-int spl_hex_digit(char c);
-
 /* The parameter called `name` in `place`; PARAM_COUNT and a filled `err` for one that is unknown there. */
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err);
 
@@ -96,14 +93,14 @@ int spl_values_from_body(struct values *values, const char *body, size_t length,
 int spl_values_set_color(struct values *values, const char *text, struct spl_error *err);
 void spl_values_resolve_colors(const struct values *values, struct spl_view *view);
 
-/* terms.c: more terms of PARAM_soft, _clip or _class, as text, or as JSON: text, or an array of such, which may be empty
- * and then says nothing. */
+/* terms.c: more terms of PARAM_soft, _clip or _class, as text, or as JSON: text, or an array of such, which may be
+ * empty and then says nothing. */
 int spl_values_add_terms(struct values *values, int param, const char *text, struct spl_error *err);
 int spl_values_add_terms_json(struct values *values, int param, const json_t *json, struct spl_error *err);
 /* Those of `common` where it has none of its own. */
 void spl_values_inherit_terms(struct values *values, const struct values *common);
-/* `defaults`, or with `view` those of that view, in *own; what its settings say and the request does not is given from then
- * on. SPL_E_INPUT, field "view". */
+/* `defaults`, or with `view` those of that view, in *own; what its settings say and the request does not is given from
+ * then on. SPL_E_INPUT, field "view". */
 int spl_values_choose_view(struct values *values, const struct spl_camera_defaults **defaults,
                            struct spl_camera_defaults *own, struct spl_error *err);
 /* The terms in the world; with crs shapes are given in that. */

@@ -63,9 +63,11 @@ static int resolve_all(const struct values *common, json_t *list, const struct s
             return spl_fail_field(err, rc, field, "view %zu: %s", out->count, why.message);
         lenses += spl_camera_is_bent(&view->view.camera) && has_own_lens(out, &view->view);
         if (lenses > SPL_VIEW_LENSES_KEPT)
-            return spl_fail_field(err, SPL_E_INPUT, "views",
-                                  "views[%zu] is beyond the %d lenses and panoramas of a batch that differ in more than "
-                                  "their pose; ask for them in several batches", out->count, SPL_VIEW_LENSES_KEPT);
+            return spl_fail_field(
+                err, SPL_E_INPUT, "views",
+                "views[%zu] is beyond the %d lenses and panoramas of a batch that differ in more than "
+                "their pose; ask for them in several batches",
+                out->count, SPL_VIEW_LENSES_KEPT);
         pixels += (uint64_t)view->view.camera.width * view->view.camera.height;
         samples += spl_view_get_samples(&view->view);
     }

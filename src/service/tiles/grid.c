@@ -64,12 +64,13 @@ int spl_tile_name_parse(const char *text, struct spl_tile_name *name, struct spl
     }
     int format = y >= 0 && *at == '.' ? spl_format_from_name(at + 1) : -1;
     if (format != SPL_FORMAT_PNG && format != SPL_FORMAT_WEBP)
-        return spl_fail_field(err, SPL_E_NOT_FOUND, "tile", "'%.64s' is no tile; write z/x/y.png, .webp or @2x.png", text);
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "tile", "'%.64s' is no tile; write z/x/y.png, .webp or @2x.png",
+                              text);
     if (!spl_format_is_built((enum spl_format)format))
         return spl_fail_field(err, SPL_E_NOT_FOUND, "tile", "this build makes no %s tiles; ask for png", at + 1);
     if (z >= SPL_TILE_LEVELS || x >> z || y >> z)
-        return spl_fail_field(err, SPL_E_NOT_FOUND, "tile", "there is no tile '%.64s': z ends at %d, x and y below 2^z", text,
-                              SPL_TILE_LEVELS - 1);
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "tile", "there is no tile '%.64s': z ends at %d, x and y below 2^z",
+                              text, SPL_TILE_LEVELS - 1);
     name->z = (uint32_t)z;
     name->x = (uint32_t)x;
     name->y = (uint32_t)y;
@@ -98,9 +99,10 @@ static int look_from_mercator(const struct spl_tile_grid *grid, const struct spl
     }
     step = fmin(step, widest);
     int rc = to_world(entry, near[0], near[1], at, err);
-    for (int i = 0; !rc && i < 4; i++)
-        rc = to_world(entry, near[0] + (i == 0 ? step : i == 1 ? -step : 0), near[1] + (i == 2 ? step : i == 3 ? -step : 0),
-                      ends[i], err);
+    for (int i = 0; !rc && i < 4; i++) {
+        const double by = i % 2 ? -step : step;
+        rc = to_world(entry, near[0] + (i < 2 ? by : 0), near[1] + (i < 2 ? 0 : by), ends[i], err);
+    }
     if (rc)
         return rc;
     double east[2], north[2];
@@ -132,7 +134,8 @@ int spl_tile_grid_look(const struct spl_tile_grid *grid, const struct spl_catalo
     return SPL_OK;
 }
 
-void spl_tile_grid_get_levels(const struct spl_tile_grid *grid, const struct spl_dataset_info *info, int *least, int *most)
+void spl_tile_grid_get_levels(const struct spl_tile_grid *grid, const struct spl_dataset_info *info, int *least,
+                              int *most)
 {
     double widest = fmax(grid->high[0] - grid->low[0], grid->high[1] - grid->low[1]);
     double splat = info->splat_radius / grid->world_units;

@@ -1,6 +1,6 @@
-/* The grid of a dataset's map tiles: squares of a square, 2^z a side, as XYZ has them (x from the west, y from the north).
- * Where PROJ knows the dataset's coordinate system the square is Web Mercator's world (EPSG:3857), else that of the
- * dataset's own plane which holds its bounds. The loop's thread. */
+/* The grid of a dataset's map tiles: squares of a square, 2^z a side, as XYZ has them (x from the west, y from the
+ * north). Where PROJ knows the dataset's coordinate system the square is Web Mercator's world (EPSG:3857), else that of
+ * the dataset's own plane which holds its bounds. The loop's thread. */
 #ifndef SPL_SERVICE_TILES_GRID_H
 #define SPL_SERVICE_TILES_GRID_H
 
@@ -32,14 +32,15 @@ struct spl_tile_name {
 /* SPL_E_NOT_FOUND of what is no tile. */
 int spl_tile_name_parse(const char *text, struct spl_tile_name *name, struct spl_error *err);
 
-/* What the tile shows of the dataset: from above, its middle where the tile's is, turned and scaled as the grid is there
- * (to 0.02 pixels where a tile is 2.4 km wide, and less the smaller it is). */
+/* What the tile shows of the dataset: from above, its middle where the tile's is, turned and scaled as the grid is
+ * there (to 0.02 pixels where a tile is 2.4 km wide, and less the smaller it is). */
 int spl_tile_grid_look(const struct spl_tile_grid *grid, const struct spl_catalog_entry *entry,
                        const struct spl_tile_name *name, struct spl_tile_view *view, struct spl_error *err);
 
 /* Levels from that on which the dataset fills a quarter of a tile's side, to that on which a pixel is less than a
  * splat. */
-void spl_tile_grid_get_levels(const struct spl_tile_grid *grid, const struct spl_dataset_info *info, int *least, int *most);
+void spl_tile_grid_get_levels(const struct spl_tile_grid *grid, const struct spl_dataset_info *info, int *least,
+                              int *most);
 
 /* Longitude and latitude of a point of Web Mercator, degrees. */
 void spl_tile_to_degrees(const double mercator[2], double out[2]);

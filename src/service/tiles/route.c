@@ -1,5 +1,5 @@
-/* Map tiles of a dataset, and TileJSON that says where they are. A tile is a view: it has a view's ETag, cache, queue and
- * limits; one where nothing is is as transparent as it is drawn. Owned by the loop's thread. */
+/* Map tiles of a dataset, and TileJSON that says where they are. A tile is a view: it has a view's ETag, cache, queue
+ * and limits; one where nothing is is as transparent as it is drawn. Owned by the loop's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,8 +27,8 @@ static int find_view(struct request *request, const struct spl_call *call, struc
     rc = spl_tile_grid_find(entry, &grid, err);
     rc = rc ? rc : spl_tile_grid_look(&grid, entry, &name, &look, err);
     rc = rc ? rc
-            : spl_tile_request_from_query(request->query, strlen(request->query), &look, &entry->defaults, &limits, view,
-                                          err);
+            : spl_tile_request_from_query(request->query, strlen(request->query), &look, &entry->defaults, &limits,
+                                          view, err);
     return rc ? spl_view_blame(err) : SPL_OK;
 }
 
@@ -54,14 +54,15 @@ static int find_tiles(struct request *request, const struct spl_call *call, stru
     rc = rc ? rc : spl_tile_grid_look(grid, entry, &top, &look, err);
     if (rc)
         return rc;
-    rc = spl_tile_request_from_query(request->query, strlen(request->query), &look, &entry->defaults, &limits, &view, err);
+    rc = spl_tile_request_from_query(request->query, strlen(request->query), &look, &entry->defaults, &limits, &view,
+                                     err);
     rc = rc ? rc : spl_view_check_dataset(&view, entry->info, err);
     *versioned = !rc && view.versioned;
     return rc ? spl_view_blame(err) : SPL_OK;
 }
 
-/* The template of the tiles' URLs, with the query and the signature that tiles.json was asked with, as they stand; what JSON
- * or a template could not carry is written %7B. What is signed is not changed: it names a version or none. */
+/* The template of the tiles' URLs, with the query and the signature that tiles.json was asked with, as they stand; what
+ * JSON or a template could not carry is written %7B. What is signed is not changed: it names a version or none. */
 static json_t *make_template(const struct request *request, const struct spl_catalog_entry *entry, bool versioned)
 {
     char *query = spl_alloc(3 * strlen(request->query) + 1, 1, NULL), *to = query, version[24] = "";
@@ -102,14 +103,15 @@ void spl_show_tiles(struct request *request, const struct spl_call *call)
     }
     int least, most;
     spl_tile_grid_get_levels(&grid, entry->info, &least, &most);
-    json_t *json = json_pack("{s:s, s:s, s:s, s:[o], s:i, s:i}", "tilejson", "3.0.0", "name", entry->info->id, "scheme", "xyz",
-                             "tiles",
-                             make_template(request, entry, versioned), "minzoom", least, "maxzoom", most);
+    json_t *json =
+        json_pack("{s:s, s:s, s:s, s:[o], s:i, s:i}", "tilejson", "3.0.0", "name", entry->info->id, "scheme", "xyz",
+                  "tiles", make_template(request, entry, versioned), "minzoom", least, "maxzoom", most);
     json_t *own = json_pack("{s:s, s:s, s:[f, f], s:f, s:i}", "scheme", grid.mercator ? "mercator" : "plane", "unit",
                             grid.mercator ? "m" : spl_unit_word(entry->info), "corner", grid.corner[0], grid.corner[1],
                             "side", grid.side, "tile_size", SPL_TILE_SIDE);
     if (grid.mercator) { /* else there are no degrees */
-        double low[2], high[2], middle[2] = {(grid.low[0] + grid.high[0]) / 2, (grid.low[1] + grid.high[1]) / 2}, center[2];
+        double low[2], high[2], middle[2] = {(grid.low[0] + grid.high[0]) / 2, (grid.low[1] + grid.high[1]) / 2},
+                                center[2];
         spl_tile_to_degrees(grid.low, low);
         spl_tile_to_degrees(grid.high, high);
         spl_tile_to_degrees(middle, center);

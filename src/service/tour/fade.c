@@ -1,5 +1,5 @@
-/* soft_opacity, soft_cover and soft_blend along a path. Their ranges are those of the methods' table, so that every frame's view has
- * passed what spl_view_check() asks of them. Pure functions, any thread. */
+/* soft_opacity, soft_cover and soft_blend along a path. Their ranges are those of the methods' table, so that every
+ * frame's view has passed what spl_view_check() asks of them. Pure functions, any thread. */
 #include "service/tour/fade.h"
 
 #include <math.h>

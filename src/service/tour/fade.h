@@ -1,5 +1,5 @@
-/* What of a view changes along a tour: what keyframes may say beside their cameras (geom/camera_path.h). Pure functions,
- * any thread. */
+/* What of a view changes along a tour: what keyframes may say beside their cameras (geom/camera_path.h). Pure
+ * functions, any thread. */
 #ifndef SPL_SERVICE_TOUR_FADE_H
 #define SPL_SERVICE_TOUR_FADE_H
 

@@ -3,13 +3,10 @@
  * MHD reads it through a callback, block by block, because each block must count as progress of the connection: a large
  * video over a slow line takes longer than a reply may. Blocks are read on the loop, mostly from the page cache. Owned
  * by the loop's thread. */
-#include <errno.h>
-#include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -25,38 +22,25 @@ enum { block_bytes = 64 << 10 };
 struct reading {
     struct spl_tour *tour; // held; its `readers`
     struct connection *connection;
-    int fd;
-    uint64_t offset;
+    struct spl_tour_file file; /* what of it was asked for */
 };
 
 static ssize_t on_read(void *context, uint64_t position, char *out, size_t room)
 {
+    (void)position; // it follows what was read
     struct reading *reading = context;
-    ssize_t got = spl_tour_file_read_at(reading->fd, reading->offset + position, out, room);
+    size_t got = spl_tour_file_read(&reading->file, out, room);
     reading->connection->since_ns = spl_now_ns();
-    return got > 0 ? got : MHD_CONTENT_READER_END_WITH_ERROR; // the size was said: it became shorter
+    return got ? (ssize_t)got : MHD_CONTENT_READER_END_WITH_ERROR; // the size was said: it became shorter
 }
 
 static void on_free(void *context)
 {
     struct reading *reading = context;
-    close(reading->fd);
+    spl_tour_file_close(&reading->file);
     reading->tour->readers--;
     spl_tour_let_go(reading->tour);
     free(reading);
-}
-
-static void header(struct request *request, const char *name, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-static void header(struct request *request, const char *name, const char *format, ...)
-{
-    char text[256];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    MHD_add_response_header(request->response, name, text);
 }
 
 /* A range counts only while the file is the one that the client has a part of. */
@@ -69,9 +53,9 @@ static enum spl_range wanted(struct request *request, const char *tag, uint64_t 
 
 static void add_cache_headers(struct request *request, const char *tag)
 {
-    header(request, MHD_HTTP_HEADER_ETAG, "%s", tag);
-    header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "private, max-age=31536000, immutable");
-    header(request, MHD_HTTP_HEADER_ACCEPT_RANGES, "bytes");
+    spl_reply_add_header(request, MHD_HTTP_HEADER_ETAG, "%s", tag);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_CACHE_CONTROL, "private, max-age=31536000, immutable");
+    spl_reply_add_header(request, MHD_HTTP_HEADER_ACCEPT_RANGES, "bytes");
 }
 
 static void refuse_range(struct request *request, uint64_t size)
@@ -80,16 +64,15 @@ static void refuse_range(struct request *request, uint64_t size)
     snprintf(detail, sizeof detail, "the range begins behind the file's %llu bytes", (unsigned long long)size);
     spl_reply_problem(request, MHD_HTTP_RANGE_NOT_SATISFIABLE, "range", "Range", detail);
     if (request->response)
-        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes */%llu", (unsigned long long)size);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes */%llu", (unsigned long long)size);
 }
 
-void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *file, const char *type,
+void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *name, const char *type,
                          const char *tag)
 {
-    struct spl_error err = {0};
-    struct stat status;
-    char path[4096];
-    uint64_t first, length;
+    struct spl_error why = {0}, err = {0};
+    struct spl_tour_file file;
+    uint64_t length;
     const char *held = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
     if (held && spl_etag_matches(held, tag)) {
         request->status = MHD_HTTP_NOT_MODIFIED;
@@ -97,23 +80,22 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
             add_cache_headers(request, tag);
         return;
     }
-    snprintf(path, sizeof path, "%s/%s/%s", tour->tours->directory, tour->name, file);
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-    if (fd < 0 || fstat(fd, &status)) {
-        spl_fail_errno(&err, errno, "%s of tour %s cannot be read", file, tour->name);
+    if (spl_tour_file_open(tour->tours->directory, tour->name, name, &file, &why)) {
+        spl_fail(&err, SPL_E_IO, "%s", why.message); // also where it is not there: the tour says that it is
         spl_reply_error(request, &err);
-        goto close_file;
+        return;
     }
-    enum spl_range range = wanted(request, tag, (uint64_t)status.st_size, &first, &length);
+    const uint64_t size = file.left;
+    enum spl_range range = wanted(request, tag, size, &file.offset, &length);
     if (range == SPL_RANGE_UNSATISFIABLE) {
-        refuse_range(request, (uint64_t)status.st_size);
+        refuse_range(request, size);
         goto close_file;
     }
+    file.left = length;
     struct reading *reading = spl_alloc(1, sizeof *reading, NULL);
     if (!reading)
         goto close_file;
-    spl_tour_file_pace(fd);
-    *reading = (struct reading){tour, request->connection, fd, first};
+    *reading = (struct reading){tour, request->connection, file};
     request->response = MHD_create_response_from_callback(length, block_bytes, on_read, reading, on_free);
     if (!request->response) {
         free(reading);
@@ -121,13 +103,12 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
     }
     tour->readers++;
     request->status = range == SPL_RANGE_PART ? MHD_HTTP_PARTIAL_CONTENT : MHD_HTTP_OK;
-    header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
+    spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
     add_cache_headers(request, tag);
     if (range == SPL_RANGE_PART)
-        header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes %llu-%llu/%lld", (unsigned long long)first,
-               (unsigned long long)(first + length - 1), (long long)status.st_size);
+        spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_RANGE, "bytes %" PRIu64 "-%" PRIu64 "/%" PRIu64,
+                             file.offset, file.offset + length - 1, size);
     return;
 close_file:
-    if (fd >= 0)
-        close(fd);
+    spl_tour_file_close(&file);
 }

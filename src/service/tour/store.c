@@ -45,43 +45,31 @@ int spl_tour_file_open(const char *directory, const char *name, const char *file
         return spl_fail(err, SPL_E_USAGE, "the path of the tours' folder is too long");
     out->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (out->fd < 0 || fstat(out->fd, &status))
-        rc = errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s is not there", path)
-                             : spl_fail_errno(err, errno, "%s: cannot be read", path);
+        rc = errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s of tour %s is not there", file, name)
+                             : spl_fail_errno(err, errno, "%s of tour %s cannot be read", file, name);
     else if (!S_ISREG(status.st_mode))
-        rc = spl_fail(err, SPL_E_CORRUPT, "%s is no file", path);
+        rc = spl_fail(err, SPL_E_CORRUPT, "%s of tour %s is no file", file, name);
     else
         out->left = (uint64_t)status.st_size;
     if (rc)
         spl_tour_file_close(out);
     else
-        spl_tour_file_pace(out->fd);
+        posix_fadvise(out->fd, 0, 0, POSIX_FADV_RANDOM); // ahead of it only what is said below
     return rc;
-}
-
-void spl_tour_file_pace(int fd)
-{
-    posix_fadvise(fd, 0, 0, POSIX_FADV_RANDOM);
-}
-
-ssize_t spl_tour_file_read_at(int fd, uint64_t offset, void *out, size_t room)
-{
-    static const off_t ahead_bytes = 512 << 10;
-    ssize_t got;
-    do
-        got = pread(fd, out, room, (off_t)offset);
-    while (got < 0 && errno == EINTR);
-    if (got > 0)
-        posix_fadvise(fd, (off_t)offset + got, ahead_bytes, POSIX_FADV_WILLNEED);
-    return got;
 }
 
 size_t spl_tour_file_read(struct spl_tour_file *file, void *out, size_t room)
 {
+    static const off_t ahead_bytes = 512 << 10;
+    ssize_t got;
     room = room < file->left ? room : (size_t)file->left;
-    ssize_t got = spl_tour_file_read_at(file->fd, file->offset, out, room);
+    do
+        got = pread(file->fd, out, room, (off_t)file->offset);
+    while (got < 0 && errno == EINTR);
     if (got <= 0)
         return 0;
     file->offset += (uint64_t)got;
+    posix_fadvise(file->fd, (off_t)file->offset, ahead_bytes, POSIX_FADV_WILLNEED);
     file->left -= (size_t)got;
     return (size_t)got;
 }

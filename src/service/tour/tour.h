@@ -132,7 +132,9 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
                          struct spl_error *err);
 int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,
                         size_t *length, struct spl_error *err); /* the caller frees *bytes */
-/* One that is read piece by piece, since a frame may have hundreds of megabytes. */
+/* One that is read piece by piece, since a frame may have hundreds of megabytes. The kernel by itself reads ahead as
+ * far as its disk says, 8 MiB at some, and a hole's zeros it writes at once: 20 ms of the loop for a block. Of this one
+ * it reads what is asked, and half a MiB behind it in its own time. */
 struct spl_tour_file {
     int fd; /* -1 = none */
     uint64_t offset, left;
@@ -142,10 +144,6 @@ int spl_tour_file_open(const char *directory, const char *name, const char *file
 size_t spl_tour_file_read(struct spl_tour_file *file, void *out,
                           size_t room);               /* 0: nothing left, or it cannot be read */
 void spl_tour_file_close(struct spl_tour_file *file); /* idempotent */
-/* The kernel reads ahead as far as its disk says, 8 MiB at some, and a hole's zeros it writes at once: 20 ms of the loop
- * for a block. Of an opened file that is paced it reads what is asked, and half a MiB behind it in its own time. */
-void spl_tour_file_pace(int fd);
-ssize_t spl_tour_file_read_at(int fd, uint64_t offset, void *out, size_t room); /* as pread(); not interrupted */
 void spl_tour_store_remove(const char *directory, const char *name);
 bool spl_tour_name_is_valid(const char *name);
 
@@ -170,7 +168,7 @@ void spl_tour_stream_pictures(struct request *request, struct spl_tour *tour);
 void spl_tour_streams_wake(struct spl_tour *tour); /* something has changed */
 
 /* file.c, zip.c: files of a tour as request->response. */
-void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *file, const char *type,
+void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const char *name, const char *type,
                          const char *tag);
 void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
 

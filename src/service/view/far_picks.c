@@ -1,11 +1,12 @@
-/* Picks of datasets from servers. What a pick says beside its pixel is read from its dataset, which may take as long as a
- * server does not answer: on threads of their own, so that the encoders, which all datasets share, never wait for one.
+/* Picks of datasets from servers. What a pick says beside its pixel is read from its dataset, which may take as long as
+ * a server does not answer: on threads of their own, so that the encoders, which all datasets share, never wait for
+ * one.
  *
- * Of a dataset a few are read at a time, and a bounded number is inside: a server that hangs leaves room for others. One
- * thread more than reads at a time gives up what nobody waits for any more, and says meanwhile that work goes on.
+ * Of a dataset a few are read at a time, and a bounded number is inside: a server that hangs leaves room for others.
+ * One thread more than reads at a time gives up what nobody waits for any more, and says meanwhile that work goes on.
  *
- * Invariant: a job in `waiting` or counted in `reading` is this file's, and ends in spl_pipeline_finish_job(). The threads
- * begin with the first job. take() is the gpu thread's. */
+ * Invariant: a job in `waiting` or counted in `reading` is this file's, and ends in spl_pipeline_finish_job(). The
+ * threads begin with the first job. take() is the gpu thread's. */
 #include "base/condition.h"
 #include "service/view/stages.h"
 

@@ -1,10 +1,10 @@
 /* The gpu thread: the only one that touches the renderer, for its whole life.
  *
- * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so a
- * view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and
- * finishes with the bytes that it would have had alone. A frame that takes long in the middle of a piece gives way there,
- * where others wait (render/turns.h). Frames of tours have the turns that nobody wants. What comes of
- * a device that is lost is in gpu_loss.c. */
+ * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so
+ * a view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and
+ * finishes with the bytes that it would have had alone. A frame that takes long in the middle of a piece gives way
+ * there, where others wait (render/turns.h). Frames of tours have the turns that nobody wants. What comes of a device
+ * that is lost is in gpu_loss.c. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,8 +128,9 @@ static void complete(struct gpu *gpu, struct spl_job *job)
         spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS, job->stats.soft_ms);
 }
 
-/* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes behind
- * what is large, and what gave way in the middle of a piece behind all that did not, who had less before who had more. */
+/* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes
+ * behind what is large, and what gave way in the middle of a piece behind all that did not, who had less before who had
+ * more. */
 static uint64_t count_left(const struct spl_job *job)
 {
     if (spl_frame_is_paused(job->steps))

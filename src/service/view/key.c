@@ -80,8 +80,8 @@ static void add_camera(struct form *form, const struct spl_camera *camera)
         add_number(form, i < 6 ? camera->lens.k[i] : i < 8 ? camera->lens.p[i - 6] : camera->lens.reach);
 }
 
-/* What is soft, or drawn; another order of terms is another key. Not their text: a batch has 256 views, whose numbers take
- * longer to print than the loop has. */
+/* What is soft, or drawn; another order of terms is another key. Not their text: a batch has 256 views, whose numbers
+ * take longer to print than the loop has. */
 static void add_terms(struct form *form, const struct spl_terms *terms)
 {
     enum { name_words = (SPL_TERM_NAME_MAX + 7) / 8, term_words = 12 + name_words };

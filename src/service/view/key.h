@@ -18,8 +18,8 @@ enum { SPL_ETAG_BYTES = 40 };
 uint64_t spl_renderer_hash(const struct spl_device_info *device);
 
 /* Parameters that cannot change the reply are left out: quality of a PNG, the background of a depth layer, atoms of a
- * dataset without textures, all that begins with soft_ where nothing is soft, wait: it stands for the complete view, and what is less is nobody's to keep. Not for
- * planned requests, whose bytes nobody knows yet. */
+ * dataset without textures, all that begins with soft_ where nothing is soft, wait: it stands for the complete view,
+ * and what is less is nobody's to keep. Not for planned requests, whose bytes nobody knows yet. */
 struct spl_key spl_key_make(const struct spl_view_request *request, const struct spl_dataset_info *dataset,
                             uint64_t renderer);
 

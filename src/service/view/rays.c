@@ -1,9 +1,9 @@
-/* Rays: a POST of directions, answered as a view of them is. A million of them are 24 MiB, so their body is let in by name
- * (http.c) after its token and dataset were looked at, and the pool reads it while the request waits; the list then stays with
- * the request, and with every job that renders it.
+/* Rays: a POST of directions, answered as a view of them is. A million of them are 24 MiB, so their body is let in by
+ * name (http.c) after its token and dataset were looked at, and the pool reads it while the request waits; the list
+ * then stays with the request, and with every job that renders it.
  *
- * Invariant: a wish belongs to the pool until after(), whether its request still waits or not, and the body to the wish.
- * Owned by the loop's thread, but for read_list(). */
+ * Invariant: a wish belongs to the pool until after(), whether its request still waits or not, and the body to the
+ * wish. Owned by the loop's thread, but for read_list(). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,7 +20,7 @@
 #include "service/state.h"
 #include "service/view/views.h"
 
-enum { lists_max = 32, header_most = 8192, beside_max = 4096 /* values beside directions, which the loop reads and frees */ };
+enum { lists_max = 32, header_most = 8192, beside_max = 4096 /* values beside directions: the loop reads and frees */ };
 
 struct spl_ray_wish {
     uv_work_t work;
@@ -80,7 +80,8 @@ static int read_json(struct spl_ray_wish *wish, struct spl_error *err)
     json_object_del(json, "directions");
     if (count_values(json) > beside_max) {
         json_decref(json);
-        return spl_fail_field(err, SPL_E_INPUT, "body", "beside 'directions' there are more than %d values", (int)beside_max);
+        return spl_fail_field(err, SPL_E_INPUT, "body", "beside 'directions' there are more than %d values",
+                              (int)beside_max);
     }
     wish->rest = json;
     return 0;
@@ -94,8 +95,8 @@ static void read_list(uv_work_t *work)
     wish->body = NULL;
 }
 
-/* What is drawn has a reference of its own to the list: a client that reads its reply slowly keeps none, and no place of
- * those that send one. */
+/* What is drawn has a reference of its own to the list: a client that reads its reply slowly keeps none, and no place
+ * of those that send one. */
 static void let_go(struct request *request)
 {
     spl_rays_destroy(request->rays);
@@ -112,10 +113,11 @@ static void answer(struct request *request, const struct spl_call *call)
     struct spl_view_request view;
     struct spl_error err = {0};
     if (request->rest && request->query[0])
-        spl_fail_field(&err, SPL_E_INPUT, "body", "parameters stand beside 'directions' in JSON; in the URL with NPY alone");
+        spl_fail_field(&err, SPL_E_INPUT, "body",
+                       "parameters stand beside 'directions' in JSON; in the URL with NPY alone");
     else
-        spl_rays_request_from(request->rest, request->query, strlen(request->query), request->rays, &call->entry->defaults,
-                              &limits, &view, &err);
+        spl_rays_request_from(request->rest, request->query, strlen(request->query), request->rays,
+                              &call->entry->defaults, &limits, &view, &err);
     if (err.code && spl_view_blame(&err) && spl_place_wait(request, call, spl_make_rays, &err))
         return;
     spl_view_answer(request, call, &view, &err);

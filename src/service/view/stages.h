@@ -1,5 +1,5 @@
-/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c, encode_thread.c and far_picks.c include
- * it. */
+/* What the pipeline's threads share; only pipeline.c, admission.c, gpu_thread.c, encode_thread.c and far_picks.c
+ * include it. */
 #ifndef SPL_SERVICE_STAGES_H
 #define SPL_SERVICE_STAGES_H
 
@@ -55,7 +55,8 @@ void *spl_gpu_thread_run(void *argument);
 void *spl_encode_thread_run(void *argument);
 void *spl_encode_large_thread_run(void *argument);
 
-/* Fills `encoded` of a rendered job, or sets its error. Reads what a pick is of: from a server it may block for long. */
+/* Fills `encoded` of a rendered job, or sets its error. Reads what a pick is of: from a server it may block for
+ * long. */
 void spl_encode_job(struct spl_job *job);
 
 /* far_picks.c: finish ends what is inside first. On failure, with the job's error set, the caller keeps the job. */
@@ -73,8 +74,8 @@ bool spl_pipeline_image_is_large(const struct spl_view *view);
 /* Refuses further jobs; those inside can still be popped. */
 void spl_pipeline_close_render(struct spl_pipeline *pipeline);
 
-/* Hands a rendered job to the encoders of its kind. Waits for room among the small ones, until its deadline: those never
- * wait for a server. */
+/* Hands a rendered job to the encoders of its kind. Waits for room among the small ones, until its deadline: those
+ * never wait for a server. */
 int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* The oldest entry that the gpu thread is to add or to let go of, or NULL. */

@@ -105,7 +105,8 @@ void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_i
 }
 
 /* What a dataset lacks of a view's terms, by the parameter that asked for it: classes are the clip's last terms. */
-static int blame_class(const struct spl_view_request *view, const struct spl_dataset_info *info, int rc, struct spl_error *err)
+static int blame_class(const struct spl_view_request *view, const struct spl_dataset_info *info, int rc,
+                       struct spl_error *err)
 {
     struct spl_view others = view->view;
     if (!rc || !view->classes || strcmp(err->field, "clip"))

@@ -3,7 +3,7 @@
  * inscription and a flat red panel. x is east, y north, z up; the ground is z = 0. */
 #include "synth/build.h"
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double width = 20, depth = 16, height = 7;
 static const double east[3] = {1, 0, 0}, north[3] = {0, 1, 0}, up[3] = {0, 0, 1};

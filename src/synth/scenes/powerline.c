@@ -4,7 +4,7 @@
 #include "synth/build.h"
 
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double east[3] = {1, 0, 0}, north[3] = {0, 1, 0};
 static const double reach[2] = {200, 60}, pylons[3] = {-130, 10, 150};

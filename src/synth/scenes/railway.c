@@ -3,7 +3,7 @@
  * goes through. Places are given along the southern track (s, metres), to its left and above its rails. */
 #include "synth/build.h"
 
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 static const double radius = 600, reach = 60, gauge = 1.505,
                     tracks[2] = {0, 4.2}; /* gauge: between rail heads' middles */

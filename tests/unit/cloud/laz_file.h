@@ -27,13 +27,13 @@ static inline int laz_file_open(struct laz_file *f, const char *path, unsigned t
     assert_int_equal(spl_source_peek(&f->source, 1 << 16, &head, &available, err), 0);
     assert_true(available > 255);
     unsigned points = head[104] & 0x3f;
-    uint64_t at = spl_laz_get16(head + 94), points_at = spl_laz_get32(head + 96);
-    f->points = head[25] >= 4 && spl_laz_get64(head + 247) ? spl_laz_get64(head + 247) : spl_laz_get32(head + 107);
-    for (uint32_t i = 0; i < spl_laz_get32(head + 100); i++) {
-        unsigned bytes = spl_laz_get16(head + at + 20);
+    uint64_t at = spl_le_get16(head + 94), points_at = spl_le_get32(head + 96);
+    f->points = head[25] >= 4 && spl_le_get64(head + 247) ? spl_le_get64(head + 247) : spl_le_get32(head + 107);
+    for (uint32_t i = 0; i < spl_le_get32(head + 100); i++) {
+        unsigned bytes = spl_le_get16(head + at + 20);
         assert_true(at + 54 + bytes <= available);
         if (memcmp(head + at + 2, "laszip encoded", 14) == 0) {
-            code = spl_laz_format_read(&f->format, head + at + 54, bytes, points, spl_laz_get16(head + 105), &f->fault);
+            code = spl_laz_format_read(&f->format, head + at + 54, bytes, points, spl_le_get16(head + 105), &f->fault);
             if (code < 0)
                 return spl_fail(err, code, "%s: %s", f->fault.field, f->fault.reason);
             return spl_laz_stream_open(&f->stream, &f->source, &f->format, points_at, f->points, threads, NULL, err);

@@ -55,8 +55,8 @@ static void build(struct copc *c)
     uint8_t *records = laz_make_records(&format, POINTS, 1), info[SPL_COPC_INFO_BYTES] = {0};
     struct laz_out file = laz_write_file(&format, 7, records, chunk_points, LAZ_TABLE_USUAL);
     struct bytes *b = &c->b;
-    uint64_t points_at = spl_laz_get32(file.bytes + 96) + RECORD, table_at;
-    uint32_t count = spl_laz_get32(file.bytes + 100) + 1;
+    uint64_t points_at = spl_le_get32(file.bytes + 96) + RECORD, table_at;
+    uint32_t count = spl_le_get32(file.bytes + 100) + 1;
     b->length = 0;
     put(b, file.bytes, HEADER);
     put(b, record, sizeof record);
@@ -64,7 +64,7 @@ static void build(struct copc *c)
     put(b, file.bytes + HEADER, file.count - HEADER);
     memcpy(b->data + 96, &points_at, 4);
     memcpy(b->data + 100, &count, 4);
-    table_at = spl_laz_get64(b->data + points_at) + RECORD;
+    table_at = spl_le_get64(b->data + points_at) + RECORD;
     memcpy(b->data + points_at, &table_at, 8);
     read_chunks(c);
     c->child = b->length;

@@ -8,38 +8,23 @@
 
 #include "cloud/path.h"
 #include "cloud/views.h"
+#include "support/folder.h"
 
 #define LEAST "-9223372036854775808"
 #define MOST "9223372036854775807"
 #define PAST "18446744073709551616" /* of 64 bits */
 #define HALF "4611686018427387905"  /* 2^62 + 1: times four it is four */
 
-static char folder[] = "/tmp/splatd-extremes-XXXXXX";
-
-static int make_folder(void **state)
+static int remove_both(void **state)
 {
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[256];
     remove_scratch(NULL);
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
+    return folder_remove(state);
 }
 
 static const char *put_file(const char *name, const char *text)
 {
-    static char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-    return path;
+    folder_put_text(name, text);
+    return in_folder(name);
 }
 
 static void check_said(size_t row, const struct spl_error *err, const char *file, const char *field, const char *value)
@@ -174,7 +159,7 @@ static void lists_of_views(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_view_list list;
         struct spl_error err = {0};
-        const char *path = rows[i].json ? put_file("a.json", rows[i].json) : folder;
+        const char *path = rows[i].json ? put_file("a.json", rows[i].json) : test_folder;
         if (!rows[i].json) {
             put_file("cameras.txt", rows[i].cameras);
             put_file("images.txt", rows[i].images);
@@ -216,5 +201,5 @@ int main(void)
         cmocka_unit_test(scans),          cmocka_unit_test(las_headers),  cmocka_unit_test(lines_of_nans),
         cmocka_unit_test(lists_of_views), cmocka_unit_test(camera_paths),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, remove_both);
 }

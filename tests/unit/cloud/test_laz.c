@@ -205,7 +205,7 @@ static void wrong_tables_are_named_or_done_without(void **state)
             struct spl_laz_format format = laz_format(6, 0, 3, fixed ? 200 : 0);
             uint8_t *records = laz_make_records(&format, 500, 3);
             struct laz_out file = laz_write_file(&format, 6, records, even, LAZ_TABLE_USUAL);
-            uint64_t start = spl_laz_get32(file.bytes + 96), table = spl_laz_get64(file.bytes + start);
+            uint64_t start = spl_le_get32(file.bytes + 96), table = spl_le_get64(file.bytes + start);
             uint8_t *at = spoil == 0 ? file.bytes + start + 3
                                      : file.bytes + table +
                                            (spoil == 1   ? 0

@@ -29,7 +29,7 @@ static int read_all(const char *path, unsigned threads, struct found *found, str
         found->points += count;
         for (size_t i = 0; i < count; i++)
             for (unsigned k = 0; k < 3; k++) {
-                int64_t v = (int32_t)spl_laz_get32(records + i * bytes + 4 * k);
+                int64_t v = (int32_t)spl_le_get32(records + i * bytes + 4 * k);
                 found->min[k] = v < found->min[k] ? v : found->min[k];
                 found->max[k] = v > found->max[k] ? v : found->max[k];
             }

@@ -15,30 +15,10 @@
 #include "base/memory.h"
 #include "cloud/views.h"
 #include "geom/camera_json.h"
+#include "support/folder.h"
 
-static char folder[] = "/tmp/splatd-photographs-XXXXXX";
 static char bytes[4096];
 static size_t used;
-
-static const char *at(const char *name)
-{
-    static char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
-static void put(const char *name, const void *content, size_t length)
-{
-    FILE *file = fopen(at(name), "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(content, 1, length, file), length);
-    fclose(file);
-}
-
-static void put_text(const char *name, const char *text)
-{
-    put(name, text, strlen(text));
-}
 
 static void add(const void *value, size_t length)
 {
@@ -81,11 +61,11 @@ static void put_model(int32_t model, unsigned count, const double *params, const
     add(&two, 8);
     add_camera(7, 1, 640, 480, 4, pinhole);
     add_camera(9, model, 640, 480, count, params);
-    put("cameras.bin", bytes, used);
+    folder_put("cameras.bin", bytes, used);
     used = 0;
     add(&one, 8);
     add_image(9, q, "east/a.jpg", 2);
-    put("images.bin", bytes, used);
+    folder_put("images.bin", bytes, used);
 }
 
 struct refused {
@@ -134,31 +114,17 @@ static void images_that_are_no_folder_are_named_by_their_flag(void **state)
     (void)state;
     struct spl_view_list list;
     struct spl_error err = {0};
-    assert_int_equal(load(&list, folder, at("none"), NULL, &err), SPL_E_NOT_FOUND);
+    assert_int_equal(load(&list, test_folder, in_folder("none"), NULL, &err), SPL_E_NOT_FOUND);
     assert_string_equal(err.field, "images");
     assert_non_null(strstr(err.message, "--images '"));
     assert_non_null(strstr(err.message, "none' is no folder"));
 }
 
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[256];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
-}
-
 static int clean(void **state)
 {
     (void)state;
-    char command[256];
-    snprintf(command, sizeof command, "rm -rf %s/*", folder);
+    char command[300];
+    snprintf(command, sizeof command, "rm -rf %s/*", test_folder);
     return system(command);
 }
 
@@ -168,19 +134,19 @@ static void binary_means_what_text_means(void **state)
     struct spl_view_list binary, text;
     struct spl_error err = {0};
     put_model(4, 8, opencv, pose);
-    if (load(&binary, folder, NULL, NULL, &err))
+    if (load(&binary, test_folder, NULL, NULL, &err))
         fail_msg("%s", err.message);
-    remove(at("cameras.bin"));
-    put_text("cameras.txt", "7 PINHOLE 640 480 500 510 331.25 228.5\n"
+    remove(in_folder("cameras.bin"));
+    folder_put_text("cameras.txt", "7 PINHOLE 640 480 500 510 331.25 228.5\n"
                             "9 OPENCV 640 480 500 510 331.25 228.5 -0.2 0.05 0.001 -0.002\n");
-    put_text("images.txt", "17 -0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "
+    folder_put_text("images.txt", "17 -0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "
                            "-0.06410832213881687 0.16613728300474614 4.6401280721795111 9 east/a.jpg\n\n");
-    if (load(&text, folder, NULL, NULL, &err))
+    if (load(&text, test_folder, NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(binary.count, 1);
     assert_int_equal(text.count, 1);
     assert_string_equal(binary.views[0].name, "east_a");
-    assert_string_equal(binary.views[0].photograph, at("images/east/a.jpg"));
+    assert_string_equal(binary.views[0].photograph, in_folder("images/east/a.jpg"));
     const struct spl_named_view *a = &binary.views[0], *b = &text.views[0];
     assert_memory_equal(a->camera.rotation, b->camera.rotation, sizeof a->camera.rotation);
     assert_memory_equal(a->camera.eye, b->camera.eye, sizeof a->camera.eye);
@@ -197,7 +163,7 @@ static void binary_means_what_text_means(void **state)
     spl_view_list_finish(&binary);
     spl_view_list_finish(&text);
     /* what is drawn is a pinhole */
-    assert_int_equal(spl_view_list_load(&text, folder, &err), SPL_E_INPUT);
+    assert_int_equal(spl_view_list_load(&text, test_folder, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "params");
 }
 
@@ -206,45 +172,45 @@ static void broken_binary_models_are_refused_by_offset(void **state)
     (void)state;
     const double params[12] = {500, 510, 331.25, 228.5}, zero[7] = {0}, nan_pose[7] = {NAN, 0, 0, 0, 0, 0, 0};
     put_model(7, 5, params, pose);
-    assert_refused(folder, SPL_E_INPUT, "MODEL", "'FOV'");
+    assert_refused(test_folder, SPL_E_INPUT, "MODEL", "'FOV'");
     put_model(10, 12, params, pose);
-    assert_refused(folder, SPL_E_INPUT, "MODEL", "'THIN_PRISM_FISHEYE'");
+    assert_refused(test_folder, SPL_E_INPUT, "MODEL", "'THIN_PRISM_FISHEYE'");
     put_model(99, 4, params, pose);
-    assert_refused(folder, SPL_E_INPUT, "MODEL", "model number 99");
+    assert_refused(test_folder, SPL_E_INPUT, "MODEL", "model number 99");
     put_model(-1, 4, params, pose);
-    assert_refused(folder, SPL_E_INPUT, "MODEL", "model number -1");
+    assert_refused(test_folder, SPL_E_INPUT, "MODEL", "model number -1");
     put_model(1, 4, zero, pose);
-    assert_refused(folder, SPL_E_INPUT, "fx", "fx");
+    assert_refused(test_folder, SPL_E_INPUT, "fx", "fx");
     put_model(1, 4, params, zero);
-    assert_refused(folder, SPL_E_INPUT, "q", "offset 8");
+    assert_refused(test_folder, SPL_E_INPUT, "q", "offset 8");
     put_model(1, 4, params, nan_pose);
-    assert_refused(folder, SPL_E_INPUT, "q", "finite");
+    assert_refused(test_folder, SPL_E_INPUT, "q", "finite");
     put_model(2, 4, (double[]){500, 3, 2, -1e9}, pose);
-    assert_refused(folder, SPL_E_INPUT, "params", "fold");
+    assert_refused(test_folder, SPL_E_INPUT, "params", "fold");
 
     put_model(1, 4, params, pose);
     uint64_t many = UINT64_MAX / 16;
     memcpy(bytes, &many, 8);
-    put("images.bin", bytes, used);
-    assert_refused(folder, SPL_E_INPUT, "count", "do not fit");
+    folder_put("images.bin", bytes, used);
+    assert_refused(test_folder, SPL_E_INPUT, "count", "do not fit");
     put_model(1, 4, params, pose);
     memcpy(bytes + used - 2 * 24 - 8, &many, 8);
-    put("images.bin", bytes, used);
-    assert_refused(folder, SPL_E_INPUT, "POINTS2D", "do not fit");
+    folder_put("images.bin", bytes, used);
+    assert_refused(test_folder, SPL_E_INPUT, "POINTS2D", "do not fit");
     for (size_t length = 1; length < used; length++) { /* cut anywhere */
         put_model(1, 4, params, pose);
-        put("images.bin", bytes, length);
+        folder_put("images.bin", bytes, length);
         struct spl_view_list list;
-        assert_int_equal(load(&list, folder, NULL, NULL, NULL), SPL_E_INPUT);
+        assert_int_equal(load(&list, test_folder, NULL, NULL, NULL), SPL_E_INPUT);
     }
     put_model(1, 4, params, pose);
     add("x", 1);
-    put("images.bin", bytes, used);
-    assert_refused(folder, SPL_E_INPUT, "count", "1 bytes follow");
-    put("images.bin", "", 0);
-    assert_refused(folder, SPL_E_INPUT, "", "empty");
-    remove(at("images.bin"));
-    assert_refused(folder, SPL_E_NOT_FOUND, "", "images.bin");
+    folder_put("images.bin", bytes, used);
+    assert_refused(test_folder, SPL_E_INPUT, "count", "1 bytes follow");
+    folder_put("images.bin", "", 0);
+    assert_refused(test_folder, SPL_E_INPUT, "", "empty");
+    remove(in_folder("images.bin"));
+    assert_refused(test_folder, SPL_E_NOT_FOUND, "", "images.bin");
 }
 
 static void a_fault_of_one_photograph_is_handed_out(void **state)
@@ -253,18 +219,18 @@ static void a_fault_of_one_photograph_is_handed_out(void **state)
     struct spl_view_list list;
     struct refused refused = {0};
     struct spl_error err = {0};
-    put_text("cameras.txt", "1 PINHOLE 640 480 500 510 331.25 228.5\n2 FOV 640 480 500 510 331.25 228.5 0.9\n");
-    put_text("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 0 0 0 0 0 0 0 1 b.jpg\n\n3 1 0 0 0 0 0 0 2 c.jpg\n\n");
-    if (load(&list, folder, "/tmp", &refused, &err))
+    folder_put_text("cameras.txt", "1 PINHOLE 640 480 500 510 331.25 228.5\n2 FOV 640 480 500 510 331.25 228.5 0.9\n");
+    folder_put_text("images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n2 0 0 0 0 0 0 0 1 b.jpg\n\n3 1 0 0 0 0 0 0 2 c.jpg\n\n");
+    if (load(&list, test_folder, "/tmp", &refused, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 1);
     assert_string_equal(list.views[0].photograph, "/tmp/a.jpg");
     assert_int_equal(refused.count, 3); /* the camera, b's pose, c for its camera */
     assert_non_null(strstr(refused.first.message, "FOV"));
     spl_view_list_finish(&list);
-    put_text("images.txt", "2 0 0 0 0 0 0 0 1 b.jpg\n\n");
+    folder_put_text("images.txt", "2 0 0 0 0 0 0 0 1 b.jpg\n\n");
     refused.count = 0;
-    assert_int_equal(load(&list, folder, NULL, &refused, &err), SPL_E_INPUT);
+    assert_int_equal(load(&list, test_folder, NULL, &refused, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "views");
 }
 
@@ -276,13 +242,13 @@ static void transforms_give_cameras_and_lenses(void **state)
     (void)state;
     struct spl_view_list list;
     struct spl_error err = {0};
-    put_text("transforms.json",
+    folder_put_text("transforms.json",
              "{" LENS "\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"aabb_scale\":16,\"frames\":["
              "{\"file_path\":\"./images/f_1.jpg\",\"transform_matrix\":" MATRIX ",\"sharpness\":9},"
              "{\"file_path\":\"images/f_2\",\"transform_matrix\":" MATRIX ",\"k1\":0,\"w\":320,\"fl_x\":250},"
              "{\"file_path\":\"f_3.png\",\"transform_matrix\":" MATRIX
              ",\"k1\":0,\"camera_model\":\"OPENCV_FISHEYE\"}]}");
-    if (load(&list, at("transforms.json"), NULL, NULL, &err))
+    if (load(&list, in_folder("transforms.json"), NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 3);
     assert_string_equal(list.views[0].name, "images_f_1");
@@ -323,8 +289,8 @@ static void transforms_give_cameras_and_lenses(void **state)
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_error why = {0};
-        put_text("transforms.json", rows[i].text);
-        assert_true(load(&list, at("transforms.json"), NULL, NULL, &why) < 0);
+        folder_put_text("transforms.json", rows[i].text);
+        assert_true(load(&list, in_folder("transforms.json"), NULL, NULL, &why) < 0);
         assert_string_equal(why.field, rows[i].field);
         if (!strstr(why.message, rows[i].says))
             fail_msg("'%s' lacks '%s'", why.message, rows[i].says);
@@ -336,19 +302,19 @@ static void open3d_photographs_are_those_of_the_folder(void **state)
     (void)state;
     struct spl_view_list list;
     struct spl_error err = {0};
-    put_text(
+    folder_put_text(
         "trajectory.json",
         "{\"class_name\":\"PinholeCameraTrajectory\",\"parameters\":[{\"extrinsic\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,2,"
         "1],\"intrinsic\":{\"width\":640,\"height\":480,\"intrinsic_matrix\":[500,0,0,0,510,0,330.75,228,1]}}]}");
-    assert_refused(at("trajectory.json"), SPL_E_NOT_FOUND, "", "no folder");
-    mkdir(at("color"), 0700);
-    assert_refused(at("trajectory.json"), SPL_E_INPUT, "parameters", "0 photographs");
-    put_text("color/00001.jpg", "x");
-    put_text("color/notes.txt", "x");
-    if (load(&list, at("trajectory.json"), NULL, NULL, &err))
+    assert_refused(in_folder("trajectory.json"), SPL_E_NOT_FOUND, "", "no folder");
+    mkdir(in_folder("color"), 0700);
+    assert_refused(in_folder("trajectory.json"), SPL_E_INPUT, "parameters", "0 photographs");
+    folder_put_text("color/00001.jpg", "x");
+    folder_put_text("color/notes.txt", "x");
+    if (load(&list, in_folder("trajectory.json"), NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 1);
-    assert_string_equal(list.views[0].photograph, at("color/00001.jpg"));
+    assert_string_equal(list.views[0].photograph, in_folder("color/00001.jpg"));
     double pixel[2], depth;
     assert_true(spl_camera_project(&list.views[0].camera, (double[]){1, 1, 3}, pixel, &depth));
     assert_true(fabs(pixel[0] - 431.25) < 1e-9 && fabs(pixel[1] - 330.5) < 1e-9 && depth == 5);
@@ -361,15 +327,15 @@ static void pose_folders_take_their_size_from_photographs(void **state)
     struct spl_view_list list;
     struct refused refused = {0};
     struct spl_error err = {0};
-    put_text("camera-intrinsics.txt", "5e+02 0 330.75\n0 510 228\n0 0 1\n");
-    assert_refused(folder, SPL_E_INPUT, "views", "no view");
-    put_text("f-1.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 -2\n0 0 0 1\n");
-    assert_refused(folder, SPL_E_NOT_FOUND, "", "f-1.color.jpg");
-    put_text("f-1.color.jpg", "x");
-    put_text("f-2.color.png", "x");
-    put_text("f-2.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 -2\n0 0 0 1\n"); /* mirrored */
-    assert_refused(folder, SPL_E_INPUT, "matrix", "f-2.pose.txt");
-    if (load(&list, folder, NULL, &refused, &err))
+    folder_put_text("camera-intrinsics.txt", "5e+02 0 330.75\n0 510 228\n0 0 1\n");
+    assert_refused(test_folder, SPL_E_INPUT, "views", "no view");
+    folder_put_text("f-1.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 -2\n0 0 0 1\n");
+    assert_refused(test_folder, SPL_E_NOT_FOUND, "", "f-1.color.jpg");
+    folder_put_text("f-1.color.jpg", "x");
+    folder_put_text("f-2.color.png", "x");
+    folder_put_text("f-2.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 -1 -2\n0 0 0 1\n"); /* mirrored */
+    assert_refused(test_folder, SPL_E_INPUT, "matrix", "f-2.pose.txt");
+    if (load(&list, test_folder, NULL, &refused, &err))
         fail_msg("%s", err.message);
     assert_int_equal(refused.count, 1);
     assert_int_equal(list.count, 1);
@@ -384,14 +350,14 @@ static void pose_folders_take_their_size_from_photographs(void **state)
                                           {"1 0 0 1e999\n0 1 0 0\n0 0 1 -2\n0 0 0 1\n", "inf"},
                                           {"", "empty"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        put_text("f-1.pose.txt", rows[i][0]);
+        folder_put_text("f-1.pose.txt", rows[i][0]);
         struct spl_error why = {0};
-        assert_int_equal(load(&list, folder, NULL, NULL, &why), SPL_E_INPUT);
+        assert_int_equal(load(&list, test_folder, NULL, NULL, &why), SPL_E_INPUT);
         if (!strstr(why.message, rows[i][1]))
             fail_msg("'%s' lacks '%s'", why.message, rows[i][1]);
     }
-    put_text("camera-intrinsics.txt", "500 1 330.75\n0 510 228\n0 0 1\n");
-    assert_refused(folder, SPL_E_INPUT, "intrinsics", "skew");
+    folder_put_text("camera-intrinsics.txt", "500 1 330.75\n0 510 228\n0 0 1\n");
+    assert_refused(test_folder, SPL_E_INPUT, "intrinsics", "skew");
 }
 
 static void lenses_have_an_end(void **state)
@@ -426,7 +392,7 @@ static void no_refused_allocation_is_passed_over(void **state)
         struct spl_error err = {0};
         struct refused refused = {0};
         spl_memory_fail_after(++n);
-        rc = load(&list, folder, NULL, &refused, &err);
+        rc = load(&list, test_folder, NULL, &refused, &err);
         spl_memory_fail_after(0);
         assert_int_equal(err.code, rc);
         assert_int_equal(refused.count, 0);
@@ -449,5 +415,5 @@ int main(void)
         cmocka_unit_test(lenses_have_an_end),
         cmocka_unit_test_teardown(no_refused_allocation_is_passed_over, clean),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

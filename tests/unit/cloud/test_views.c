@@ -14,43 +14,23 @@
 
 #include "base/memory.h"
 #include "cloud/views.h"
+#include "support/folder.h"
 
 #define POSE                                                                                                           \
     "-0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "                              \
     "-0.06410832213881687 0.16613728300474614 4.6401280721795111"
 #define LOOK "\"camera\":{\"eye\":[3,-4,2],\"target\":[0,1,1.5],\"fov\":60}"
 
-static char folder[] = "/tmp/splatd-views-XXXXXX";
-
 static const char *put(const char *name, const char *text)
 {
-    static char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-    return path;
+    folder_put_text(name, text);
+    return in_folder(name);
 }
 
 static void put_model(const char *cameras, const char *images)
 {
     put("cameras.txt", cameras);
     put("images.txt", images);
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[256];
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    return system(command);
 }
 
 static void assert_refused(const char *path, int code, const char *field, const char *says)
@@ -131,7 +111,7 @@ static void json_gives_cameras_and_photographs(void **state)
     assert_true(spl_camera_project(c, (double[]){0.5, 0.25, 1}, pixel, &depth)); /* golden vector of api/cameras.md */
     assert_true(fabs(pixel[0] - 323.56596303319333) < 1e-9 && fabs(pixel[1] - 287.83174284533473) < 1e-9);
     assert_string_equal(list.views[1].name, "wést 2");
-    assert_int_equal(strncmp(list.views[1].photograph, folder, strlen(folder)), 0);
+    assert_int_equal(strncmp(list.views[1].photograph, test_folder, strlen(test_folder)), 0);
     assert_non_null(strstr(list.views[1].photograph, "/photos/w.jpg"));
     c = &list.views[1].camera;
     assert_true(c->near == 0.5 && c->far == 90 && c->fx == 500 && c->fy == 510 && c->cx == 331.25 && c->cy == 228.5);
@@ -175,13 +155,11 @@ static void broken_colmap_is_refused_by_line(void **state)
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         put_model(rows[i].cameras, rows[i].images);
-        assert_refused(folder, SPL_E_INPUT, rows[i].field, rows[i].says);
+        assert_refused(test_folder, SPL_E_INPUT, rows[i].field, rows[i].says);
     }
-    char path[256];
-    snprintf(path, sizeof path, "%s/images.txt", folder);
     put_model(good_camera, good_image);
-    remove(path);
-    assert_refused(folder, SPL_E_NOT_FOUND, "", "images.txt");
+    remove(in_folder("images.txt"));
+    assert_refused(test_folder, SPL_E_NOT_FOUND, "", "images.txt");
 }
 
 static void colmap_gives_cameras_and_photographs(void **state)
@@ -189,18 +167,15 @@ static void colmap_gives_cameras_and_photographs(void **state)
     (void)state;
     put_model("# Camera list\n7 PINHOLE 640 480 500 510 331.25 228.5\r\n 9 SIMPLE_RADIAL 100 50 80 50 25 0\n",
               "# Image list\n4 " POSE " 7 east/IMG 1.v2.jpg\n1.5 2.5 -1 3 4 17\n\n5 1 0 0 0 0 0 0 9 b.png\n");
-    char path[256];
-    snprintf(path, sizeof path, "%s/images", folder);
-    mkdir(path, 0700);
+    mkdir(in_folder("images"), 0700);
     struct spl_view_list list;
     struct spl_error err = {0};
-    if (spl_view_list_load(&list, folder, &err))
+    if (spl_view_list_load(&list, test_folder, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 2);
     assert_string_equal(list.views[0].name, "east_IMG 1.v2");
     assert_string_equal(list.views[1].name, "b");
-    snprintf(path, sizeof path, "%s/images/east/IMG 1.v2.jpg", folder);
-    assert_string_equal(list.views[0].photograph, path);
+    assert_string_equal(list.views[0].photograph, in_folder("images/east/IMG 1.v2.jpg"));
     double pixel[2], depth;
     assert_true(spl_camera_project(&list.views[0].camera, (double[]){-0.577054497069, 3.30876147309, -1.46753054758},
                                    pixel, &depth));
@@ -214,42 +189,34 @@ static void colmap_gives_cameras_and_photographs(void **state)
 static void photographs_are_found_where_colmap_keeps_them(void **state)
 {
     (void)state;
-    char path[256];
     static const char *const folders[] = {"project", "project/sparse", "project/sparse/0", "project/images"};
-    for (int i = 0; i < 4; i++) {
-        snprintf(path, sizeof path, "%s/%s", folder, folders[i]);
-        assert_int_equal(mkdir(path, 0700), 0);
-    }
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(mkdir(in_folder(folders[i]), 0700), 0);
     put("project/sparse/0/cameras.txt", "1 PINHOLE 640 480 500 510 331.25 228.5\n");
     put("project/sparse/0/images.txt", "1 " POSE " 1 a.jpg\n\n");
     put("project/images/a.jpg", "a");
-    snprintf(path, sizeof path, "%s/project/sparse/0", folder);
     struct spl_view_list list;
-    assert_int_equal(spl_view_list_load(&list, path, NULL), 0);
+    assert_int_equal(spl_view_list_load(&list, in_folder("project/sparse/0"), NULL), 0);
     assert_int_equal(access(list.views[0].photograph, R_OK), 0);
     spl_view_list_finish(&list);
-    snprintf(path, sizeof path, "%s/project/sparse", folder);
-    assert_refused(path, SPL_E_NOT_FOUND, "", "did you mean");
-    assert_refused(path, SPL_E_NOT_FOUND, "", "project/sparse/0'?");
-    snprintf(path, sizeof path, "%s/project", folder);
-    assert_refused(path, SPL_E_NOT_FOUND, "", "project/sparse/0'?");
-    snprintf(path, sizeof path, "%s/project/images", folder);
-    assert_refused(path, SPL_E_NOT_FOUND, "", "cameras.txt");
+    assert_refused(in_folder("project/sparse"), SPL_E_NOT_FOUND, "", "did you mean");
+    assert_refused(in_folder("project/sparse"), SPL_E_NOT_FOUND, "", "project/sparse/0'?");
+    assert_refused(in_folder("project"), SPL_E_NOT_FOUND, "", "project/sparse/0'?");
+    assert_refused(in_folder("project/images"), SPL_E_NOT_FOUND, "", "cameras.txt");
 }
 
 static void no_refused_allocation_is_passed_over(void **state)
 {
     (void)state;
-    char path[256];
     put_model("1 PINHOLE 640 480 500 510 331.25 228.5\n", "1 " POSE " 1 a.jpg\n\n");
-    strcpy(path, put("views.json", "{\"views\":[{\"name\":\"a\",\"photograph\":\"p\"," LOOK "}]}"));
+    const char *path = put("views.json", "{\"views\":[{\"name\":\"a\",\"photograph\":\"p\"," LOOK "}]}");
     for (int colmap = 0; colmap < 2; colmap++) {
         int rc = SPL_E_NOMEM, n = 0;
         while (rc == SPL_E_NOMEM) {
             struct spl_view_list list;
             struct spl_error err = {0};
             spl_memory_fail_after(++n);
-            rc = spl_view_list_load(&list, colmap ? folder : path, &err);
+            rc = spl_view_list_load(&list, colmap ? test_folder : path, &err);
             spl_memory_fail_after(0);
             assert_int_equal(err.code, rc);
             spl_view_list_finish(&list);
@@ -269,5 +236,5 @@ int main(void)
         cmocka_unit_test(photographs_are_found_where_colmap_keeps_them),
         cmocka_unit_test(no_refused_allocation_is_passed_over),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -80,7 +80,6 @@ static void by_page_they_are_the_same(void **state)
         assert_true(a->nodes == nodes + next_node);
         for (uint32_t n = 0; n < a->node_count; n++, next_node++) {
             assert_int_equal(spl_dataset_find_page_of_node(by_page, next_node), page);
-            assert_int_equal(spl_dataset_find_page_of_chunk(by_page, a->nodes[n].first_chunk), page);
             assert_int_equal(a->nodes[n].page, page);
         }
         assert_true(spl_dataset_get_page_end(all, page) == next_node);

@@ -291,16 +291,6 @@ static void binding_that_is_missing(struct spl_gpu *gpu, struct spl_gpu_buffer *
     misdispatch(gpu, buffer, (struct spl_gpu_binding){0}, 1);
 }
 
-static void counts_past_the_end(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer)
-{
-    struct spl_gpu_binding bindings[SPL_RESOURCE_COUNT];
-    struct spl_gpu_kernel *kernel = NULL;
-    for (int i = 0; i < SPL_RESOURCE_COUNT; i++)
-        bindings[i] = (struct spl_gpu_binding){buffer, 0, 16};
-    spl_gpu_kernel_create(gpu, "selftest", NULL, 0, &kernel, NULL);
-    spl_gpu_dispatch_indirect(gpu, kernel, bindings, buffer, 2040);
-}
-
 /* A kernel is given what its row declares, under any resource's name; '?' may be missing. */
 static void kernels_bind_what_they_declare(void **state)
 {
@@ -356,7 +346,6 @@ static void our_own_bugs_abort(void **state)
     expect_abort(binding_beyond_the_limit);
     expect_abort(too_many_workgroups);
     expect_abort(binding_that_is_missing);
-    expect_abort(counts_past_the_end);
     expect_abort(map_of_device_memory);
     expect_abort(close_with_live_buffers);
 }

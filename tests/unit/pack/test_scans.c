@@ -425,7 +425,7 @@ static char *write_laz(const char *name, uint16_t high, bool lost)
         records[i * 26 + 21] = i == laz_bright ? high >> 8 : 0;
     }
     struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
-    file.bytes[spl_laz_get32(file.bytes + 96) + 3] ^= lost ? 0x40 : 0;
+    file.bytes[spl_le_get32(file.bytes + 96) + 3] ^= lost ? 0x40 : 0;
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     assert_int_equal(fwrite(file.bytes, 1, file.count, f), file.count);

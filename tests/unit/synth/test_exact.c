@@ -13,7 +13,7 @@
 #include "synth/exact.h"
 #include "synth/light.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))
 

@@ -11,7 +11,7 @@
 #include "synth/footprint.h"
 #include "synth/light.h"
 #include "synth/random.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 enum { fine = 20 };
 

@@ -1,6 +1,5 @@
 /* Exact pictures as files: read back by the readers that others use, poses that mean what the pixels show, and nothing
  * half-written. */
-#include <dirent.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,7 +22,7 @@
 #include "synth/photos.h"
 #include "synth/pictures.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((double)(a) - (double)(b)) <= (tolerance))
 
@@ -44,18 +43,6 @@ static void write_pictures(const struct spl_pictures_options *o)
     struct spl_error err = {0};
     if (spl_pictures_write(o, &err))
         fail_msg("%s: %s", err.field, err.message);
-}
-
-static size_t file_count(const char *path)
-{
-    size_t count = 0;
-    DIR *dir = opendir(path);
-    if (!dir)
-        return 0;
-    for (struct dirent *entry; (entry = readdir(dir));)
-        count += entry->d_name[0] != '.';
-    closedir(dir);
-    return count;
 }
 
 static struct spl_image load(const char *path, enum spl_layer layer)
@@ -90,7 +77,7 @@ static void truth_reads_back_and_threads_do_not_matter(void **state)
         o.views = &views;
         o.threads = threads;
         write_pictures(&o);
-        assert_int_equal(file_count(in_folder("truth/truth")), 5);
+        assert_int_equal(folder_count(in_folder("truth/truth")), 5);
         assert_int_equal(spl_exact_render(scene, &view.camera, o.samples, 1, images, NULL), 0);
         for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
             if (!images[layer].pixels)
@@ -243,7 +230,7 @@ static void panoramas_come_with_poses(void **state)
     struct spl_pictures_options o = options_for(in_folder("panoramas"));
     o.panorama_width = 256;
     write_pictures(&o);
-    assert_int_equal(file_count(in_folder("panoramas/panoramas")), 9); /* four stations, one list */
+    assert_int_equal(folder_count(in_folder("panoramas/panoramas")), 9); /* four stations, one list */
     struct spl_scene *scene = NULL;
     assert_int_equal(spl_scene_create("courtyard", &scene, NULL), 0);
     check_pose(scene);
@@ -318,7 +305,7 @@ static void failures_leave_whole_files_only(void **state)
         spl_memory_fail_after(0);
         done = !result;
         assert_true(done || (result == SPL_E_NOMEM && err.code == SPL_E_NOMEM));
-        size_t images = file_count(in_folder("refused/photos/images"));
+        size_t images = folder_count(in_folder("refused/photos/images"));
         assert_int_equal(access(in_folder("refused/photos/images/0001.png"), F_OK) == 0, images);
         assert_true(images <= 1);
         assert_true(done == (access(in_folder("refused/photos/sparse/0/images.txt"), F_OK) == 0));

@@ -1,5 +1,4 @@
 /* Scans on disk: complete, repeatable, true to the surfaces they sampled, and absent when something was wrong. */
-#include <dirent.h>
 #include <math.h>
 #include <setjmp.h>
 #include <signal.h>
@@ -22,7 +21,7 @@
 #include "synth/light.h"
 #include "synth/scene.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 
 static char *read_all(const char *path, size_t *bytes)
@@ -36,18 +35,6 @@ static char *read_all(const char *path, size_t *bytes)
     assert_int_equal(fread(text, 1, *bytes, file), *bytes);
     fclose(file);
     return text;
-}
-
-static size_t file_count(const char *path)
-{
-    size_t count = 0;
-    DIR *dir = opendir(path);
-    if (!dir)
-        return 0;
-    for (struct dirent *entry; (entry = readdir(dir));)
-        count += entry->d_name[0] != '.';
-    closedir(dir);
-    return count;
 }
 
 static struct spl_synth_options options_for(const char *directory, uint64_t points)
@@ -84,7 +71,7 @@ static void files_depend_on_the_seed_and_not_on_threads(void **state)
         o.threads = i == 1 ? 3 : 1;
         o.seed = i == 3 ? 2 : 1;
         scan(o);
-        assert_int_equal(file_count(o.directory), 2);
+        assert_int_equal(folder_count(o.directory), 2);
     }
     assert_true(same_files(in_folder("one/courtyard.ptx"), in_folder("three/courtyard.ptx")));
     assert_true(same_files(in_folder("one/courtyard.ply"), in_folder("three/courtyard.ply")));
@@ -111,7 +98,7 @@ static void counts_come_within_two_percent(void **state)
         assert_int_equal(bytes - (size_t)(body - ply), points * 15);
         free(ply);
     }
-    assert_int_equal(file_count(in_folder("count")), 1); /* written over, and no PTX */
+    assert_int_equal(folder_count(in_folder("count")), 1); /* written over, and no PTX */
 }
 
 /* All scenes, all faults at once: what is lost is made up for by a finer grid. */
@@ -310,7 +297,7 @@ static void las_and_ply_hold_far_coordinates(void **state)
     struct spl_synth_options o = options_for(in_folder("far"), 8000);
     o.scene = "powerline";
     uint64_t points = scan(o);
-    assert_int_equal(file_count(o.directory), 2);
+    assert_int_equal(folder_count(o.directory), 2);
     struct spl_point_batch las, ply;
     struct spl_cloud *las_cloud, *ply_cloud;
     read_cloud(in_folder("far/powerline.las"), points, &las, &las_cloud);
@@ -426,7 +413,7 @@ static void classes_are_written(void **state)
         o.formats = NULL;
         o.directory = in_folder("crown");
         scan(o);
-        assert_int_equal(file_count(o.directory), s ? 3 : 1); /* no PTX */
+        assert_int_equal(folder_count(o.directory), s ? 3 : 1); /* no PTX */
     }
 }
 
@@ -439,7 +426,7 @@ static void refused(struct spl_synth_options o, int code, const char *field, con
     if (!strstr(err.message, word))
         fail_msg("'%s' does not say '%s'", err.message, word);
     assert_int_equal(points, 7);
-    assert_int_equal(file_count(o.directory ? o.directory : "/nonexistent"), 0);
+    assert_int_equal(folder_count(o.directory ? o.directory : "/nonexistent"), 0);
 }
 
 static void bad_arguments_are_named_and_leave_nothing(void **state)
@@ -514,7 +501,7 @@ static void a_full_disk_keeps_the_old_files(void **state)
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &kept), 0);
     assert_int_equal(result, SPL_E_IO);
     assert_non_null(strstr(err.message, "courtyard."));
-    assert_int_equal(file_count(directory), 3); /* both old files and the link, nothing partial */
+    assert_int_equal(folder_count(directory), 3); /* both old files and the link, nothing partial */
     assert_true(same_files(before[0], before[1]));
 }
 
@@ -530,9 +517,9 @@ static void refused_memory_leaves_nothing(void **state)
         if (!result)
             break;
         assert_int_equal(result, SPL_E_NOMEM);
-        assert_int_equal(file_count(o.directory), 0);
+        assert_int_equal(folder_count(o.directory), 0);
     }
-    assert_int_equal(file_count(o.directory), 2);
+    assert_int_equal(folder_count(o.directory), 2);
 }
 
 static void note_progress(void *context, const struct spl_progress *progress)

@@ -11,7 +11,7 @@
 
 #include "synth/build.h"
 #include "synth/scanner.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 

@@ -14,7 +14,7 @@
 #include "synth/build.h"
 #include "synth/random.h"
 #include "synth/synth.h"
-#include "synth/vector.h"
+#include "geom/vector.h"
 
 #define assert_near(a, b, tolerance) assert_true(fabs((a) - (b)) <= (tolerance))
 

@@ -1,12 +1,17 @@
 /* Doubles in threes. */
-#ifndef SPL_SYNTH_VECTOR_H
-#define SPL_SYNTH_VECTOR_H
+#ifndef SPL_GEOM_VECTOR_H
+#define SPL_GEOM_VECTOR_H
 
 #include <math.h>
 
 static inline double dot3(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline double distance3(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 static inline void sub3(const double a[3], const double b[3], double out[3])
