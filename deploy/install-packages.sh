@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Installs what is missing of the named sections of deploy/packages.txt. Needs no root when nothing is missing.
-# usage: deploy/install-packages.sh SECTION…      (build, run, quickstart, test)
+# usage: deploy/install-packages.sh SECTION…      (build, run, quickstart, test, full)
 set -euo pipefail
 
 list=$(dirname "${BASH_SOURCE[0]}")/packages.txt
-[ $# -gt 0 ] || { echo "usage: $0 SECTION… (build, run, quickstart, test)" >&2; exit 2; }
+[ $# -gt 0 ] || { echo "usage: $0 SECTION… (build, run, quickstart, test, full)" >&2; exit 2; }
 
 wanted=()
 for section in "$@"; do

@@ -74,6 +74,7 @@ sanitiser_runs() {
 }
 
 deploy/install-packages.sh build run quickstart test
+[ "$mode" != --full ] || deploy/install-packages.sh full
 
 rm -f "$out"/*.built
 sanitised=(-Ddebug=false -Dc_args=-g1 -Doptimization=1 -Db_lundef=false) # lines are all that their reports show
@@ -177,6 +178,7 @@ program clang python3 tests/clang.py "$out/normal"
 
 whole=(stability-whole-{conditions,drivers,invariants-vulkan,invariants-egl})
 program stability meson test -C "$out/normal" --no-rebuild --benchmark "${whole[@]}"
+program slurm meson test -C "$out/normal" --no-rebuild --benchmark parts-slurm
 program mutants python3 tests/mutants/mutants.py --keep "$out/mutants"
 build fuzz clang "${sanitised[@]}" -Db_sanitize=address,undefined -Dfuzz=true
 if built fuzz; then

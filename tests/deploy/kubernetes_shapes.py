@@ -51,6 +51,16 @@ POD = obj(
         whenUnsatisfiable=text("ScheduleAnyway", "DoNotSchedule"))),
     tolerations=items(obj(key=S, operator=text("Exists", "Equal"), effect=text("NoSchedule", "NoExecute"))),
     runtimeClassName=NAME, containers=items(CONTAINER), volumes=items(VOLUME))
+FIELD = obj("fieldPath", fieldPath=text("metadata.annotations['batch.kubernetes.io/job-completion-index']"))
+WORKER = obj(  # a container that ends by itself, and its pod
+    "name", "image", "args", "securityContext", "volumeMounts", "resources", name=NAME, image=S, args=items(S),
+    env=items(obj("name", "valueFrom", name=S, valueFrom=obj("fieldRef", fieldRef=FIELD))),
+    **{field: CONTAINER["properties"][field] for field in ("securityContext", "volumeMounts", "resources")})
+TASK = obj(
+    "restartPolicy", "containers", "volumes", "securityContext", restartPolicy=text("OnFailure", "Never"),
+    containers=items(WORKER),
+    **{field: POD["properties"][field] for field in ("automountServiceAccountToken", "enableServiceLinks",
+                                                     "securityContext", "volumes")})
 POLICIES = obj(stabilizationWindowSeconds=I,
                policies=items(obj("type", "value", "periodSeconds", type=text("Percent", "Pods"), value=I,
                                   periodSeconds=I)))
@@ -61,6 +71,9 @@ SPECS = {
         "selector", "template", "strategy", revisionHistoryLimit=I, selector=SELECTOR,
         strategy=obj("type", type=text("RollingUpdate"), rollingUpdate=obj(maxSurge=I, maxUnavailable=I)),
         template=obj("metadata", "spec", metadata=obj("labels", labels=LABELS), spec=POD)),
+    ("batch/v1", "Job"): obj(
+        "completionMode", "completions", "template", completionMode=text("Indexed"), completions=I, parallelism=I,
+        backoffLimit=I, template=obj("metadata", "spec", metadata=obj("labels", labels=LABELS), spec=TASK)),
     ("v1", "Service"): obj("selector", "ports", selector=LABELS, clusterIP=text("None"), publishNotReadyAddresses=B,
                            ports=items(obj("name", "port", "targetPort", name=PORT, port=I, targetPort=PORT))),
     ("v1", "PersistentVolumeClaim"): obj(
