@@ -128,6 +128,61 @@ static uint64_t private_bytes(void)
     return data * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
+/* From now on no more than so many bytes of private memory can be had beside what there is; what was before. */
+static struct rlimit limit_heap(uint64_t bytes)
+{
+    struct rlimit before, less;
+    assert_int_equal(getrlimit(RLIMIT_DATA, &before), 0);
+    less = before;
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    malloc_trim(0); /* what earlier tests have freed is no room */
+    less.rlim_cur = private_bytes() + bytes;
+    assert_int_equal(setrlimit(RLIMIT_DATA, &less), 0);
+    return before;
+}
+
+/* Of points all of whose arrays lie in files. */
+static struct spl_points in_files(size_t count)
+{
+    struct spl_points p = {.count = count, .capacity = count, .up = {0, 0, 1}};
+    assert_int_equal(spl_spill_create(in_folder("any.spld"), UINT64_C(1) << 30, &p.spill, NULL), 0);
+    spl_spill_force(65536);
+    for (int c = 0; c < 3; c++)
+        p.axis[c] = spl_spill_alloc(p.spill, count + SPL_POINTS_PAD, sizeof(double), NULL);
+    p.color_class = spl_spill_alloc(p.spill, count + SPL_POINTS_PAD, sizeof *p.color_class, NULL);
+    return p;
+}
+
+static void finish_in_files(struct spl_points *points)
+{
+    struct spl_spill *spill = points->spill;
+    spl_points_finish(points);
+    spl_spill_force(0);
+    spl_spill_destroy(spill);
+}
+
+/* Of as many points as a volume has at the borders of its blocks the edges between blocks lie in files too. */
+static void test_sides_of_many_blocks_take_no_heap(void **state)
+{
+    (void)state;
+    skip_sanitised();
+    enum { count = 1 << 18, neighbours = 16, heap_most = 43 << 20 }; /* of the one thread's scratch */
+    struct spl_error err = {0};
+    struct spl_stage stage = quiet_stage(1);
+    struct spl_points p = in_files(count);
+    uint64_t random = 5;
+    for (size_t i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            p.axis[c][i] = uniform(&random);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    struct rlimit before = limit_heap(heap_most);
+    int rc = spl_surface(&p, neighbours, false, &stage, &err);
+    assert_int_equal(setrlimit(RLIMIT_DATA, &before), 0);
+    if (rc)
+        fail_msg("%s", err.message);
+    finish_in_files(&p);
+}
+
 /* One stray point makes all the others one run of equal keys: they are ordered as if it were not there, in arrays that
  * may lie on disk, and on the heap in no more room than fewer would take. */
 static void test_order_beside_a_stray_takes_no_heap(void **state)
@@ -136,27 +191,15 @@ static void test_order_beside_a_stray_takes_no_heap(void **state)
     skip_sanitised();
     enum { count = 1 << 20, heap_most = 4 << 20 };
     struct spl_error err = {0};
-    struct spl_spill *spill;
-    struct rlimit before, less;
     struct spl_stage stage = quiet_stage(1);
     uint64_t random = 5;
-    struct spl_points p = {.count = count, .capacity = count, .up = {0, 0, 1}};
-    assert_int_equal(spl_spill_create(in_folder("any.spld"), UINT64_C(1) << 30, &spill, NULL), 0);
-    spl_spill_force(65536);
-    p.spill = spill;
+    struct spl_points p = in_files(count);
     for (int c = 0; c < 3; c++) {
-        p.axis[c] = spl_spill_alloc(spill, count + SPL_POINTS_PAD, sizeof(double), NULL);
         for (size_t i = 0; i < count - 1; i++)
             p.axis[c][i] = i % 16 ? uniform(&random) : 0.5; /* many of them at one place */
         p.axis[c][count - 1] = 1e9;
     }
-    p.color_class = spl_spill_alloc(spill, count + SPL_POINTS_PAD, sizeof *p.color_class, NULL);
-    assert_int_equal(getrlimit(RLIMIT_DATA, &before), 0);
-    less = before;
-    mallopt(M_MMAP_THRESHOLD, 1 << 20);
-    malloc_trim(0); /* what earlier tests have freed is no room */
-    less.rlim_cur = private_bytes() + heap_most;
-    assert_int_equal(setrlimit(RLIMIT_DATA, &less), 0);
+    struct rlimit before = limit_heap(heap_most);
     int rc = spl_points_order(&p, &stage, &err);
     assert_int_equal(setrlimit(RLIMIT_DATA, &before), 0);
     if (rc)
@@ -173,9 +216,7 @@ static void test_order_beside_a_stray_takes_no_heap(void **state)
     }
     for (size_t i = 1; i + 1 < p.count; i++)
         assert_true(spl_points_key(&p, i - 1, low, size) <= spl_points_key(&p, i, low, size));
-    spl_points_finish(&p);
-    spl_spill_force(0);
-    spl_spill_destroy(spill);
+    finish_in_files(&p);
 }
 
 /* The same of any number of threads, and of points that are nearly all at one place. */
@@ -647,6 +688,7 @@ int main(void)
         cmocka_unit_test(test_the_same_duplicate_stays),
         cmocka_unit_test(test_order_below_key_resolution),   cmocka_unit_test(test_neighbours_against_brute_force),
         cmocka_unit_test(test_order_beside_a_stray_takes_no_heap),
+        cmocka_unit_test(test_sides_of_many_blocks_take_no_heap),
         cmocka_unit_test(test_threads_order_long_runs_alike),
         cmocka_unit_test(test_normals_of_a_sphere),
         cmocka_unit_test(test_lines_at_borders),          cmocka_unit_test(test_normals_face_the_station),
