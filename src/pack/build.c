@@ -135,17 +135,19 @@ static int begin_spill(struct spl_build *p, struct spl_error *err)
 }
 
 /* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
-static void end_spill(const struct spl_pack_options *o, struct spl_stage *stage, bool done)
+static int end_spill(const struct spl_pack_options *o, struct spl_stage *stage, int rc, struct spl_error *err)
 {
     char text[160];
     uint64_t most = stage->spill ? spl_spill_memory_most(stage->spill) : 0;
-    if (done && o->warn && most > o->memory_bytes) {
+    rc = spl_spill_explain(stage->spill, rc, err);
+    if (!rc && o->warn && most > o->memory_bytes) {
         snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB: so much was needed",
                  (double)most / 1048576, (double)o->memory_bytes / 1048576);
         o->warn(o->progress_context, text);
     }
     spl_spill_destroy(stage->spill);
     stage->spill = NULL;
+    return rc;
 }
 
 static struct spl_bound get_bound(const struct spl_build *p)
@@ -346,6 +348,5 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     spl_points_finish(&p.points);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
-    end_spill(options, stage, !rc);
-    return rc;
+    return end_spill(options, stage, rc, err);
 }

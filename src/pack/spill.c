@@ -49,6 +49,7 @@ struct spl_spill {
     pthread_mutex_t lock;
     struct piece *pieces;
     size_t count, capacity;
+    struct spl_error why; /* the first file had no room */
     uint64_t trimmed_ns;
     size_t hand, hand_at; /* where pages were taken away last */
     char *pool;           /* of small ones: what is left of it */
@@ -60,10 +61,21 @@ struct spl_spill {
 };
 
 static atomic_size_t forced;
+static atomic_long fail_countdown;
 
 void spl_spill_force(size_t least)
 {
     atomic_store(&forced, least);
+}
+
+void spl_spill_fail_after(long n)
+{
+    atomic_store(&fail_countdown, n);
+}
+
+static bool is_to_fail(void)
+{
+    return atomic_load(&fail_countdown) > 0 && atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
 static uint64_t get_resident(struct spl_spill *s)
@@ -230,13 +242,19 @@ void spl_spill_destroy(struct spl_spill *s)
     free(s);
 }
 
-static int reserve_blocks(const struct spl_spill *s, int fd, size_t bytes, struct spl_error *err)
+/* Of a file that has `before`. */
+static int reserve_blocks(struct spl_spill *s, int fd, size_t before, size_t bytes)
 {
-    int why = posix_fallocate(fd, 0, (off_t)bytes);
+    int why = ENOSPC;
+    if (!is_to_fail())
+        while ((why = posix_fallocate(fd, (off_t)before, (off_t)(bytes - before))) == EINTR)
+            continue;
     if (!why)
         return SPL_OK;
-    return spl_fail_field(err, SPL_E_IO, "memory", "within this memory the pack needs %.1f GB more in '%.300s': %s",
-                          (double)bytes / 1e9, s->folder, strerror(why));
+    return spl_fail_field(&s->why, SPL_E_IO, "memory",
+                          "within this memory the pack needs %.0f MB in '%.200s' beside the %.0f MB that it keeps there: "
+                          "%s; make room there, give it more memory, or write the dataset to another disk",
+                          (double)(bytes - before) / 1e6, s->folder, (double)s->on_disk / 1e6, strerror(why));
 }
 
 /* Where the file system knows no files without a name, one that loses it at once. */
@@ -253,20 +271,20 @@ static int open_nameless(const char *folder)
     return fd;
 }
 
-static void *map_file(struct spl_spill *s, size_t bytes, struct spl_error *err)
+static void *map_file(struct spl_spill *s, size_t bytes)
 {
     int fd = open_nameless(s->folder);
     if (fd < 0) {
-        spl_fail_errno(err, errno, "'%.300s': no file for what is beyond the bound of memory can be made", s->folder);
+        spl_fail_errno(&s->why, errno, "'%.300s': no file for what is beyond the bound of memory can be made", s->folder);
         return NULL;
     }
-    if (reserve_blocks(s, fd, bytes, err)) {
+    if (reserve_blocks(s, fd, 0, bytes)) {
         close(fd);
         return NULL;
     }
     void *at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
     if (at == MAP_FAILED) {
-        spl_fail_errno(err, errno, "%zu bytes cannot be mapped", bytes);
+        spl_fail_errno(&s->why, errno, "%zu bytes cannot be mapped", bytes);
         close(fd);
         return NULL;
     }
@@ -276,13 +294,30 @@ static void *map_file(struct spl_spill *s, size_t bytes, struct spl_error *err)
     return at;
 }
 
+int spl_spill_explain(const struct spl_spill *s, int rc, struct spl_error *err)
+{
+    if (!s || !s->why.code || rc == SPL_OK || rc == SPL_E_CANCELLED)
+        return rc;
+    if (err)
+        *err = s->why;
+    return s->why.code;
+}
+
+static void *fail_piece(const struct spl_spill *s, struct spl_error *err)
+{
+    spl_fail_field(err, s->why.code, s->why.field, "%s", s->why.message);
+    return NULL;
+}
+
 /* Under the lock. */
 static void *add_piece(struct spl_spill *s, size_t bytes, bool zeroed, struct spl_error *err)
 {
     if (spl_array_reserve(s->pieces, s->capacity, s->count + 1, err))
         return NULL;
-    if (s->on_heap + bytes > spl_spill_get_share(s->memory) || atomic_load(&forced))
-        return map_file(s, bytes, err);
+    if (s->on_heap + bytes > spl_spill_get_share(s->memory) || atomic_load(&forced)) {
+        void *in_file = map_file(s, bytes);
+        return in_file ? in_file : fail_piece(s, err);
+    }
     void *at = zeroed ? spl_alloc(1, bytes, err) : spl_alloc_raw(1, bytes, err);
     if (at) {
         s->pieces[s->count++] = (struct piece){at, bytes, -1};
@@ -330,12 +365,12 @@ static size_t find_piece(const struct spl_spill *s, const void *at)
 /* In its file. */
 static void *grow_file(struct spl_spill *s, struct piece *p, size_t bytes, struct spl_error *err)
 {
-    if (reserve_blocks(s, p->fd, bytes, err))
-        return NULL;
+    if (reserve_blocks(s, p->fd, p->bytes, bytes))
+        return fail_piece(s, err);
     void *at = mremap(p->at, p->bytes, bytes, MREMAP_MAYMOVE);
     if (at == MAP_FAILED) {
-        spl_fail_errno(err, errno, "%zu bytes cannot be mapped", bytes);
-        return NULL;
+        spl_fail_errno(&s->why, errno, "%zu bytes cannot be mapped", bytes);
+        return fail_piece(s, err);
     }
     s->on_disk += bytes - p->bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;

@@ -1,5 +1,6 @@
 /* A dataset depends on what is in the scans alone: not on threads, on memory, on the order of files and of the points in
  * them, nor on how many files they lie in. */
+#include <glob.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -230,6 +231,39 @@ static void of_any_memory_without_surfaces(void **state)
     free(file[1].bytes);
 }
 
+/* Wherever a pack is: the error names the folder and what to do, and nothing is left there. */
+static void a_full_disk_is_told_in_every_stage(void **state)
+{
+    char few[300], left[300];
+    const char *path = few;
+    struct spl_pack_options options = get_options(&path, 1, 2);
+    glob_t found;
+    long n = 0;
+    int rc = SPL_E_IO;
+    (void)state;
+    snprintf(few, sizeof few, "%s", in_folder("few.ply"));
+    snprintf(left, sizeof left, "%s", in_folder("{,.}none*"));
+    write_scan(few, 0, 20, 0);
+    options.output = in_folder("none.spld");
+    options.memory_bytes = SPL_PACK_MEMORY_MIN;
+    spl_spill_force(1024);
+    while (rc) {
+        struct spl_error err = {0};
+        spl_spill_fail_after(++n);
+        rc = spl_pack(&options, NULL, &err);
+        if (rc && (rc != SPL_E_IO || err.code != rc || strcmp(err.field, "memory") ||
+                   !strstr(err.message, test_folder) || !strstr(err.message, "make room there")))
+            fail_msg("array %ld: %d, %s: %s", n, rc, err.field, err.message);
+        if (rc && glob(left, GLOB_BRACE, NULL, &found) != GLOB_NOMATCH)
+            fail_msg("array %ld: %s is left", n, found.gl_pathv[0]);
+    }
+    spl_spill_fail_after(0);
+    spl_spill_force(0);
+    assert_true(n > 40);
+    assert_int_equal(unlink(options.output), 0);
+    assert_int_equal(unlink(few), 0);
+}
+
 static void too_little_memory_is_refused(void **state)
 {
     const char *path = scan;
@@ -294,6 +328,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(of_any_number_of_threads),
                                        cmocka_unit_test(of_any_memory),
                                        cmocka_unit_test(of_any_memory_without_surfaces),
+                                       cmocka_unit_test(a_full_disk_is_told_in_every_stage),
                                        cmocka_unit_test(too_little_memory_is_refused),
                                        cmocka_unit_test(too_many_points_are_refused_at_once),
                                        cmocka_unit_test(of_any_order_of_points),
