@@ -32,6 +32,7 @@
 
 /* Bytes a point in large arrays, at most: see above. */
 static const double bytes_bare = 54, bytes_surface = 70, bytes_planes = 100, bytes_normal = 12, bytes_scalar = 8;
+static const double bytes_written = 16; /* a point, scalars apart: 8 of a wall, 12 of clusters, 15 on wires */
 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
@@ -75,6 +76,12 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
     return rc;
 }
 
+/* The end once more, without panels, for the maps of stations. */
+static bool writes_twice(const struct spl_build *p, const struct spl_passes *later)
+{
+    return later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF;
+}
+
 /* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
 static void plan(const struct spl_build *p, const struct spl_passes *later)
 {
@@ -87,8 +94,7 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
                  {"joining wires", 0.05, false}, {"outlines", 0.2, true},    {"panels", 0.3, true},
                  {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
     uint64_t points = 0;
-    bool twice =
-        later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF; /* the end, without panels */
+    bool twice = writes_twice(p, later);
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
@@ -107,13 +113,14 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         spl_maps_plan(p->stage, &later->pictures, 1, points);
 }
 
-/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough. Says how much it will be. */
-static int begin_spill(struct spl_build *p, struct spl_error *err)
+/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough, for the dataset too. Says how
+ * much it will be, and where the disk is none. */
+static int begin_spill(struct spl_build *p, const struct spl_passes *later, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
     double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
     double points = 0, normals = 0, scalars = 0;
-    char text[200];
+    char text[400];
     for (size_t i = 0; i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
         points += (double)(scan->max_points ? scan->max_points : scan->points_expected);
@@ -122,16 +129,27 @@ static int begin_spill(struct spl_build *p, struct spl_error *err)
     }
     uint64_t share = spl_spill_get_share(o->memory_bytes);
     double beyond = points * (bytes + normals + scalars) - (double)share;
+    double written = points * (bytes_written + scalars) * (writes_twice(p, later) ? 2 : 1);
     if (beyond <= 0)
         return SPL_OK;
     if (o->warn) {
         snprintf(text, sizeof text,
                  "%.0f points take up to %.1f GB while they are packed, which is beyond --memory: %.1f GB of it lie on "
-                 "disk beside %.60s meanwhile",
-                 points, points * (bytes + normals + scalars) / 1e9, beyond / 1e9, spl_input_name(o->output));
+                 "disk beside %.60s meanwhile, which takes up to %.1f GB itself",
+                 points, points * (bytes + normals + scalars) / 1e9, beyond / 1e9, spl_input_name(o->output),
+                 written / 1e9);
         o->warn(o->progress_context, text);
     }
-    return spl_spill_check_disk(o->output, (uint64_t)beyond, err);
+    char *folder = spl_spill_find_memory_folder(o->output);
+    if (o->warn && folder) {
+        snprintf(text, sizeof text,
+                 "'%.200s' lies in memory (tmpfs), and so does what is beyond --memory, which bounds nothing there: write "
+                 "the dataset (-o) to a folder on a disk",
+                 folder);
+        o->warn(o->progress_context, text);
+    }
+    free(folder);
+    return spl_spill_check_disk(o->output, (uint64_t)beyond, (uint64_t)written, err);
 }
 
 /* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
@@ -292,7 +310,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_points_check_count(&p.scans, err);
     if (!rc) {
         plan(&p, later);
-        rc = stage->spill ? begin_spill(&p, err) : SPL_OK;
+        rc = stage->spill ? begin_spill(&p, later, err) : SPL_OK;
     }
     if (!rc) {
         rc = gather(&p, &said, err);

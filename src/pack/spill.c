@@ -12,6 +12,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -21,6 +22,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/statvfs.h>
+#include <sys/vfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -173,18 +175,29 @@ uint64_t spl_spill_get_share(uint64_t memory)
     return (uint64_t)(in_memory * (double)memory);
 }
 
-int spl_spill_check_disk(const char *beside, uint64_t bytes, struct spl_error *err)
+char *spl_spill_find_memory_folder(const char *beside)
+{
+    struct statfs status;
+    char *folder = find_folder(beside);
+    if (folder && !statfs(folder, &status) && (status.f_type == TMPFS_MAGIC || status.f_type == RAMFS_MAGIC))
+        return folder;
+    free(folder);
+    return NULL;
+}
+
+int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t written, struct spl_error *err)
 {
     struct statvfs status;
     char *folder = find_folder(beside);
     int rc = SPL_OK;
     if (folder && !statvfs(folder, &status)) {
         uint64_t free_bytes = (uint64_t)status.f_bavail * status.f_frsize;
-        if (free_bytes < bytes)
+        if (free_bytes < meanwhile + written)
             rc = spl_fail_field(err, SPL_E_IO, "memory",
-                                "within this memory the pack keeps up to %.1f GB in '%.300s' meanwhile, where %.1f GB "
-                                "are free: make room, or give it more memory",
-                                (double)bytes / 1e9, folder, (double)free_bytes / 1e9);
+                                "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
+                                "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
+                                "or write the dataset to another disk",
+                                (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
     }
     free(folder);
     return rc;

@@ -42,8 +42,13 @@ int spl_spill_explain(const struct spl_spill *spill, int rc, struct spl_error *e
 /* Bytes that arrays may take before the first of them goes to a file. */
 uint64_t spl_spill_get_share(uint64_t memory);
 
-/* SPL_E_IO, field "memory", where the folder of `beside` has not `bytes` free. */
-int spl_spill_check_disk(const char *beside, uint64_t bytes, struct spl_error *err);
+/* SPL_E_IO, field "memory", where the folder of `beside` has not so many bytes free: of files meanwhile, and of what is
+ * written there while they last. */
+int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t written, struct spl_error *err);
+
+/* The folder of `beside` where it lies in memory itself, so that what is there is beyond no bound; else NULL. The caller
+ * frees. */
+char *spl_spill_find_memory_folder(const char *beside);
 
 /* From now on each array of `least` bytes and more lies in a file, whatever memory there is; 0: as else. Tests only. */
 void spl_spill_force(size_t least);

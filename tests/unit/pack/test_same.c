@@ -264,6 +264,62 @@ static void a_full_disk_is_told_in_every_stage(void **state)
     assert_int_equal(unlink(few), 0);
 }
 
+static char warned[2000];
+
+static void keep_warning(void *context, const char *text)
+{
+    spl_cancel_set(context);
+    strncat(warned, text, sizeof warned - strlen(warned) - 1);
+}
+
+/* What is said of a pack beyond its memory, which ends before it begins. */
+static void warn_of(const char *output)
+{
+    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000\nproperty float x\n"
+                               "property float y\nproperty float z\nend_header\n";
+    const char *path = in_folder("million.ply");
+    struct spl_error err = {0};
+    struct spl_cancel cancel = {0};
+    struct spl_pack_options options = get_options(&path, 1, 1);
+    folder_put_text("million.ply", head);
+    assert_int_equal(truncate(path, (off_t)sizeof head - 1 + 12000000), 0);
+    options.keep = NULL;
+    options.output = output;
+    options.cancel = options.progress_context = &cancel;
+    options.memory_bytes = SPL_PACK_MEMORY_MIN;
+    options.warn = keep_warning;
+    warned[0] = 0;
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_CANCELLED);
+    assert_int_equal(unlink(path), 0);
+}
+
+/* A million points: 100 bytes each less what is in memory, and 16 of the dataset. */
+static void what_the_disk_needs_is_said(void **state)
+{
+    char *in_memory = spl_spill_find_memory_folder(in_folder("none.spld"));
+    (void)state;
+    warn_of(in_folder("none.spld"));
+    if (!strstr(warned, "take up to 0.1 GB while") || !strstr(warned, "0.1 GB of it lie on disk") ||
+        !strstr(warned, "which takes up to 0.0 GB itself"))
+        fail_msg("%s", warned);
+    assert_int_equal(!strstr(warned, "tmpfs"), !in_memory);
+    free(in_memory);
+}
+
+static void a_disk_in_memory_is_said(void **state)
+{
+    char output[100], *folder = spl_spill_find_memory_folder("/dev/shm/none.spld");
+    (void)state;
+    if (!folder)
+        skip(); /* none here */
+    assert_string_equal(folder, "/dev/shm/");
+    free(folder);
+    snprintf(output, sizeof output, "/dev/shm/splatd-test-%ld.spld", (long)getpid());
+    warn_of(output);
+    if (!strstr(warned, "'/dev/shm/' lies in memory") || !strstr(warned, "-o"))
+        fail_msg("%s", warned);
+}
+
 static void too_little_memory_is_refused(void **state)
 {
     const char *path = scan;
@@ -329,6 +385,8 @@ int main(void)
                                        cmocka_unit_test(of_any_memory),
                                        cmocka_unit_test(of_any_memory_without_surfaces),
                                        cmocka_unit_test(a_full_disk_is_told_in_every_stage),
+                                       cmocka_unit_test(what_the_disk_needs_is_said),
+                                       cmocka_unit_test(a_disk_in_memory_is_said),
                                        cmocka_unit_test(too_little_memory_is_refused),
                                        cmocka_unit_test(too_many_points_are_refused_at_once),
                                        cmocka_unit_test(of_any_order_of_points),

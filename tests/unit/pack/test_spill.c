@@ -41,8 +41,11 @@ static void arrays_beyond_the_bound_keep_their_values(void **state)
     for (size_t a = 0; a < arrays; a++) {
         array[a] = spl_spill_alloc(spill, count, sizeof **array, NULL);
         assert_non_null(array[a]);
-        for (size_t i = 0; i < count; i += 512) /* zeroed; one of each page */
+        for (size_t i = 0; i < count; i += 512) { /* zeroed; one of each page */
             assert_int_equal(array[a][i], 0);
+            if (i % 65536 == 0)
+                spl_spill_keep_bound(spill);
+        }
         for (size_t i = 0; i < count; i++) {
             array[a][i] = value_at(a, i);
             if (i % 65536 == 0)
@@ -121,9 +124,12 @@ static void a_disk_without_room_is_an_error(void **state)
     struct rlimit before, less = {.rlim_cur = 1 << 20};
     struct spl_error err = {0};
     (void)state;
-    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), UINT64_C(1) << 60, &err), SPL_E_IO);
+    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), UINT64_C(1) << 60, 0, &err), SPL_E_IO);
     assert_string_equal(err.field, "memory");
-    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), 1, &err), SPL_OK);
+    err = (struct spl_error){0};
+    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), 1, UINT64_C(2000000000) << 30, &err), SPL_E_IO);
+    assert_non_null(strstr(err.message, "a dataset of up to 2147483648.0 GB"));
+    assert_int_equal(spl_spill_check_disk(in_folder("any.spld"), 1, 1, &err), SPL_OK);
     err = (struct spl_error){0};
     struct spl_spill *spill = create(64 << 20);
     signal(SIGXFSZ, SIG_IGN);
