@@ -113,31 +113,42 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         spl_maps_plan(p->stage, &later->pictures, 1, points);
 }
 
-/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough, for the dataset too. Says how
- * much it will be, and where the disk is none. */
+static int check_disk(const struct spl_build *p, double points, double bytes, double written, struct spl_error *err)
+{
+    double beyond = points * bytes - (double)spl_spill_get_share(p->options->memory_bytes);
+    return beyond > 0
+               ? spl_spill_check_disk(p->options->output, (uint64_t)beyond, (uint64_t)(points * written), err)
+               : SPL_OK;
+}
+
+/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough, for the dataset too. Where
+ * points are guessed, or cells may be none, half of them must have room; else it is said alone. Says how much it will
+ * be, and where the disk is none. */
 static int begin_spill(struct spl_build *p, const struct spl_passes *later, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
     double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
-    double points = 0, normals = 0, scalars = 0;
+    double points = 0, least = 0, normals = 0, scalars = 0;
+    struct spl_error why = {0};
     char text[400];
     for (size_t i = 0; i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
-        points += (double)(scan->max_points ? scan->max_points : scan->points_expected);
+        double own = (double)(scan->max_points ? scan->max_points : scan->points_expected);
+        points += own;
+        least += scan->max_points || scan->counted ? own : own / 2;
         normals = scan->attributes & SPL_CLOUD_NORMAL ? bytes_normal : normals;
         scalars = fmax(scalars, bytes_scalar * __builtin_popcount(scan->scalars));
     }
-    uint64_t share = spl_spill_get_share(o->memory_bytes);
-    double beyond = points * (bytes + normals + scalars) - (double)share;
-    double written = points * (bytes_written + scalars) * (writes_twice(p, later) ? 2 : 1);
+    bytes += normals + scalars;
+    double beyond = points * bytes - (double)spl_spill_get_share(o->memory_bytes);
+    double written = (bytes_written + scalars) * (writes_twice(p, later) ? 2 : 1);
     if (beyond <= 0)
         return SPL_OK;
     if (o->warn) {
         snprintf(text, sizeof text,
                  "%.0f points take up to %.1f GB while they are packed, which is beyond --memory: %.1f GB of it lie on "
                  "disk beside %.60s meanwhile, which takes up to %.1f GB itself",
-                 points, points * (bytes + normals + scalars) / 1e9, beyond / 1e9, spl_input_name(o->output),
-                 written / 1e9);
+                 points, points * bytes / 1e9, beyond / 1e9, spl_input_name(o->output), points * written / 1e9);
         o->warn(o->progress_context, text);
     }
     char *folder = spl_spill_find_memory_folder(o->output);
@@ -149,7 +160,13 @@ static int begin_spill(struct spl_build *p, const struct spl_passes *later, stru
         o->warn(o->progress_context, text);
     }
     free(folder);
-    return spl_spill_check_disk(o->output, (uint64_t)beyond, (uint64_t)written, err);
+    int rc = check_disk(p, points, bytes, written, &why);
+    if (rc && !check_disk(p, least, bytes, written, NULL)) {
+        if (o->warn)
+            o->warn(o->progress_context, why.message);
+        return SPL_OK;
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
 /* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
