@@ -176,8 +176,9 @@ static int end_spill(const struct spl_pack_options *o, struct spl_stage *stage, 
     uint64_t most = stage->spill ? spl_spill_memory_most(stage->spill) : 0;
     rc = spl_spill_explain(stage->spill, rc, err);
     if (!rc && o->warn && most > o->memory_bytes) {
-        snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB: so much was needed",
-                 (double)most / 1048576, (double)o->memory_bytes / 1048576);
+        snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB%s",
+                 (double)most / 1048576, (double)o->memory_bytes / 1048576,
+                 stage->threads > 1 ? ": with fewer --threads it takes less" : "");
         o->warn(o->progress_context, text);
     }
     spl_spill_destroy(stage->spill);

@@ -52,6 +52,7 @@ struct spl_spill {
     struct piece *pieces;
     size_t count, capacity;
     struct spl_error why; /* the first file had no room */
+    uint64_t high_before; /* resident bytes that the process ever had, see get_high() */
     uint64_t trimmed_ns;
     size_t hand, hand_at; /* where pages were taken away last */
     char *pool;           /* of small ones: what is left of it */
@@ -93,6 +94,19 @@ static uint64_t get_resident(struct spl_spill *s)
     while (resident > most && !atomic_compare_exchange_weak(&s->memory_most, &most, resident))
         continue;
     return resident;
+}
+
+/* The most resident bytes that the process ever had, as the kernel noted it, which misses no moment; 0 = it does not say. */
+static uint64_t get_high(void)
+{
+    char line[256];
+    unsigned long long kib = 0;
+    FILE *f = fopen("/proc/self/status", "re");
+    while (f && !kib && fgets(line, sizeof line, f))
+        sscanf(line, "VmHWM: %llu kB", &kib);
+    if (f)
+        fclose(f);
+    return kib << 10;
 }
 
 /* Resident bytes from which on pages are taken away. */
@@ -209,6 +223,7 @@ int spl_spill_create(const char *beside, uint64_t memory, struct spl_spill **out
     if (!s)
         return SPL_E_NOMEM;
     s->memory = memory;
+    s->high_before = get_high();
     s->statm = -1;
     pthread_mutex_init(&s->lock, NULL);
     int rc = (s->folder = find_folder(beside)) ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory");
@@ -490,6 +505,6 @@ uint64_t spl_spill_disk_most(const struct spl_spill *spill)
 
 uint64_t spl_spill_memory_most(struct spl_spill *spill)
 {
-    get_resident(spill);
-    return atomic_load(&spill->memory_most);
+    uint64_t high = get_high(), seen = (get_resident(spill), atomic_load(&spill->memory_most));
+    return high > spill->high_before && high > seen ? high : seen; /* what was before is another's */
 }

@@ -1,5 +1,6 @@
 /* Arrays beyond the bound of memory: they keep what is written into them, the process keeps to its bound, and a disk
  * without room is an error. */
+#include <malloc.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -15,6 +16,7 @@
 
 #include "pack/spill.h"
 #include "support/folder.h"
+#include "support/sanitised.h"
 
 static struct spl_spill *create(uint64_t memory)
 {
@@ -62,9 +64,12 @@ static void arrays_beyond_the_bound_keep_their_values(void **state)
         }
     array[7] = spl_spill_realloc(spill, array[7], count + count / 2, sizeof **array, NULL);
     array[0] = spl_spill_realloc(spill, array[0], 2 * count, sizeof **array, NULL); /* from the heap to a file */
-    for (size_t i = 0; i < count; i += 999)
+    for (size_t i = 0; i < count; i += 999) {
         if (array[7][i] != value_at(7, i) || array[0][i] != value_at(0, i))
             fail_msg("grown, %zu", i);
+        if (i % (999 * 64) == 0)
+            spl_spill_keep_bound(spill);
+    }
     array[7][count + count / 2 - 1] = 1;
     for (size_t a = 0; a < arrays; a += 2)
         spl_spill_free(spill, array[a]);
@@ -119,6 +124,32 @@ static void without_a_bound_it_is_the_heap(void **state)
     spl_spill_give(NULL, spl_spill_take(NULL, 10, 10, NULL));
 }
 
+/* What is told at the end misses no moment, however short: many, each with a new most. */
+static void the_most_is_that_of_every_moment(void **state)
+{
+    skip_sanitised();
+    struct spl_spill *spill = create(64 << 20);
+    struct rusage usage;
+    (void)state;
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    assert_int_equal(getrusage(RUSAGE_SELF, &usage), 0);
+    size_t before = (size_t)usage.ru_maxrss << 10;
+    for (size_t bytes = before; bytes < before + (32 << 20); bytes += 2 << 20) {
+        char *at = malloc(bytes);
+        assert_non_null(at);
+        memset(at, 1, bytes);
+        __asm__ volatile("" : : "r"(at) : "memory");
+        free(at);
+    }
+    assert_int_equal(getrusage(RUSAGE_SELF, &usage), 0);
+    assert_true((size_t)usage.ru_maxrss << 10 > before + (16 << 20));
+    assert_true(spl_spill_memory_most(spill) + (1 << 18) >= (uint64_t)usage.ru_maxrss << 10);
+    spl_spill_destroy(spill);
+    spill = create(64 << 20); /* of another, what was before is none */
+    assert_true(spl_spill_memory_most(spill) < (uint64_t)usage.ru_maxrss << 10);
+    spl_spill_destroy(spill);
+}
+
 static void a_disk_without_room_is_an_error(void **state)
 {
     struct rlimit before, less = {.rlim_cur = 1 << 20};
@@ -157,6 +188,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arrays_beyond_the_bound_keep_their_values), cmocka_unit_test(small_ones_lie_beside_each_other),
         cmocka_unit_test(what_was_small_grows_into_a_file),
-        cmocka_unit_test(without_a_bound_it_is_the_heap), cmocka_unit_test(a_disk_without_room_is_an_error)};
+        cmocka_unit_test(the_most_is_that_of_every_moment), cmocka_unit_test(without_a_bound_it_is_the_heap), cmocka_unit_test(a_disk_without_room_is_an_error)};
     return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
 }
