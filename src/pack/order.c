@@ -188,9 +188,12 @@ static void sort_part(struct order *o, size_t begin, size_t end)
     uint32_t count[8][digits] = {0};
     uint64_t *key = o->key_to, *key_to = o->key;
     uint32_t *index = o->index_to, *index_to = o->index;
-    for (size_t i = begin; i < end; i++)
+    for (size_t i = begin; i < end; i++) {
+        if (i % grain == 0)
+            spl_spill_keep_bound(o->points->spill);
         for (unsigned d = 0; d < 8; d++)
             count[d][key[i] >> 8 * d & (digits - 1)]++;
+    }
     for (unsigned d = 0; d < 8; d++) {
         uint32_t *at = count[d], sum = (uint32_t)begin;
         if (at[key[begin] >> 8 * d & (digits - 1)] == end - begin)
@@ -214,9 +217,11 @@ static void sort_part(struct order *o, size_t begin, size_t end)
         key_to = other_key;
         index_to = other_index;
     }
-    if (key != o->key) {
-        memcpy(o->key + begin, key + begin, (end - begin) * sizeof *key);
-        memcpy(o->index + begin, index + begin, (end - begin) * sizeof *index);
+    for (size_t i = begin, some; key != o->key && i < end; i += some) {
+        some = end - i < grain ? end - i : grain;
+        spl_spill_keep_bound(o->points->spill);
+        memcpy(o->key + i, key + i, some * sizeof *key);
+        memcpy(o->index + i, index + i, some * sizeof *index);
     }
 }
 
@@ -337,8 +342,9 @@ static void runs_piece(void *context, size_t begin, size_t end, unsigned worker)
     while (i < end && i > 0 && o->key[i] == o->key[i - 1])
         i++;
     for (size_t next; i < end; i = next) {
-        for (next = i + 1; next < o->count && o->key[next] == o->key[i];)
-            next++;
+        for (next = i + 1; next < o->count && o->key[next] == o->key[i]; next++)
+            if (next % grain == 0)
+                spl_spill_keep_bound(o->points->spill);
         if (next - i > long_run)
             o->runs[atomic_fetch_add(&o->run_count, 1)] = (struct run){o->begin + i, next - i};
         else if (next - i > 1)

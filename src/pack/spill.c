@@ -60,7 +60,7 @@ struct spl_spill {
     int statm;
     pthread_t watcher;
     bool watched;
-    atomic_bool ends;
+    atomic_bool ends, at_work; /* pages are being taken away */
 };
 
 static atomic_size_t forced;
@@ -121,6 +121,7 @@ static void let_go(struct spl_spill *s)
 {
     uint64_t wanted = (uint64_t)(low * (double)get_most(s)), steps = 0;
     pthread_mutex_lock(&s->lock);
+    atomic_store(&s->at_work, true);
     uint64_t left = s->on_disk;
     for (size_t turns = 0; left > 0 && turns <= s->count; steps++) {
         if (s->hand >= s->count || s->pieces[s->hand].fd < 0 || s->hand_at >= s->pieces[s->hand].bytes) {
@@ -143,6 +144,7 @@ static void let_go(struct spl_spill *s)
         malloc_trim(0);
         s->trimmed_ns = now;
     }
+    atomic_store(&s->at_work, false);
     pthread_mutex_unlock(&s->lock);
 }
 
@@ -150,6 +152,10 @@ void spl_spill_keep_bound(struct spl_spill *s)
 {
     if (!s)
         return;
+    if (atomic_load_explicit(&s->at_work, memory_order_relaxed)) { // who filled on meanwhile would be faster
+        pthread_mutex_lock(&s->lock);
+        pthread_mutex_unlock(&s->lock);
+    }
     uint64_t now = spl_now_ns(), before = atomic_load_explicit(&s->checked_ns, memory_order_relaxed);
     if ((int64_t)(now - before) < shortest_ns || !atomic_compare_exchange_strong(&s->checked_ns, &before, now))
         return;
@@ -316,6 +322,7 @@ static void *map_file(struct spl_spill *s, size_t bytes)
         close(fd);
         return NULL;
     }
+    madvise(at, bytes, MADV_NOHUGEPAGE); /* less comes at a touch */
     s->pieces[s->count++] = (struct piece){at, bytes, fd};
     s->on_disk += bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;

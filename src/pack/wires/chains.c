@@ -55,8 +55,10 @@ static int gather(struct gathered *g, const struct spl_points *p, const struct s
     g->index = spl_alloc_raw(linear + 1, sizeof *g->index, err);
     if (!g->points || !g->index)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->count && !spl_stage_is_cancelled(stage); i += SPL_CHUNK_SPLATS)
+    for (size_t i = 0; i < p->count && !spl_stage_is_cancelled(stage); i += SPL_CHUNK_SPLATS) {
+        spl_spill_keep_bound(p->spill);
         gather_run(g, p, i, p->count - i < SPL_CHUNK_SPLATS ? p->count : i + SPL_CHUNK_SPLATS);
+    }
     return spl_stage_check(stage, err);
 }
 
@@ -122,6 +124,7 @@ static void add_vertex(struct spl_wires *w, const struct spl_points *p, const st
 {
     spl_assert(w->count < w->capacity);
     uint32_t index = g->index[like];
+    spl_spill_keep_bound(p->spill); /* each is in pages of its own */
     struct spl_wire_vertex *vertex = &w->vertices[w->count++];
     *vertex = (struct spl_wire_vertex){.radius = (float)g->points[like].spacing,
                                        .length = length,
