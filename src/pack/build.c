@@ -6,8 +6,9 @@
  * plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes
  * 60 more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until
  * the end. Stations have seen points, not panels: where there are both, the scan is written once more without panels.
- * All that grows with the points, but for tables of a byte a point, is in arrays that may lie on disk (spill.h): where
- * memory is bounded these are what is beyond. The same work is done on them, so that nothing depends on the bound.
+ * All that grows with the points, but for tables of a byte a point and what joins wires, is in arrays that may lie on
+ * disk (spill.h): where memory is bounded these are what is beyond. The same work is done on them, so that nothing
+ * depends on the bound.
  * The output's temporary file is made first, so that an unwritable place is known before hours of work, and is gone
  * unless the last rename succeeded. Runs on the caller's thread; parallel loops end before it goes on. */
 #include "pack/build.h"

@@ -188,6 +188,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arrays_beyond_the_bound_keep_their_values), cmocka_unit_test(small_ones_lie_beside_each_other),
         cmocka_unit_test(what_was_small_grows_into_a_file),
-        cmocka_unit_test(the_most_is_that_of_every_moment), cmocka_unit_test(without_a_bound_it_is_the_heap), cmocka_unit_test(a_disk_without_room_is_an_error)};
+        cmocka_unit_test(the_most_is_that_of_every_moment), cmocka_unit_test(without_a_bound_it_is_the_heap),
+        cmocka_unit_test(a_disk_without_room_is_an_error)};
     return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
 }
