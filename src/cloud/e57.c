@@ -92,6 +92,8 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
     bool cells = from->field[SPL_E57_ROW] >= 0 && from->field[SPL_E57_COLUMN] >= 0;
     scan->misses =
         (cells || scan->spherical) && from->field[scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE] < 0;
+    cloud->info.points_at_most |=
+        scan->misses || from->field[scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE] >= 0;
     scan->station = UINT16_MAX;
     if (scan->posed || scan->spherical || cells) {
         scan->station = (uint16_t)cloud->info.station_count;

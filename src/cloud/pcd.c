@@ -190,6 +190,7 @@ static int pcd_open(struct spl_cloud *cloud, struct spl_error *err)
     if (pcd->header.data != SPL_PCD_ASCII)
         cloud->sampling = SPL_SAMPLE_INTENSITY;
     cloud->info.points_expected = pcd->header.points;
+    cloud->info.points_at_most = pcd->header.height > 1;
     if ((code = check_count(cloud, err)) < 0)
         return code;
     return add_station(cloud, err);

@@ -45,6 +45,14 @@ failed:
     return rc;
 }
 
+static int fail_write(const struct spl_part_file *file, uint64_t offset, size_t bytes, int why, struct spl_error *err)
+{
+    bool full = why == ENOSPC || why == EDQUOT || why == EFBIG;
+    return spl_fail(err, SPL_E_IO, "cannot write %s, %zu bytes at %llu: %s%s", file->part_path, bytes,
+                    (unsigned long long)offset, strerror(why),
+                    full ? "; make room there, or write to another disk" : "");
+}
+
 int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void *data, size_t bytes,
                         struct spl_error *err)
 {
@@ -54,8 +62,7 @@ int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void 
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
-            return spl_fail_errno(err, n ? errno : ENOSPC, "cannot write %s at byte %llu", file->part_path,
-                                  (unsigned long long)offset);
+            return fail_write(file, offset, bytes, n ? errno : ENOSPC, err);
         p += n;
         offset += (uint64_t)n;
         bytes -= (size_t)n;

@@ -6,8 +6,9 @@
  * plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes
  * 60 more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until
  * the end. Stations have seen points, not panels: where there are both, the scan is written once more without panels.
- * All that grows with the points, but for tables of a byte a point, is in arrays that may lie on disk (spill.h): where
- * memory is bounded these are what is beyond. The same work is done on them, so that nothing depends on the bound.
+ * All that grows with the points, but for tables of a byte a point and what joins wires, is in arrays that may lie on
+ * disk (spill.h): where memory is bounded these are what is beyond. The same work is done on them, so that nothing
+ * depends on the bound.
  * The output's temporary file is made first, so that an unwritable place is known before hours of work, and is gone
  * unless the last rename succeeded. Runs on the caller's thread; parallel loops end before it goes on. */
 #include "pack/build.h"
@@ -32,6 +33,7 @@
 
 /* Bytes a point in large arrays, at most: see above. */
 static const double bytes_bare = 54, bytes_surface = 70, bytes_planes = 100, bytes_normal = 12, bytes_scalar = 8;
+static const double bytes_written = 16; /* a point, scalars apart: 8 of a wall, 12 of clusters, 15 on wires */
 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
@@ -75,6 +77,12 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
     return rc;
 }
 
+/* The end once more, without panels, for the maps of stations. */
+static bool writes_twice(const struct spl_build *p, const struct spl_passes *later)
+{
+    return later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF;
+}
+
 /* Seconds a million points on two cores, of the vault and the street. Reading costs most where it is text. */
 static void plan(const struct spl_build *p, const struct spl_passes *later)
 {
@@ -87,8 +95,7 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
                  {"joining wires", 0.05, false}, {"outlines", 0.2, true},    {"panels", 0.3, true},
                  {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
     uint64_t points = 0;
-    bool twice =
-        later && p->options->maps && p->options->primitives != SPL_PRIMITIVES_OFF; /* the end, without panels */
+    bool twice = writes_twice(p, later);
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
@@ -107,45 +114,77 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         spl_maps_plan(p->stage, &later->pictures, 1, points);
 }
 
-/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough. Says how much it will be. */
-static int begin_spill(struct spl_build *p, struct spl_error *err)
+static int check_disk(const struct spl_build *p, double points, double bytes, double written, struct spl_error *err)
+{
+    double beyond = points * bytes - (double)spl_spill_get_share(p->options->memory_bytes);
+    return beyond > 0
+               ? spl_spill_check_disk(p->options->output, (uint64_t)beyond, (uint64_t)(points * written), err)
+               : SPL_OK;
+}
+
+/* Where memory is bounded: what is beyond it goes to disk, of which there must be enough, for the dataset too. Where
+ * points are guessed, or cells may be none, half of them must have room; else it is said alone. Says how much it will
+ * be, and where the disk is none. */
+static int begin_spill(struct spl_build *p, const struct spl_passes *later, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
     double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
-    double points = 0, normals = 0, scalars = 0;
-    char text[200];
+    double points = 0, least = 0, normals = 0, scalars = 0;
+    struct spl_error why = {0};
+    char text[400];
     for (size_t i = 0; i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
-        points += (double)(scan->max_points ? scan->max_points : scan->points_expected);
+        double own = (double)(scan->max_points ? scan->max_points : scan->points_expected);
+        points += own;
+        least += scan->max_points || scan->counted ? own : own / 2;
         normals = scan->attributes & SPL_CLOUD_NORMAL ? bytes_normal : normals;
         scalars = fmax(scalars, bytes_scalar * __builtin_popcount(scan->scalars));
     }
-    uint64_t share = spl_spill_get_share(o->memory_bytes);
-    double beyond = points * (bytes + normals + scalars) - (double)share;
+    bytes += normals + scalars;
+    double beyond = points * bytes - (double)spl_spill_get_share(o->memory_bytes);
+    double written = (bytes_written + scalars) * (writes_twice(p, later) ? 2 : 1);
     if (beyond <= 0)
         return SPL_OK;
     if (o->warn) {
         snprintf(text, sizeof text,
                  "%.0f points take up to %.1f GB while they are packed, which is beyond --memory: %.1f GB of it lie on "
-                 "disk beside %.60s meanwhile",
-                 points, points * (bytes + normals + scalars) / 1e9, beyond / 1e9, spl_input_name(o->output));
+                 "disk beside %.60s meanwhile, which takes up to %.1f GB itself",
+                 points, points * bytes / 1e9, beyond / 1e9, spl_input_name(o->output), points * written / 1e9);
         o->warn(o->progress_context, text);
     }
-    return spl_spill_check_disk(o->output, (uint64_t)beyond, err);
+    char *folder = spl_spill_find_memory_folder(o->output);
+    if (o->warn && folder) {
+        snprintf(text, sizeof text,
+                 "'%.200s' lies in memory (tmpfs), and so does what is beyond --memory, which bounds nothing there: write "
+                 "the dataset (-o) to a folder on a disk",
+                 folder);
+        o->warn(o->progress_context, text);
+    }
+    free(folder);
+    int rc = check_disk(p, points, bytes, written, &why);
+    if (rc && !check_disk(p, least, bytes, written, NULL)) {
+        if (o->warn)
+            o->warn(o->progress_context, why.message);
+        return SPL_OK;
+    }
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
 /* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
-static void end_spill(const struct spl_pack_options *o, struct spl_stage *stage, bool done)
+static int end_spill(const struct spl_pack_options *o, struct spl_stage *stage, int rc, struct spl_error *err)
 {
     char text[160];
     uint64_t most = stage->spill ? spl_spill_memory_most(stage->spill) : 0;
-    if (done && o->warn && most > o->memory_bytes) {
-        snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB: so much was needed",
-                 (double)most / 1048576, (double)o->memory_bytes / 1048576);
+    rc = spl_spill_explain(stage->spill, rc, err);
+    if (!rc && o->warn && most > o->memory_bytes) {
+        snprintf(text, sizeof text, "the process took %.0f MB at most, where --memory says %.0f MB%s",
+                 (double)most / 1048576, (double)o->memory_bytes / 1048576,
+                 stage->threads > 1 ? ": with fewer --threads it takes less" : "");
         o->warn(o->progress_context, text);
     }
     spl_spill_destroy(stage->spill);
     stage->spill = NULL;
+    return rc;
 }
 
 static struct spl_bound get_bound(const struct spl_build *p)
@@ -290,7 +329,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_points_check_count(&p.scans, err);
     if (!rc) {
         plan(&p, later);
-        rc = stage->spill ? begin_spill(&p, err) : SPL_OK;
+        rc = stage->spill ? begin_spill(&p, later, err) : SPL_OK;
     }
     if (!rc) {
         rc = gather(&p, &said, err);
@@ -346,6 +385,5 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     spl_points_finish(&p.points);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
-    end_spill(options, stage, !rc);
-    return rc;
+    return end_spill(options, stage, rc, err);
 }

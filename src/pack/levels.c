@@ -32,7 +32,7 @@
 /* Splats of a node as a share of its children's; never more than inner_most, which volumes would exceed level by level.
  */
 static const double most = 0.28, wanted = 0.25, least = 0.20;
-enum { attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
+enum { look_grain = 32, attempts = 6, inner_most = 12288, pruned_inner_most = 768 };
 
 /* Beside panels: how many times as wide as its splats lie apart a cell becomes, if not for the panels' sake; along a
  * wire a quarter of the splats asks for 4, lines of a scan that lie unevenly for up to twice as much. And how much
@@ -109,6 +109,7 @@ static size_t take_child(const struct levels *l, struct scratch *w, const struct
         }
         return at;
     }
+    spl_spill_keep_bound(l->points->spill);
     for (size_t i = child->begin; i < child->end; i++)
         if (!spl_panels_has_point(l->points, i)) {
             load_point(l->points, parent, i, &w->input[at]);
@@ -317,6 +318,8 @@ static bool make_left(struct levels *l, struct scratch *w, const struct spl_tree
     if (!reserve(w, left->count, left->count + 2, l->scalars))
         return false;
     for (size_t i = 0; i < left->count; i++) {
+        if (i % look_grain == 0)
+            spl_spill_keep_bound(l->points->spill);
         load_point(l->points, node, left->points[i], &w->input[i]);
         spl_scalars_take_point(l->points, left->points[i], w->numbers + i * l->scalars);
     }

@@ -6,7 +6,7 @@
 
 #include "pack/linear_level.h"
 
-enum { gap_most = 16 };              /* cells between lines that continue each other */
+enum { gap_most = 16, look_grain = 64 }; /* cells between lines that continue each other; lines looked at in a row */
 static const double straight = 0.97; /* cosine between those, and of each with the axis between them */
 
 enum { look, clear, mark };
@@ -110,6 +110,8 @@ void spl_linear_connect(const struct spl_points *p, struct spl_linear_level *l)
     for (uint32_t i = 0; i < l->line_count && !spl_stage_is_cancelled(l->stage); i++) {
         struct spl_line *line = &l->lines[i];
         int64_t at[3];
+        if (i % look_grain == 0)
+            spl_spill_keep_bound(p->spill);
         if (line->state != SPL_LINE_ALIVE)
             continue;
         spl_cells_place(&l->cells, line->cell, at);
@@ -139,6 +141,8 @@ uint64_t spl_linear_mark(struct spl_points *p, struct spl_linear_level *l)
     for (uint32_t i = 0; i < l->line_count; i++) {
         struct spl_line *line = &l->lines[i];
         int64_t at[3];
+        if (i % look_grain == 0)
+            spl_spill_keep_bound(p->spill);
         if (line->state == SPL_LINE_ALIVE || line->state == SPL_LINE_EDGE)
             continue;
         spl_cells_place(&l->cells, line->cell, at);
@@ -161,6 +165,8 @@ uint64_t spl_linear_mark(struct spl_points *p, struct spl_linear_level *l)
         const struct spl_line *root = &l->lines[root_of(l->lines, i)];
         double squared = 0;
         int64_t at[3];
+        if (i % look_grain == 0)
+            spl_spill_keep_bound(p->spill);
         for (int c = 0; c < 3; c++)
             squared += (root->high[c] - root->low[c]) * (root->high[c] - root->low[c]);
         if (line->state != SPL_LINE_ALIVE || sqrt(squared) + 1 < l->length_min)

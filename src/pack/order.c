@@ -5,7 +5,8 @@
  * prefix sum, pieces scatter), then each part digit by digit, by one worker and in so little memory that it is near. So
  * the result does not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within
  * their own bounds, recursively, so that a dense cluster in a wide cloud is as well ordered as any other; equal
- * coordinates can only lie in one such run. */
+ * coordinates can only lie in one such run. Beside one stray point far away that can be all the others: a long run is
+ * sorted as the whole is, by all threads and within the same arrays, a short one by one worker, on the heap. */
 #include "pack/points.h"
 
 #include <math.h>
@@ -17,17 +18,24 @@
 #include "geom/morton.h"
 #include "pack/order.h"
 
-enum { digits = 256, threads_max = 64, short_run = 32, grain = 1 << 16 };
+enum { digits = 256, threads_max = 64, short_run = 32, long_run = 1 << 16, grain = 1 << 16 };
 /* Each element of these may be in a page of its own, which comes with fifteen others. */
 enum { random_grain = 256 };
 enum { lead_bits = 16, leads = 1 << lead_bits, lead_shift = 63 - lead_bits, parts_most = 1024 };
 static const uint32_t dropped = UINT32_MAX;
 
+struct run { /* points of equal keys; at first all points */
+    size_t begin, count;
+};
+
 struct order {
     struct spl_points *points;
-    uint64_t *key, *key_to;
+    uint64_t *key, *key_to; /* of the run at work, as all below */
     uint32_t *index, *index_to;
-    size_t count, piece;
+    size_t begin, count, piece;
+    double origin[3], size; /* of its cube */
+    struct run *runs;       /* long ones that wait: room for all that there can be */
+    atomic_size_t run_count;
     unsigned pieces, part_count;
     uint32_t (*leads)[leads];        /* of each piece: points by the first bits of their keys */
     uint32_t (*at)[parts_most + 2];  /* of each piece: where its next point of a part goes */
@@ -41,37 +49,46 @@ struct order {
 static void bounds_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
+    spl_spill_keep_bound(o->points->spill);
     for (int c = 0; c < 3; c++) {
         const double *v = o->points->axis[c];
         double low = o->low[worker][c], high = o->high[worker][c];
         for (size_t i = begin; i < end; i++) {
-            low = v[i] < low ? v[i] : low;
-            high = v[i] > high ? v[i] : high;
+            double at = v[o->index[i]];
+            low = at < low ? at : low;
+            high = at > high ? at : high;
         }
         o->low[worker][c] = low;
         o->high[worker][c] = high;
     }
 }
 
-static void find_cube(struct order *o)
+/* Around the run at work; its far corner goes to `high`. */
+static void find_cube(struct order *o, double high[3])
 {
-    struct spl_points *p = o->points;
     for (unsigned t = 0; t < threads_max; t++)
         for (int c = 0; c < 3; c++)
-            o->low[t][c] = o->high[t][c] = p->axis[c][0];
-    spl_parallel_for(o->stage->threads, p->count, grain, bounds_piece, o);
-    p->cube_size = 0;
+            o->low[t][c] = o->high[t][c] = o->points->axis[c][o->index[0]];
+    spl_parallel_for(o->stage->threads, o->count, grain, bounds_piece, o);
+    o->size = 0;
     for (int c = 0; c < 3; c++) {
-        p->bounds_min[c] = o->low[0][c];
-        p->bounds_max[c] = o->high[0][c];
+        o->origin[c] = o->low[0][c];
+        high[c] = o->high[0][c];
         for (unsigned t = 1; t < threads_max; t++) {
-            p->bounds_min[c] = fmin(p->bounds_min[c], o->low[t][c]);
-            p->bounds_max[c] = fmax(p->bounds_max[c], o->high[t][c]);
+            o->origin[c] = fmin(o->origin[c], o->low[t][c]);
+            high[c] = fmax(high[c], o->high[t][c]);
         }
-        p->cube_size = fmax(p->cube_size, p->bounds_max[c] - p->bounds_min[c]);
+        o->size = fmax(o->size, high[c] - o->origin[c]);
     }
+}
+
+static void find_whole_cube(struct order *o)
+{
+    struct spl_points *p = o->points;
+    find_cube(o, p->bounds_max);
+    memcpy(p->bounds_min, o->origin, sizeof p->bounds_min);
     /* The next float up, as the container keeps it: the cube of the file is the cube of the keys. */
-    p->cube_size = p->cube_size > 0 ? nextafterf((float)p->cube_size, INFINITY) : 1;
+    p->cube_size = o->size = o->size > 0 ? nextafterf((float)o->size, INFINITY) : 1;
 }
 
 uint64_t spl_points_key(const struct spl_points *points, size_t i, const double low[3], double size)
@@ -82,12 +99,30 @@ uint64_t spl_points_key(const struct spl_points *points, size_t i, const double 
     return spl_morton_encode(cell[0], cell[1], cell[2]);
 }
 
+static void number_piece(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct order *o = context;
+    (void)worker;
+    spl_spill_keep_bound(o->points->spill);
+    for (size_t i = begin; i < end; i++)
+        o->index[i] = (uint32_t)i;
+}
+
+/* Where runs are sorted again the stage's end has been reached by then. */
+static void add_done(struct order *o, size_t points, unsigned worker)
+{
+    if (o->count == o->points->count)
+        spl_stage_add(o->stage, points, worker);
+    else
+        spl_spill_keep_bound(o->points->spill);
+}
+
 static void key_piece(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct order *o = context;
     for (size_t i = begin; i < end; i++)
-        o->key[i] = spl_points_key(o->points, i, o->points->bounds_min, o->points->cube_size);
-    spl_stage_add(o->stage, (end - begin) / 8, worker);
+        o->key[i] = spl_points_key(o->points, o->index[i], o->origin, o->size);
+    add_done(o, (end - begin) / 8, worker);
 }
 
 /* How many points of a piece begin with each lead. */
@@ -111,7 +146,7 @@ static void scatter_piece(void *context, size_t begin, size_t end, unsigned work
             spl_spill_keep_bound(o->points->spill);
         uint32_t to = at[o->part_of[o->key[i] >> lead_shift]]++;
         o->key_to[to] = o->key[i];
-        o->index_to[to] = (uint32_t)i;
+        o->index_to[to] = o->index[i];
     }
 }
 
@@ -153,9 +188,12 @@ static void sort_part(struct order *o, size_t begin, size_t end)
     uint32_t count[8][digits] = {0};
     uint64_t *key = o->key_to, *key_to = o->key;
     uint32_t *index = o->index_to, *index_to = o->index;
-    for (size_t i = begin; i < end; i++)
+    for (size_t i = begin; i < end; i++) {
+        if (i % grain == 0)
+            spl_spill_keep_bound(o->points->spill);
         for (unsigned d = 0; d < 8; d++)
             count[d][key[i] >> 8 * d & (digits - 1)]++;
+    }
     for (unsigned d = 0; d < 8; d++) {
         uint32_t *at = count[d], sum = (uint32_t)begin;
         if (at[key[begin] >> 8 * d & (digits - 1)] == end - begin)
@@ -166,6 +204,8 @@ static void sort_part(struct order *o, size_t begin, size_t end)
             sum += n;
         }
         for (size_t i = begin; i < end; i++) {
+            if (i % grain == 0)
+                spl_spill_keep_bound(o->points->spill);
             uint32_t to = at[key[i] >> 8 * d & (digits - 1)]++;
             key_to[to] = key[i];
             index_to[to] = index[i];
@@ -177,9 +217,11 @@ static void sort_part(struct order *o, size_t begin, size_t end)
         key_to = other_key;
         index_to = other_index;
     }
-    if (key != o->key) {
-        memcpy(o->key + begin, key + begin, (end - begin) * sizeof *key);
-        memcpy(o->index + begin, index + begin, (end - begin) * sizeof *index);
+    for (size_t i = begin, some; key != o->key && i < end; i += some) {
+        some = end - i < grain ? end - i : grain;
+        spl_spill_keep_bound(o->points->spill);
+        memcpy(o->key + i, key + i, some * sizeof *key);
+        memcpy(o->index + i, index + i, some * sizeof *index);
     }
 }
 
@@ -189,19 +231,22 @@ static void sort_parts(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t part = begin; part < end; part++) {
         if (o->first[part + 1] > o->first[part])
             sort_part(o, o->first[part], o->first[part + 1]);
-        spl_stage_add(o->stage, (o->first[part + 1] - o->first[part]) / 2, worker);
+        add_done(o, (o->first[part + 1] - o->first[part]) / 2, worker);
     }
 }
 
 static void radix_sort(struct order *o)
 {
+    o->piece = (o->count + o->stage->threads - 1) / o->stage->threads;
+    o->piece = o->piece < grain ? grain : o->piece;
+    o->pieces = (unsigned)((o->count + o->piece - 1) / o->piece); /* fewer than threads, where there are few points */
     spl_parallel_for(o->stage->threads, o->count, o->piece, count_piece, o);
     divide(o);
     spl_parallel_for(o->stage->threads, o->count, o->piece, scatter_piece, o);
     spl_parallel_for(o->stage->threads, o->part_count, 1, sort_parts, o);
 }
 
-struct pair {
+struct pair { /* of a short run */
     uint64_t key;
     uint32_t index;
 };
@@ -238,12 +283,24 @@ static int compare_points(const struct spl_points *p, uint32_t a, uint32_t b)
     return order;
 }
 
+/* Of points at one place. */
+static void keep_one(const struct spl_points *p, uint32_t *index, size_t n)
+{
+    for (size_t i = 1; i < n; i++) {
+        if (i % random_grain == 0)
+            spl_spill_keep_bound(p->spill);
+        index[0] = compare_points(p, index[i], index[0]) < 0 ? index[i] : index[0];
+        index[i] = dropped;
+    }
+}
+
 /* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and
  * so is each run of equal keys. */
 static void order_run(struct order *o, uint32_t *index, size_t n)
 {
     const struct spl_points *p = o->points;
     double low[3], size = 0;
+    spl_spill_keep_bound(p->spill);
     for (int c = 0; c < 3; c++) {
         double high = low[c] = p->axis[c][index[0]];
         for (size_t i = 1; i < n; i++) {
@@ -254,10 +311,7 @@ static void order_run(struct order *o, uint32_t *index, size_t n)
         size = fmax(size, high - low[c]);
     }
     if (size == 0) {
-        for (size_t i = 1; i < n; i++) {
-            index[0] = compare_points(p, index[i], index[0]) < 0 ? index[i] : index[0];
-            index[i] = dropped;
-        }
+        keep_one(p, index, n);
         return;
     }
     struct pair few[short_run], *many = n <= short_run ? NULL : spl_alloc_raw(n, sizeof *many, NULL);
@@ -288,12 +342,53 @@ static void runs_piece(void *context, size_t begin, size_t end, unsigned worker)
     while (i < end && i > 0 && o->key[i] == o->key[i - 1])
         i++;
     for (size_t next; i < end; i = next) {
-        for (next = i + 1; next < o->count && o->key[next] == o->key[i];)
-            next++;
-        if (next - i > 1)
+        for (next = i + 1; next < o->count && o->key[next] == o->key[i]; next++)
+            if (next % grain == 0)
+                spl_spill_keep_bound(o->points->spill);
+        if (next - i > long_run)
+            o->runs[atomic_fetch_add(&o->run_count, 1)] = (struct run){o->begin + i, next - i};
+        else if (next - i > 1)
             order_run(o, o->index + i, next - i);
     }
-    spl_stage_add(o->stage, (end - begin) / 8, worker);
+    add_done(o, (end - begin) / 8, worker);
+}
+
+/* Makes another run that at work. */
+static void enter(struct order *o, struct run run)
+{
+    ptrdiff_t by = (ptrdiff_t)run.begin - (ptrdiff_t)o->begin;
+    o->key += by;
+    o->key_to += by;
+    o->index += by;
+    o->index_to += by;
+    o->begin = run.begin;
+    o->count = run.count;
+}
+
+/* Orders the run at work within its cube; what is left of it are runs. */
+static void order_in_cube(struct order *o)
+{
+    spl_parallel_for(o->stage->threads, o->count, grain, key_piece, o);
+    radix_sort(o);
+    spl_parallel_for(o->stage->threads, o->count, grain, runs_piece, o);
+}
+
+static void order_all(struct order *o)
+{
+    const struct run all = {0, o->count};
+    double high[3];
+    spl_parallel_for(o->stage->threads, o->count, grain, number_piece, o);
+    find_whole_cube(o);
+    order_in_cube(o);
+    while (o->run_count) {
+        enter(o, o->runs[--o->run_count]);
+        find_cube(o, high);
+        if (o->size > 0)
+            order_in_cube(o);
+        else
+            keep_one(o->points, o->index, o->count);
+    }
+    enter(o, all);
 }
 
 struct permutation {
@@ -348,22 +443,18 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
 {
     struct order o = {.points = points, .count = points->count, .stage = stage};
     int rc = SPL_E_NOMEM;
-    o.piece = (o.count + stage->threads - 1) / stage->threads;
-    o.pieces = (unsigned)((o.count + o.piece - 1) / o.piece); // fewer than threads, where there are few points
     spl_stage_begin(stage, "ordering", "points", o.count);
     o.key = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
     o.key_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
     o.index = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
     o.index_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
-    o.leads = spl_alloc_raw(o.pieces, sizeof *o.leads, err);
-    o.at = spl_alloc_raw(o.pieces, sizeof *o.at, err);
+    o.leads = spl_alloc_raw(stage->threads, sizeof *o.leads, err);
+    o.at = spl_alloc_raw(stage->threads, sizeof *o.at, err);
     o.part_of = spl_alloc_raw(leads, sizeof *o.part_of, err);
-    if (!o.key || !o.key_to || !o.index || !o.index_to || !o.leads || !o.at || !o.part_of)
+    o.runs = spl_alloc_raw(o.count / long_run + 1, sizeof *o.runs, err);
+    if (!o.key || !o.key_to || !o.index || !o.index_to || !o.leads || !o.at || !o.part_of || !o.runs)
         goto done;
-    find_cube(&o);
-    spl_parallel_for(stage->threads, o.count, grain, key_piece, &o);
-    radix_sort(&o);
-    spl_parallel_for(stage->threads, o.count, grain, runs_piece, &o);
+    order_all(&o);
     if (atomic_load(&o.failed)) {
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while ordering %zu points", o.count);
         goto done;
@@ -395,5 +486,6 @@ done:
     free(o.leads);
     free(o.at);
     free(o.part_of);
+    free(o.runs);
     return rc;
 }

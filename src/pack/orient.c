@@ -263,12 +263,12 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 }
 
 int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
-                          size_t edge_count, struct spl_error *err)
+                          size_t edge_count, struct spl_spill *spill, struct spl_error *err)
 {
     struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err), spl_alloc(count, 1, err),
                             spl_alloc_raw(count, 1, err), spl_alloc_raw(count, sizeof *forest.best, err),
                             (uint32_t)count};
-    struct spl_orient_edge *spare = spl_alloc_raw(edge_count, sizeof *spare, err);
+    struct spl_orient_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
     double *outward = spl_alloc(count, sizeof *outward, err);
     bool enough = forest.parent && forest.flip && forest.anchored && forest.best && spare && outward;
     for (size_t i = 0; enough && i < count; i++) {
@@ -291,7 +291,7 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
     free(forest.flip);
     free(forest.anchored);
     free(forest.best);
-    free(spare);
+    spl_spill_free(spill, spare);
     free(outward);
     return enough ? SPL_OK : SPL_E_NOMEM;
 }

@@ -62,7 +62,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .attributes = info->attributes,
                               .columns = info->columns,
                               .scalars = info->scalars,
-                              .counted = info->points_expected > 0,
+                              .counted = info->points_expected > 0 && !info->points_at_most,
                               .points_total = info->points_total,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,

@@ -20,7 +20,7 @@ struct spl_scan {
     uint32_t attributes;       /* enum spl_cloud_attribute */
     uint32_t columns, scalars; /* as of struct spl_cloud_info */
     uint64_t points_expected;  /* of the header, or a guess by the file's size */
-    bool counted;              /* the former is the header's, and the file is as large as it says */
+    bool counted;              /* the former is the header's, the file as large as it says, and each a point */
     uint64_t points_total;     /* as of struct spl_cloud_info */
     uint64_t max_points;       /* its share of a part; 0 = all */
     uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */

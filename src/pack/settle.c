@@ -107,6 +107,8 @@ void spl_settle_block(const struct spl_settle_block *block, const struct spl_uns
 void spl_settle_find(const struct spl_points *points, unsigned k, struct spl_unsettled *unsettled)
 {
     for (size_t i = 0; i < unsettled->count; i++) {
+        if (i % 256 == 0)
+            spl_spill_keep_bound(points->spill);
         struct spl_unsettled_point *point = &unsettled->points[i];
         settle(points, point->index, unsettled->neighbours + i * k, k, point->limit, &point->radius,
                &point->uncertainty);

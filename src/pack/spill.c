@@ -12,6 +12,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -21,6 +22,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/statvfs.h>
+#include <sys/vfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -49,6 +51,8 @@ struct spl_spill {
     pthread_mutex_t lock;
     struct piece *pieces;
     size_t count, capacity;
+    struct spl_error why; /* the first file had no room */
+    uint64_t high_before; /* resident bytes that the process ever had, see get_high() */
     uint64_t trimmed_ns;
     size_t hand, hand_at; /* where pages were taken away last */
     char *pool;           /* of small ones: what is left of it */
@@ -56,14 +60,25 @@ struct spl_spill {
     int statm;
     pthread_t watcher;
     bool watched;
-    atomic_bool ends;
+    atomic_bool ends, at_work; /* pages are being taken away */
 };
 
 static atomic_size_t forced;
+static atomic_long fail_countdown;
 
 void spl_spill_force(size_t least)
 {
     atomic_store(&forced, least);
+}
+
+void spl_spill_fail_after(long n)
+{
+    atomic_store(&fail_countdown, n);
+}
+
+static bool is_to_fail(void)
+{
+    return atomic_load(&fail_countdown) > 0 && atomic_fetch_sub(&fail_countdown, 1) == 1;
 }
 
 static uint64_t get_resident(struct spl_spill *s)
@@ -81,6 +96,19 @@ static uint64_t get_resident(struct spl_spill *s)
     return resident;
 }
 
+/* The most resident bytes that the process ever had, as the kernel noted it, which misses no moment; 0 = it does not say. */
+static uint64_t get_high(void)
+{
+    char line[256];
+    unsigned long long kib = 0;
+    FILE *f = fopen("/proc/self/status", "re");
+    while (f && !kib && fgets(line, sizeof line, f))
+        sscanf(line, "VmHWM: %llu kB", &kib);
+    if (f)
+        fclose(f);
+    return kib << 10;
+}
+
 /* Resident bytes from which on pages are taken away. */
 static uint64_t get_most(const struct spl_spill *s)
 {
@@ -93,6 +121,7 @@ static void let_go(struct spl_spill *s)
 {
     uint64_t wanted = (uint64_t)(low * (double)get_most(s)), steps = 0;
     pthread_mutex_lock(&s->lock);
+    atomic_store(&s->at_work, true);
     uint64_t left = s->on_disk;
     for (size_t turns = 0; left > 0 && turns <= s->count; steps++) {
         if (s->hand >= s->count || s->pieces[s->hand].fd < 0 || s->hand_at >= s->pieces[s->hand].bytes) {
@@ -115,6 +144,7 @@ static void let_go(struct spl_spill *s)
         malloc_trim(0);
         s->trimmed_ns = now;
     }
+    atomic_store(&s->at_work, false);
     pthread_mutex_unlock(&s->lock);
 }
 
@@ -122,6 +152,10 @@ void spl_spill_keep_bound(struct spl_spill *s)
 {
     if (!s)
         return;
+    if (atomic_load_explicit(&s->at_work, memory_order_relaxed)) { // who filled on meanwhile would be faster
+        pthread_mutex_lock(&s->lock);
+        pthread_mutex_unlock(&s->lock);
+    }
     uint64_t now = spl_now_ns(), before = atomic_load_explicit(&s->checked_ns, memory_order_relaxed);
     if ((int64_t)(now - before) < shortest_ns || !atomic_compare_exchange_strong(&s->checked_ns, &before, now))
         return;
@@ -161,18 +195,29 @@ uint64_t spl_spill_get_share(uint64_t memory)
     return (uint64_t)(in_memory * (double)memory);
 }
 
-int spl_spill_check_disk(const char *beside, uint64_t bytes, struct spl_error *err)
+char *spl_spill_find_memory_folder(const char *beside)
+{
+    struct statfs status;
+    char *folder = find_folder(beside);
+    if (folder && !statfs(folder, &status) && (status.f_type == TMPFS_MAGIC || status.f_type == RAMFS_MAGIC))
+        return folder;
+    free(folder);
+    return NULL;
+}
+
+int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t written, struct spl_error *err)
 {
     struct statvfs status;
     char *folder = find_folder(beside);
     int rc = SPL_OK;
     if (folder && !statvfs(folder, &status)) {
         uint64_t free_bytes = (uint64_t)status.f_bavail * status.f_frsize;
-        if (free_bytes < bytes)
+        if (free_bytes < meanwhile + written)
             rc = spl_fail_field(err, SPL_E_IO, "memory",
-                                "within this memory the pack keeps up to %.1f GB in '%.300s' meanwhile, where %.1f GB "
-                                "are free: make room, or give it more memory",
-                                (double)bytes / 1e9, folder, (double)free_bytes / 1e9);
+                                "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
+                                "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
+                                "or write the dataset to another disk",
+                                (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
     }
     free(folder);
     return rc;
@@ -184,6 +229,7 @@ int spl_spill_create(const char *beside, uint64_t memory, struct spl_spill **out
     if (!s)
         return SPL_E_NOMEM;
     s->memory = memory;
+    s->high_before = get_high();
     s->statm = -1;
     pthread_mutex_init(&s->lock, NULL);
     int rc = (s->folder = find_folder(beside)) ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory");
@@ -230,13 +276,19 @@ void spl_spill_destroy(struct spl_spill *s)
     free(s);
 }
 
-static int reserve_blocks(const struct spl_spill *s, int fd, size_t bytes, struct spl_error *err)
+/* Of a file that has `before`. */
+static int reserve_blocks(struct spl_spill *s, int fd, size_t before, size_t bytes)
 {
-    int why = posix_fallocate(fd, 0, (off_t)bytes);
+    int why = ENOSPC;
+    if (!is_to_fail())
+        while ((why = posix_fallocate(fd, (off_t)before, (off_t)(bytes - before))) == EINTR)
+            continue;
     if (!why)
         return SPL_OK;
-    return spl_fail_field(err, SPL_E_IO, "memory", "within this memory the pack needs %.1f GB more in '%.300s': %s",
-                          (double)bytes / 1e9, s->folder, strerror(why));
+    return spl_fail_field(&s->why, SPL_E_IO, "memory",
+                          "within this memory the pack needs %.0f MB in '%.200s' beside the %.0f MB that it keeps there: "
+                          "%s; make room there, give it more memory, or write the dataset to another disk",
+                          (double)(bytes - before) / 1e6, s->folder, (double)s->on_disk / 1e6, strerror(why));
 }
 
 /* Where the file system knows no files without a name, one that loses it at once. */
@@ -253,27 +305,43 @@ static int open_nameless(const char *folder)
     return fd;
 }
 
-static void *map_file(struct spl_spill *s, size_t bytes, struct spl_error *err)
+static void *map_file(struct spl_spill *s, size_t bytes)
 {
     int fd = open_nameless(s->folder);
     if (fd < 0) {
-        spl_fail_errno(err, errno, "'%.300s': no file for what is beyond the bound of memory can be made", s->folder);
+        spl_fail_errno(&s->why, errno, "'%.300s': no file for what is beyond the bound of memory can be made", s->folder);
         return NULL;
     }
-    if (reserve_blocks(s, fd, bytes, err)) {
+    if (reserve_blocks(s, fd, 0, bytes)) {
         close(fd);
         return NULL;
     }
     void *at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
     if (at == MAP_FAILED) {
-        spl_fail_errno(err, errno, "%zu bytes cannot be mapped", bytes);
+        spl_fail_errno(&s->why, errno, "%zu bytes cannot be mapped", bytes);
         close(fd);
         return NULL;
     }
+    madvise(at, bytes, MADV_NOHUGEPAGE); /* less comes at a touch */
     s->pieces[s->count++] = (struct piece){at, bytes, fd};
     s->on_disk += bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;
     return at;
+}
+
+int spl_spill_explain(const struct spl_spill *s, int rc, struct spl_error *err)
+{
+    if (!s || !s->why.code || rc == SPL_OK || rc == SPL_E_CANCELLED)
+        return rc;
+    if (err)
+        *err = s->why;
+    return s->why.code;
+}
+
+static void *fail_piece(const struct spl_spill *s, struct spl_error *err)
+{
+    spl_fail_field(err, s->why.code, s->why.field, "%s", s->why.message);
+    return NULL;
 }
 
 /* Under the lock. */
@@ -281,8 +349,10 @@ static void *add_piece(struct spl_spill *s, size_t bytes, bool zeroed, struct sp
 {
     if (spl_array_reserve(s->pieces, s->capacity, s->count + 1, err))
         return NULL;
-    if (s->on_heap + bytes > spl_spill_get_share(s->memory) || atomic_load(&forced))
-        return map_file(s, bytes, err);
+    if (s->on_heap + bytes > spl_spill_get_share(s->memory) || atomic_load(&forced)) {
+        void *in_file = map_file(s, bytes);
+        return in_file ? in_file : fail_piece(s, err);
+    }
     void *at = zeroed ? spl_alloc(1, bytes, err) : spl_alloc_raw(1, bytes, err);
     if (at) {
         s->pieces[s->count++] = (struct piece){at, bytes, -1};
@@ -330,12 +400,12 @@ static size_t find_piece(const struct spl_spill *s, const void *at)
 /* In its file. */
 static void *grow_file(struct spl_spill *s, struct piece *p, size_t bytes, struct spl_error *err)
 {
-    if (reserve_blocks(s, p->fd, bytes, err))
-        return NULL;
+    if (reserve_blocks(s, p->fd, p->bytes, bytes))
+        return fail_piece(s, err);
     void *at = mremap(p->at, p->bytes, bytes, MREMAP_MAYMOVE);
     if (at == MAP_FAILED) {
-        spl_fail_errno(err, errno, "%zu bytes cannot be mapped", bytes);
-        return NULL;
+        spl_fail_errno(&s->why, errno, "%zu bytes cannot be mapped", bytes);
+        return fail_piece(s, err);
     }
     s->on_disk += bytes - p->bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;
@@ -442,6 +512,6 @@ uint64_t spl_spill_disk_most(const struct spl_spill *spill)
 
 uint64_t spl_spill_memory_most(struct spl_spill *spill)
 {
-    get_resident(spill);
-    return atomic_load(&spill->memory_most);
+    uint64_t high = get_high(), seen = (get_resident(spill), atomic_load(&spill->memory_most));
+    return high > spill->high_before && high > seen ? high : seen; /* what was before is another's */
 }

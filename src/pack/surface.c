@@ -137,34 +137,56 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     }
 }
 
+/* Edges between the components of blocks: as many as there are, which is far fewer than there can be. */
+struct edges {
+    struct spl_orient_edge *list;
+    size_t count, capacity;
+};
+
+static int add_edges(struct surface *s, size_t b, size_t unsettled, struct edges *edges, struct spl_error *err)
+{
+    const struct block *block = &s->blocks[b];
+    uint32_t i = block->unsettled.points[unsettled].index;
+    const uint32_t *list = block->unsettled.neighbours + unsettled * s->k;
+    if (edges->count + s->k > edges->capacity) {
+        size_t capacity = edges->capacity + edges->capacity / 2 + 4096;
+        struct spl_orient_edge *more = spl_spill_realloc(s->points->spill, edges->list, capacity, sizeof *more, err);
+        if (!more)
+            return SPL_E_NOMEM;
+        edges->list = more;
+        edges->capacity = capacity;
+    }
+    for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
+        if (list[a] / block_points != b)
+            edges->count = spl_orient_add_edge(edges->list, edges->count, block->first_component + s->label[i],
+                                               s->blocks[list[a] / block_points].first_component + s->label[list[a]],
+                                               spl_orient_agreement(s->points, i, list[a]));
+    return SPL_OK;
+}
+
 static int join_blocks(struct surface *s, struct spl_error *err)
 {
-    size_t components = 0, edges = 0, count = 0;
+    size_t components = 0;
+    struct edges edges = {0};
     for (size_t b = 0; b < s->block_count; b++) {
         s->blocks[b].first_component = (uint32_t)components;
         components += s->blocks[b].component_count;
-        edges += s->blocks[b].unsettled.count * s->k;
     }
-    struct spl_orient_edge *edge = spl_alloc_raw(edges, sizeof *edge, err);
     s->components = spl_alloc_raw(components, sizeof *s->components, err);
-    int rc = edge && s->components ? 0 : SPL_E_NOMEM;
+    int rc = s->components ? 0 : SPL_E_NOMEM;
     for (size_t b = 0; !rc && b < s->block_count; b++) {
         struct block *block = &s->blocks[b];
         memcpy(s->components + block->first_component, block->components,
                block->component_count * sizeof *block->components);
-        for (size_t d = 0; d < block->unsettled.count; d++) {
-            uint32_t i = block->unsettled.points[d].index;
-            const uint32_t *list = block->unsettled.neighbours + d * s->k;
-            for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
-                if (list[a] / block_points != b)
-                    count = spl_orient_add_edge(edge, count, block->first_component + s->label[i],
-                                                s->blocks[list[a] / block_points].first_component + s->label[list[a]],
-                                                spl_orient_agreement(s->points, i, list[a]));
+        for (size_t d = 0; !rc && d < block->unsettled.count; d++) {
+            if (d % 256 == 0)
+                spl_spill_keep_bound(s->points->spill);
+            rc = add_edges(s, b, d, &edges, err);
         }
     }
     if (!rc)
-        rc = spl_orient_components(s->components, components, edge, count, err);
-    free(edge);
+        rc = spl_orient_components(s->components, components, edges.list, edges.count, s->points->spill, err);
+    spl_spill_free(s->points->spill, edges.list);
     return rc;
 }
 

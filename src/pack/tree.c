@@ -24,6 +24,7 @@ static size_t lower_bound(const struct spl_tree_node *node, const struct spl_poi
 {
     size_t end = node->end;
     while (begin < end) {
+        spl_spill_keep_bound(points->spill); /* each is in pages of its own */
         size_t middle = begin + (end - begin) / 2;
         if (key_of(node, points, middle) >> shift < prefix)
             begin = middle + 1;
@@ -40,6 +41,8 @@ static void frame_points(struct spl_tree_node *node, const struct spl_points *po
     for (int c = 0; c < 3; c++) {
         double low = points->axis[c][node->begin], high = low;
         for (size_t i = node->begin; i < node->end; i++) {
+            if (i % grain == 0)
+                spl_spill_keep_bound(points->spill);
             low = fmin(low, points->axis[c][i]);
             high = fmax(high, points->axis[c][i]);
         }

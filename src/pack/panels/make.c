@@ -206,6 +206,7 @@ static bool make_runs(struct spl_panel_maker *m, struct spl_panel_scratch *w, st
     struct spl_node_panels made = {0};
     for (size_t r = 0; r < w->groups.run_count; r++) {
         const struct spl_panel_run *run = &w->groups.runs[r];
+        spl_spill_keep_bound(m->points->spill);
         for (uint8_t level = 0; (level = next_level(m, &w->groups, node->begin, run, level));) {
             size_t count = spl_panel_groups_select(&w->groups, m, node->begin, run, level);
             if (make_group(m, w, node, run->plane, level, count, left, &made)) {

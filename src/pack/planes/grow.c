@@ -20,7 +20,7 @@
 #include "base/parallel.h"
 #include "pack/planes/heights.h"
 
-enum { rounds = 3, grain = 1 << 10, most = 16, coarser = 2 };
+enum { rounds = 3, grain = 1 << 10, look_grain = 32, most = 16, coarser = 2 };
 static const double reach_sigmas = 4, reach_least = 0.3; /* of the noise, and of the bound */
 static const double agreement = 0.8;                     /* cosine of a point's normal and the plane's */
 static const double on_line = 0.7; /* of a cell's open points that lie on planes, where normals are not asked */
@@ -149,6 +149,8 @@ static void find_given(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     for (size_t k = begin; k < end; k++) {
         bool given = false;
+        if (k % look_grain == 0)
+            spl_spill_keep_bound(g->coarse->spill);
         for (size_t i = g->coarse->cells[k].begin; !given && i < g->coarse->cells[k + 1].begin; i++)
             given = g->label[i] != SPL_NO_PLANE && !g->regions[g->label[i]].closed;
         atomic_store_explicit(&g->given[k], given, memory_order_relaxed);
@@ -186,6 +188,8 @@ static void grow_cells(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     for (size_t k = begin; k < end && !spl_stage_is_cancelled(g->stage); k++) {
         struct candidate found[most];
+        if (k % look_grain == 0)
+            spl_spill_keep_bound(g->cells->spill);
         while (g->coarse->cells[above + 1].begin <= g->cells->cells[k].begin)
             above++;
         if (!atomic_load_explicit(&g->near[above], memory_order_relaxed) || !(g->lists[k].open || g->lists[k].linear))

@@ -37,6 +37,7 @@ static void measure_runs(void *context, size_t begin, size_t end, unsigned worke
         struct spl_patch patches[patches_most];
         size_t first = n->runs > 1 ? r * (n->points->count - n->size) / (n->runs - 1) : 0;
         n->workers[worker].base = first;
+        spl_spill_keep_bound(n->points->spill); /* each is in pages of its own */
         unsigned found = spl_fit_find(&n->workers[worker], first, first + n->size, patches);
         for (unsigned k = 0; k < patches_most; k++)
             n->rms[r][k] = k < found ? (float)patches[k].rms : -1;

@@ -68,6 +68,7 @@ static int make_tasks(struct search *s, size_t begin, size_t end, struct spl_err
         size_t low = begin, high = end; /* the first point beyond the octant */
         while (low < high) {
             size_t middle = low + (high - low) / 2;
+            spl_spill_keep_bound(s->points->spill); /* each is in pages of its own */
             if (key_of(s->points, middle) >> 3 * (shift - 1) <= octant)
                 low = middle + 1;
             else

@@ -201,9 +201,11 @@ static void make_pieces(void *context, size_t begin, size_t end, unsigned worker
 {
     struct work *w = context;
     (void)worker;
-    for (size_t k = begin; k < end && !spl_stage_is_cancelled(w->stage); k++)
+    for (size_t k = begin; k < end && !spl_stage_is_cancelled(w->stage); k++) {
+        spl_spill_keep_bound(w->points->spill);
         if (!make_piece(w, (uint32_t)k))
             atomic_store(&w->failed, true);
+    }
 }
 
 static bool is_claimed(const struct work *w, size_t i)

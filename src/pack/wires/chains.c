@@ -55,8 +55,10 @@ static int gather(struct gathered *g, const struct spl_points *p, const struct s
     g->index = spl_alloc_raw(linear + 1, sizeof *g->index, err);
     if (!g->points || !g->index)
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->count && !spl_stage_is_cancelled(stage); i += SPL_CHUNK_SPLATS)
+    for (size_t i = 0; i < p->count && !spl_stage_is_cancelled(stage); i += SPL_CHUNK_SPLATS) {
+        spl_spill_keep_bound(p->spill);
         gather_run(g, p, i, p->count - i < SPL_CHUNK_SPLATS ? p->count : i + SPL_CHUNK_SPLATS);
+    }
     return spl_stage_check(stage, err);
 }
 
@@ -111,7 +113,7 @@ static int reserve(struct spl_wires *w, const struct gathered *g, struct spl_err
                         "wires, poles and cables of %llu vertices; at most %u can be joined: pack the scans as several "
                         "datasets, or with --no-linear",
                         (unsigned long long)vertices, SPL_WIRE_END - 1);
-    w->vertices = spl_alloc_raw(vertices + 1, sizeof *w->vertices, err);
+    w->vertices = spl_spill_alloc_raw(w->spill, vertices + 1, sizeof *w->vertices, err);
     w->capacity = vertices;
     return w->vertices ? SPL_OK : SPL_E_NOMEM;
 }
@@ -122,6 +124,7 @@ static void add_vertex(struct spl_wires *w, const struct spl_points *p, const st
 {
     spl_assert(w->count < w->capacity);
     uint32_t index = g->index[like];
+    spl_spill_keep_bound(p->spill); /* each is in pages of its own */
     struct spl_wire_vertex *vertex = &w->vertices[w->count++];
     *vertex = (struct spl_wire_vertex){.radius = (float)g->points[like].spacing,
                                        .length = length,
@@ -212,7 +215,7 @@ static int compare_pieces(const void *a, const void *b, void *context)
 
 static int sort_pieces(struct spl_wires *w, struct spl_error *err)
 {
-    w->pieces = spl_alloc_raw(w->count + 1, sizeof *w->pieces, err);
+    w->pieces = spl_spill_alloc_raw(w->spill, w->count + 1, sizeof *w->pieces, err);
     if (!w->pieces)
         return SPL_E_NOMEM;
     for (size_t i = 0; i < w->count; i++)
@@ -226,7 +229,8 @@ int spl_wires_find(struct spl_wires *wires, struct spl_points *points, const str
                    struct spl_stage *stage, struct spl_error *err)
 {
     struct gathered g = {0};
-    *wires = (struct spl_wires){.with_widths = options, .error = options ? options->error : 0};
+    *wires = (struct spl_wires){.with_widths = options, .error = options ? options->error : 0,
+                                .spill = stage->spill};
     if (!points->linear)
         return SPL_OK;
     spl_stage_begin(stage, "joining wires", NULL, 0);
@@ -263,7 +267,7 @@ int spl_wires_find(struct spl_wires *wires, struct spl_points *points, const str
 
 void spl_wires_finish(struct spl_wires *wires)
 {
-    free(wires->vertices);
-    free(wires->pieces);
+    spl_spill_free(wires->spill, wires->vertices);
+    spl_spill_free(wires->spill, wires->pieces);
     *wires = (struct spl_wires){0};
 }

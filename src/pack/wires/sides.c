@@ -181,6 +181,8 @@ static void claim_points(const struct spl_wires_grid *grid, const struct spl_wir
                          double noise, const struct spl_stage *stage)
 {
     for (size_t i = 0; i < p->count; i++) {
+        if (i % every == 0)
+            spl_spill_keep_bound(p->spill);
         if (i % every == 0 && spl_stage_is_cancelled(stage))
             return;
         if (p->linear[i] || (p->plane && p->plane[i] != SPL_NO_PLANE))

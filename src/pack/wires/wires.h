@@ -23,6 +23,7 @@ struct spl_wires {
     size_t piece_count;
     bool with_widths; /* of lines: options were given */
     double error;     /* of those */
+    struct spl_spill *spill; /* where they lie; may be NULL */
     bool cut_short; /* joining would have taken more steps than it may: what is left stays open */
 };
 

@@ -184,16 +184,19 @@ static void states_and_misses(void **state)
     load_scans(&(struct e57_scan){"flagged", NULL, fields, 6, 999, 0}, 1, NULL, &l);
     assert_int_equal(l.points, 333);
     assert_int_equal(l.skipped, 666);
+    assert_true(l.at_most);
     assert_true(l.attributes & SPL_CLOUD_STATION);
     loaded_finish(&l);
     /* no flags, but cells: what lies at the scanner was not hit */
     fields[3] = fields[5];
     load_scans(&(struct e57_scan){"cells", NULL, fields, 5, N, 0}, 1, NULL, &l);
     assert_int_equal(l.points, N / 2);
+    assert_true(l.at_most);
     loaded_finish(&l);
     /* neither: a point is a point */
     load_scans(&(struct e57_scan){"points", NULL, fields, 3, N, 0}, 1, NULL, &l);
     assert_int_equal(l.points, N);
+    assert_false(l.at_most);
     loaded_finish(&l);
 }
 

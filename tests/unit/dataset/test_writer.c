@@ -157,6 +157,7 @@ static void test_full_disk(void **state)
             break;
         assert_int_equal(rc, SPL_E_IO);
         assert_non_null(strstr(err.message, part_path));
+        assert_non_null(strstr(err.message, "make room there"));
         assert_true(version_of_target() == old);
         assert_int_equal(files_in_folder(), 1);
         refused++;

@@ -1,8 +1,11 @@
 /* Order, duplicates, neighbours, normals, radii: each against brute force or a closed form. */
+#include <malloc.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -13,6 +16,7 @@
 #include "pack/eyes.h"
 #include "pack/neighbours.h"
 #include "pack/order.h"
+#include "support/folder.h"
 #include "support/sanitised.h"
 
 static int compare_places(const void *a, const void *b)
@@ -111,6 +115,132 @@ static void test_order_below_key_resolution(void **state)
     assert_true(steps / (double)p.count < 0.3e-3); /* 1e-3 on the average without any order */
     free(position);
     spl_points_finish(&p);
+}
+
+/* Bytes of private memory, as RLIMIT_DATA counts them. */
+static uint64_t private_bytes(void)
+{
+    unsigned long long all, resident, shared, text, lib, data = 0;
+    FILE *f = fopen("/proc/self/statm", "r");
+    assert_non_null(f);
+    assert_int_equal(fscanf(f, "%llu %llu %llu %llu %llu %llu", &all, &resident, &shared, &text, &lib, &data), 6);
+    fclose(f);
+    return data * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+/* From now on no more than so many bytes of private memory can be had beside what there is; what was before. */
+static struct rlimit limit_heap(uint64_t bytes)
+{
+    struct rlimit before, less;
+    assert_int_equal(getrlimit(RLIMIT_DATA, &before), 0);
+    less = before;
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    malloc_trim(0); /* what earlier tests have freed is no room */
+    less.rlim_cur = private_bytes() + bytes;
+    assert_int_equal(setrlimit(RLIMIT_DATA, &less), 0);
+    return before;
+}
+
+/* Of points all of whose arrays lie in files. */
+static struct spl_points in_files(size_t count)
+{
+    struct spl_points p = {.count = count, .capacity = count, .up = {0, 0, 1}};
+    assert_int_equal(spl_spill_create(in_folder("any.spld"), UINT64_C(1) << 30, &p.spill, NULL), 0);
+    spl_spill_force(65536);
+    for (int c = 0; c < 3; c++)
+        p.axis[c] = spl_spill_alloc(p.spill, count + SPL_POINTS_PAD, sizeof(double), NULL);
+    p.color_class = spl_spill_alloc(p.spill, count + SPL_POINTS_PAD, sizeof *p.color_class, NULL);
+    return p;
+}
+
+static void finish_in_files(struct spl_points *points)
+{
+    struct spl_spill *spill = points->spill;
+    spl_points_finish(points);
+    spl_spill_force(0);
+    spl_spill_destroy(spill);
+}
+
+/* Of as many points as a volume has at the borders of its blocks the edges between blocks lie in files too. */
+static void test_sides_of_many_blocks_take_no_heap(void **state)
+{
+    (void)state;
+    skip_sanitised();
+    enum { count = 1 << 18, neighbours = 16, heap_most = 43 << 20 }; /* of the one thread's scratch */
+    struct spl_error err = {0};
+    struct spl_stage stage = quiet_stage(1);
+    struct spl_points p = in_files(count);
+    uint64_t random = 5;
+    for (size_t i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++)
+            p.axis[c][i] = uniform(&random);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    struct rlimit before = limit_heap(heap_most);
+    int rc = spl_surface(&p, neighbours, false, &stage, &err);
+    assert_int_equal(setrlimit(RLIMIT_DATA, &before), 0);
+    if (rc)
+        fail_msg("%s", err.message);
+    finish_in_files(&p);
+}
+
+/* One stray point makes all the others one run of equal keys: they are ordered as if it were not there, in arrays that
+ * may lie on disk, and on the heap in no more room than fewer would take. */
+static void test_order_beside_a_stray_takes_no_heap(void **state)
+{
+    (void)state;
+    skip_sanitised();
+    enum { count = 1 << 20, heap_most = 4 << 20 };
+    struct spl_error err = {0};
+    struct spl_stage stage = quiet_stage(1);
+    uint64_t random = 5;
+    struct spl_points p = in_files(count);
+    for (int c = 0; c < 3; c++) {
+        for (size_t i = 0; i < count - 1; i++)
+            p.axis[c][i] = i % 16 ? uniform(&random) : 0.5; /* many of them at one place */
+        p.axis[c][count - 1] = 1e9;
+    }
+    struct rlimit before = limit_heap(heap_most);
+    int rc = spl_points_order(&p, &stage, &err);
+    assert_int_equal(setrlimit(RLIMIT_DATA, &before), 0);
+    if (rc)
+        fail_msg("%s", err.message);
+    assert_int_equal(p.count, count - count / 16 + 1);
+    double low[3] = {INFINITY, INFINITY, INFINITY}, size = 0;
+    for (int c = 0; c < 3; c++) {
+        double high = -INFINITY;
+        for (size_t i = 0; i + 1 < p.count; i++) {
+            low[c] = fmin(low[c], p.axis[c][i]);
+            high = fmax(high, p.axis[c][i]);
+        }
+        size = fmax(size, high - low[c]);
+    }
+    for (size_t i = 1; i + 1 < p.count; i++)
+        assert_true(spl_points_key(&p, i - 1, low, size) <= spl_points_key(&p, i, low, size));
+    finish_in_files(&p);
+}
+
+/* The same of any number of threads, and of points that are nearly all at one place. */
+static void test_threads_order_long_runs_alike(void **state)
+{
+    (void)state;
+    enum { count = 300000 };
+    for (int same = 0; same < 2; same++) {
+        double(*position)[3] = malloc(count * sizeof *position);
+        uint64_t random = 7;
+        for (size_t i = 0; i < count; i++)
+            for (int c = 0; c < 3; c++)
+                position[i][c] = !i ? -1e9 : same ? 7 : (i % 3 ? 1e-7 : 1) * uniform(&random);
+        struct spl_points one = sorted((const double(*)[3])position, count, 1);
+        struct spl_points many = sorted((const double(*)[3])position, count, 5);
+        assert_int_equal(one.count, same ? 2 : count);
+        assert_int_equal(many.count, one.count);
+        for (int c = 0; c < 3; c++)
+            assert_memory_equal(one.axis[c], many.axis[c], one.count * sizeof(double));
+        assert_memory_equal(one.color_class, many.color_class, one.count * sizeof *one.color_class);
+        free(position);
+        spl_points_finish(&one);
+        spl_points_finish(&many);
+    }
 }
 
 static int compare_doubles(const void *a, const void *b)
@@ -557,6 +687,9 @@ int main(void)
         cmocka_unit_test(test_order_sorts_and_drops),        cmocka_unit_test(test_few_points_in_many_threads),
         cmocka_unit_test(test_the_same_duplicate_stays),
         cmocka_unit_test(test_order_below_key_resolution),   cmocka_unit_test(test_neighbours_against_brute_force),
+        cmocka_unit_test(test_order_beside_a_stray_takes_no_heap),
+        cmocka_unit_test(test_sides_of_many_blocks_take_no_heap),
+        cmocka_unit_test(test_threads_order_long_runs_alike),
         cmocka_unit_test(test_normals_of_a_sphere),
         cmocka_unit_test(test_lines_at_borders),          cmocka_unit_test(test_normals_face_the_station),
         cmocka_unit_test(test_normals_face_the_eyes),
@@ -567,5 +700,5 @@ int main(void)
         cmocka_unit_test(test_degenerate_surfaces),          cmocka_unit_test(test_threads_do_not_matter),
     };
     only_threads_under_tsan();
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

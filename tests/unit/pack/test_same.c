@@ -1,9 +1,11 @@
 /* A dataset depends on what is in the scans alone: not on threads, on memory, on the order of files and of the points in
  * them, nor on how many files they lie in. */
+#include <glob.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -230,6 +232,117 @@ static void of_any_memory_without_surfaces(void **state)
     free(file[1].bytes);
 }
 
+/* Wherever a pack is: the error names the folder and what to do, and nothing is left there. */
+static void a_full_disk_is_told_in_every_stage(void **state)
+{
+    char few[300], left[300];
+    const char *path = few;
+    struct spl_pack_options options = get_options(&path, 1, 2);
+    glob_t found;
+    long n = 0;
+    int rc = SPL_E_IO;
+    (void)state;
+    snprintf(few, sizeof few, "%s", in_folder("few.ply"));
+    snprintf(left, sizeof left, "%s", in_folder("{,.}none*"));
+    write_scan(few, 0, 20, 0);
+    options.output = in_folder("none.spld");
+    options.memory_bytes = SPL_PACK_MEMORY_MIN;
+    spl_spill_force(1024);
+    while (rc) {
+        struct spl_error err = {0};
+        spl_spill_fail_after(++n);
+        rc = spl_pack(&options, NULL, &err);
+        if (rc && (rc != SPL_E_IO || err.code != rc || strcmp(err.field, "memory") ||
+                   !strstr(err.message, test_folder) || !strstr(err.message, "make room there")))
+            fail_msg("array %ld: %d, %s: %s", n, rc, err.field, err.message);
+        if (rc && glob(left, GLOB_BRACE, NULL, &found) != GLOB_NOMATCH)
+            fail_msg("array %ld: %s is left", n, found.gl_pathv[0]);
+    }
+    spl_spill_fail_after(0);
+    spl_spill_force(0);
+    assert_true(n > 40);
+    assert_int_equal(unlink(options.output), 0);
+    assert_int_equal(unlink(few), 0);
+}
+
+static char warned[2000];
+
+static void keep_warning(void *context, const char *text)
+{
+    (void)context;
+    strncat(warned, text, sizeof warned - strlen(warned) - 1);
+}
+
+static void stop_reading(void *context, const struct spl_progress *progress)
+{
+    if (!strncmp(progress->stage, "reading", 7))
+        spl_cancel_set(context);
+}
+
+/* How a pack of twice so many points ends that stops before it reads them: a hole. `cells`: in two rows of a grid, in
+ * which some may be none. What it warns of is in `warned`. */
+static int pack_hollow(uint64_t half, bool cells, uint64_t memory, const char *output, struct spl_error *err)
+{
+    static const char *const heads[] = {
+        "ply\nformat binary_little_endian 1.0\nelement vertex %llu\nproperty float x\nproperty float y\n"
+        "property float z\nend_header\n",
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS %llu\nWIDTH %llu\nHEIGHT 2\n"
+        "VIEWPOINT 0 0 0 1 0 0 0\nDATA binary\n"};
+    char path[300], head[400];
+    const char *input = path;
+    struct spl_cancel cancel = {0};
+    struct spl_pack_options options = get_options(&input, 1, 1);
+    snprintf(path, sizeof path, "%s", in_folder(cells ? "hollow.pcd" : "hollow.ply"));
+    int length = snprintf(head, sizeof head, heads[cells], (unsigned long long)(2 * half), (unsigned long long)half);
+    folder_put_text(cells ? "hollow.pcd" : "hollow.ply", head);
+    if (truncate(path, length + 24 * (off_t)half))
+        skip(); /* no such large file here */
+    options.keep = NULL;
+    options.output = output;
+    options.cancel = options.progress_context = &cancel;
+    options.memory_bytes = memory;
+    options.warn = keep_warning;
+    options.progress = stop_reading;
+    warned[0] = 0;
+    int rc = spl_pack(&options, NULL, err);
+    assert_int_equal(unlink(path), 0);
+    return rc;
+}
+
+/* What is said of a pack beyond its memory. */
+static void warn_of(const char *output)
+{
+    struct spl_error err = {0};
+    assert_int_equal(pack_hollow(500000, false, SPL_PACK_MEMORY_MIN, output, &err), SPL_E_CANCELLED);
+}
+
+/* A million points: 100 bytes each less what is in memory, and 16 of the dataset. */
+static void what_the_disk_needs_is_said(void **state)
+{
+    char *in_memory = spl_spill_find_memory_folder(in_folder("none.spld"));
+    (void)state;
+    warn_of(in_folder("none.spld"));
+    if (!strstr(warned, "take up to 0.1 GB while") || !strstr(warned, "0.1 GB of it lie on disk") ||
+        !strstr(warned, "which takes up to 0.0 GB itself"))
+        fail_msg("%s", warned);
+    assert_int_equal(!strstr(warned, "tmpfs"), !in_memory);
+    free(in_memory);
+}
+
+static void a_disk_in_memory_is_said(void **state)
+{
+    char output[100], *folder = spl_spill_find_memory_folder("/dev/shm/none.spld");
+    (void)state;
+    if (!folder)
+        skip(); /* none here */
+    assert_string_equal(folder, "/dev/shm/");
+    free(folder);
+    snprintf(output, sizeof output, "/dev/shm/splatd-test-%ld.spld", (long)getpid());
+    warn_of(output);
+    if (!strstr(warned, "'/dev/shm/' lies in memory") || !strstr(warned, "-o"))
+        fail_msg("%s", warned);
+}
+
 static void too_little_memory_is_refused(void **state)
 {
     const char *path = scan;
@@ -242,23 +355,39 @@ static void too_little_memory_is_refused(void **state)
     assert_string_equal(err.field, "memory");
 }
 
-/* Before they are read: the file has a hole instead of them. */
+/* Before they are read; but not cells of a grid of which some may have seen nothing. */
 static void too_many_points_are_refused_at_once(void **state)
 {
-    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty float x\n"
-                               "property float y\nproperty float z\nend_header\n";
-    const char *path = in_folder("many.ply");
+    char output[300];
     struct spl_error err = {0};
-    struct spl_pack_options options = get_options(&path, 1, 1);
     (void)state;
-    folder_put_text("many.ply", head);
-    if (truncate(path, (off_t)sizeof head - 1 + 12ll * 4294967295ll))
-        skip(); /* no such large file here */
-    options.output = in_folder("none.spld");
-    options.keep = NULL;
-    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_LIMIT);
+    snprintf(output, sizeof output, "%s", in_folder("none.spld"));
+    assert_int_equal(pack_hollow(UINT64_C(1) << 31, false, 0, output, &err), SPL_E_LIMIT);
     assert_non_null(strstr(err.message, "more than 4294967294 points"));
-    assert_int_equal(unlink(path), 0);
+    err = (struct spl_error){0};
+    assert_int_equal(pack_hollow(UINT64_C(1) << 31, true, 0, output, &err), SPL_E_CANCELLED);
+}
+
+/* Of the disk's room the same, unless half of the cells have none either. */
+static void a_disk_that_has_no_room_is_refused_at_once(void **state)
+{
+    char output[300];
+    struct statvfs status;
+    struct spl_error err = {0};
+    (void)state;
+    snprintf(output, sizeof output, "%s", in_folder("none.spld"));
+    assert_int_equal(statvfs(test_folder, &status), 0);
+    double points_in_room = (double)status.f_bavail * (double)status.f_frsize / 116;
+    if (points_in_room > 2e9)
+        skip(); /* so many are no scan */
+    uint64_t half = (uint64_t)(0.625 * points_in_room);
+    assert_int_equal(pack_hollow(half, false, SPL_PACK_MEMORY_MIN, output, &err), SPL_E_IO);
+    assert_non_null(strstr(err.message, "GB are free"));
+    err = (struct spl_error){0};
+    assert_int_equal(pack_hollow(half, true, SPL_PACK_MEMORY_MIN, output, &err), SPL_E_CANCELLED);
+    assert_non_null(strstr(warned, "GB are free"));
+    err = (struct spl_error){0};
+    assert_int_equal(pack_hollow(2 * half, true, SPL_PACK_MEMORY_MIN, output, &err), SPL_E_IO);
 }
 
 /* A name is in META, so that the points that lie the other way round lie in a file of the same one. */
@@ -294,8 +423,12 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(of_any_number_of_threads),
                                        cmocka_unit_test(of_any_memory),
                                        cmocka_unit_test(of_any_memory_without_surfaces),
+                                       cmocka_unit_test(a_full_disk_is_told_in_every_stage),
+                                       cmocka_unit_test(what_the_disk_needs_is_said),
+                                       cmocka_unit_test(a_disk_in_memory_is_said),
                                        cmocka_unit_test(too_little_memory_is_refused),
                                        cmocka_unit_test(too_many_points_are_refused_at_once),
+                                       cmocka_unit_test(a_disk_that_has_no_room_is_refused_at_once),
                                        cmocka_unit_test(of_any_order_of_points),
                                        cmocka_unit_test(of_tiles_in_any_order)};
     return cmocka_run_group_tests_name("a dataset depends on its scans alone", tests, setup, teardown);

@@ -14,6 +14,7 @@
 #include "base/memory.h"
 #include "pack/stage.h"
 #include "pack/wires/wires.h"
+#include "support/folder.h"
 
 enum { most = 4000 };
 
@@ -219,6 +220,33 @@ static void set_point(struct cloud *c, size_t i, double x, double y, double z, u
     c->points.color_class[i] = color;
 }
 
+/* What stays until the end may lie on disk where memory is bounded, and is the same there. */
+static void lines_that_stay_may_lie_on_disk(void **state)
+{
+    struct cloud c;
+    struct spl_wires on_heap;
+    struct spl_stage stage = {.threads = 1};
+    (void)state;
+    make_cloud(&c, 1000);
+    for (int i = 0; i < 1000; i++)
+        set_point(&c, (size_t)i, 0.1 * i, 3, 2, (uint32_t)i);
+    join_cloud(&c);
+    on_heap = c.wires;
+    assert_int_equal(spl_spill_create(in_folder("any.spld"), 1 << 30, &stage.spill, NULL), SPL_OK);
+    spl_spill_force(1024);
+    assert_int_equal(spl_wires_find(&c.wires, &c.points, NULL, &stage, NULL), SPL_OK);
+    assert_true(on_heap.count > 100);
+    assert_true(spl_spill_disk_most(stage.spill) >=
+                on_heap.count * (sizeof *on_heap.vertices + sizeof *on_heap.pieces));
+    assert_int_equal(c.wires.count, on_heap.count);
+    assert_memory_equal(c.wires.vertices, on_heap.vertices, on_heap.count * sizeof *on_heap.vertices);
+    assert_memory_equal(c.wires.pieces, on_heap.pieces, on_heap.piece_count * sizeof *on_heap.pieces);
+    spl_wires_finish(&on_heap);
+    free_cloud(&c);
+    spl_spill_force(0);
+    spl_spill_destroy(stage.spill);
+}
+
 /* A wire of 19 m with 4 m missing: pieces lie on the arc, and each is of the nearer point. */
 static void a_gap_is_crossed_on_the_arc(void **state)
 {
@@ -419,9 +447,10 @@ int main(void)
         cmocka_unit_test(a_gap_is_crossed_on_the_arc),
         cmocka_unit_test(a_straight_wire_is_joined_to_its_end),
         cmocka_unit_test(joining_is_reported_and_ends_when_it_is_cancelled),
+        cmocka_unit_test(lines_that_stay_may_lie_on_disk),
         cmocka_unit_test(levels_keep_their_error_and_meet),
         cmocka_unit_test(colors_are_means),
         cmocka_unit_test(a_node_has_so_many_vertices_at_most),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }
