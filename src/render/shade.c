@@ -104,16 +104,20 @@ int spl_shade_check(const struct spl_shade_params *shade, struct spl_error *err)
     return SPL_OK;
 }
 
-/* One colour, or one a class: what it lies on has no shape by itself. */
-static bool is_even(const struct spl_color_params *color)
+/* What colours tell of shape: that of nothing, where all is of one; little, where each class has its own. */
+static uint32_t find_missing(const struct spl_color_params *color, const struct spl_dataset_info *dataset)
 {
-    return color->by == SPL_COLOR_BY_FLAT || (color->by == SPL_COLOR_BY_ATTRIBUTE && !strcmp(color->name, "class"));
+    const bool one = color->by == SPL_COLOR_BY_FLAT || (color->by == SPL_COLOR_BY_RGB && !dataset->has_color);
+    if (one && dataset->has_surface)
+        return SPL_SHADE_EDL | SPL_SHADE_HEADLIGHT;
+    const bool classes = color->by == SPL_COLOR_BY_ATTRIBUTE && !strcmp(color->name, "class");
+    return one || !dataset->has_color || (classes && !color->rgb) ? SPL_SHADE_EDL : 0;
 }
 
 uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
                        const struct spl_dataset_info *dataset)
 {
     if (!shade->kinds)
-        return dataset->has_color && (color->rgb || !is_even(color)) ? 0 : SPL_SHADE_EDL;
+        return find_missing(color, dataset);
     return shade->kinds & ~(uint32_t)SPL_SHADE_NONE;
 }

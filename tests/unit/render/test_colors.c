@@ -72,17 +72,23 @@ static void test_what_is_shaded_by_itself(void **state)
 {
     (void)state;
     struct spl_dataset_info plain = {.has_color = false}, colored = {.has_color = true};
+    struct spl_dataset_info grey = {.has_surface = true}, scan = {.has_color = true, .has_surface = true};
     const struct spl_shade_params by_itself = {0}, none = {.kinds = SPL_SHADE_NONE}, lit = {.kinds = SPL_SHADE_HEADLIGHT};
     static const struct {
         const char *color;
         bool even; /* shows no shape, though the dataset has colours */
-    } rows[] = {{"rgb", false}, {"class", true}, {"rgb+class", false}, {"flat:red", true}, {"height", false}, {"classy", false},
-                {"normal", false}, {"intensity", false}};
+        bool one;  /* nor though it shows its own colours, of which there are none */
+    } rows[] = {{"rgb", false, true},     {"class", true, false},  {"rgb+class", false, false}, {"flat:red", true, true},
+                {"height", false, false}, {"classy", false, false}, {"normal", false, false},    {"intensity", false, false}};
+    const uint32_t both = SPL_SHADE_EDL | SPL_SHADE_HEADLIGHT;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_color_params color = {0};
         assert_int_equal(spl_color_parse(rows[i].color, &color, NULL), SPL_OK);
         assert_int_equal(spl_shade_for(&by_itself, &color, &plain), SPL_SHADE_EDL);
         assert_int_equal(spl_shade_for(&by_itself, &color, &colored), rows[i].even ? SPL_SHADE_EDL : 0);
+        assert_int_equal(spl_shade_for(&by_itself, &color, &grey), rows[i].one ? both : SPL_SHADE_EDL);
+        assert_int_equal(spl_shade_for(&by_itself, &color, &scan),
+                         rows[i].even && rows[i].one ? both : rows[i].even ? SPL_SHADE_EDL : 0);
         assert_int_equal(spl_shade_for(&none, &color, &plain), 0);
         assert_int_equal(spl_shade_for(&lit, &color, &plain), SPL_SHADE_HEADLIGHT);
     }
