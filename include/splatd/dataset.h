@@ -114,6 +114,8 @@ struct spl_dataset_info {
     uint32_t epsg;  /* number of the horizontal coordinate system in EPSG's list; 0 = not known */
     uint32_t station_count;       /* places where a scanner stood, by their numbers, which attribute "scan" has too */
     const double (*stations)[16]; /* row-major, station to world, z up of most scanners; borrowed until close */
+    uint32_t tiles; /* of a collection: datasets that it is made of, whose sums are in the figures above, but in
+                       file_bytes and bits; 0 = it is none */
     bool stations_of_maps;        /* no scan says where it was taken from: they are the places of panoramas */
 };
 
@@ -199,6 +201,10 @@ SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, ui
  * stream is of a type that this library does not know, the file was cut short in place, or its server could not be
  * read. Any thread; blocks on disk, or on its server. */
 SPL_API bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
+
+/* The file of the tile of a collection that has splat `id`; NULL where it is the collection's own, or there is none such.
+ * Borrowed until close. Any thread. */
+SPL_API const char *spl_dataset_find_tile(const struct spl_dataset *dataset, uint64_t id);
 
 SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */
 

@@ -244,6 +244,8 @@ static void print_table(const struct spl_info_report *report)
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     if (info->title)
         print_line("  title", info->title);
+    if (info->tiles)
+        printf("  tiles         %s, which have sizes of their own\n", spl_cmd_group(info->tiles, a));
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");
@@ -314,6 +316,8 @@ static void print_table(const struct spl_info_report *report)
             printf("%12s", spl_cmd_group(l->meshes, a));
         printf("%12.4g\n", l->spacing);
     }
+    if (info->tiles)
+        return;
     printf("\n  bytes a %s\n", spl_info_has_primitives(info) ? "point" : "splat");
     int name_width = 14;
     for (uint32_t s = 0; s < streams; s++)

@@ -150,8 +150,7 @@ static bool read_value(const struct spl_dataset *dataset, const struct spl_place
     uint32_t count = spl_stream_words(code.width, chunk->count) + SPL_PAGE_TAIL_WORDS; // which the page has
     uint64_t word =
         (uint64_t)chunk->geometry_word + spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, stream, index);
-    if (spl_dataset_read(dataset, dataset->pages[tables->page]->offset + word * sizeof *words, words,
-                         count * sizeof *words, NULL))
+    if (spl_dataset_read_words(dataset, tables->page, word, words, count, NULL))
         return false;
     *value = spl_stream_decode(&dataset->streams[stream], code, words, (uint32_t)(id - chunk->first_id));
     return true;

@@ -19,6 +19,7 @@
 #include "base/sized.h"
 #include "dataset/open.h"
 #include "dataset/remote.h"
+#include "dataset/tiles.h"
 #include "geom/fit.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
@@ -111,8 +112,10 @@ int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how,
     *out = NULL;
     if (spl_remote_is_url(path))
         return open_remote(path, how, out, err);
+    struct spl_dataset_opening file = *how;
+    file.beside = path;
     int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_source_as(&source, path, how, out, err)))
+    if (!rc && (rc = spl_dataset_open_source_as(&source, path, &file, out, err)))
         spl_dataset_source_close(&source);
     return rc;
 }
@@ -160,6 +163,7 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     dataset->remote = source->far;
     dataset->lazily = source->far && !(how->verify && how->verify_remote);
     dataset->tables_limit = how->tables_bytes;
+    dataset->beside = how->beside;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
@@ -176,6 +180,7 @@ done:
         spl_dataset_close(dataset);
     } else {
         dataset->opened = true;
+        dataset->beside = NULL;
         *out = dataset;
     }
     return rc;
@@ -189,6 +194,7 @@ void spl_dataset_hold(const struct spl_dataset *dataset)
 
 static void destroy(struct spl_dataset *dataset)
 {
+    spl_tiles_destroy(dataset->tiles);
     spl_dataset_source_close(&dataset->source);
     json_decref(dataset->meta);
     free(dataset->stations);
@@ -235,19 +241,19 @@ const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *da
 
 bool spl_dataset_keeps_all(const struct spl_dataset *dataset)
 {
-    return dataset->whole.nodes;
+    return dataset->whole.nodes && !dataset->tiles;
 }
 
 const struct spl_node *spl_dataset_get_nodes(const struct spl_dataset *dataset, uint64_t *count)
 {
-    spl_assert(dataset->whole.nodes);
+    spl_assert(spl_dataset_keeps_all(dataset));
     *count = dataset->info.nodes;
     return dataset->whole.nodes;
 }
 
 const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset, uint64_t *count)
 {
-    spl_assert(dataset->whole.nodes);
+    spl_assert(spl_dataset_keeps_all(dataset));
     *count = dataset->info.chunks;
     return dataset->whole.chunks;
 }
@@ -355,6 +361,8 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err)
 {
     spl_assert(index < dataset->info.pages);
+    if (spl_tiles_find(dataset, index))
+        return spl_tiles_read_page(dataset, index, out, err);
     const struct spl_section *page = dataset->pages[index];
     bool sound;
     int rc = spl_dataset_read_section(dataset, page, out, &sound, err);
@@ -366,13 +374,29 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
 size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
 {
     spl_assert(index < dataset->info.pages);
-    return dataset->pages[index]->bytes;
+    const struct spl_tiles *tiles = dataset->tiles;
+    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages] : dataset->pages[index]->bytes;
+}
+
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own = dataset;
+    int rc = tile ? spl_tiles_borrow(dataset, tile, &own, err) : SPL_OK;
+    if (rc)
+        return rc;
+    const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
+    rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, err);
+    if (tile)
+        spl_tiles_give_back(dataset, tile);
+    return rc;
 }
 
 const uint32_t *spl_dataset_get_page(const struct spl_dataset *dataset, uint32_t index, size_t *bytes)
 {
     *bytes = spl_dataset_get_page_bytes(dataset, index);
-    spl_assert(dataset->source.map);
+    spl_assert(dataset->source.map && !spl_tiles_find(dataset, index));
     return (const uint32_t *)(const void *)((const char *)dataset->source.map + dataset->pages[index]->offset);
 }
 

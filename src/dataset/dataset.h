@@ -31,6 +31,7 @@ struct spl_dataset_opening {
     struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
     uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */
     bool verify_remote;                /* with `verify`: also of a server all is read at first */
+    const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
 };
 
 /* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless

@@ -43,8 +43,7 @@ static bool read_splat(const struct spl_dataset *dataset, const struct spl_place
     /* reading the tables has checked that the page has them */
     uint32_t count = spl_chunk_words(&chunk) + SPL_PAGE_TAIL_WORDS;
     spl_assert(count <= sizeof words / sizeof *words);
-    uint64_t offset = dataset->pages[place->tables->page]->offset + (uint64_t)chunk.geometry_word * sizeof *words;
-    if (spl_dataset_read(dataset, offset, words, count * sizeof *words, NULL))
+    if (spl_dataset_read_words(dataset, place->tables->page, chunk.geometry_word, words, count, NULL))
         return false;
     chunk.geometry_word = 0;
     spl_chunk_decode(&chunk, words, (uint32_t)(id - chunk.first_id), splat);
@@ -84,8 +83,7 @@ static int count_chunk(const struct spl_dataset *dataset, uint32_t page, const s
         return SPL_OK;
     if (chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_SOME) {
         uint64_t word = spl_chunk_color_word(chunk) - SPL_LINEAR_WORDS; // which the page has
-        int rc =
-            spl_dataset_read(dataset, dataset->pages[page]->offset + word * sizeof *mask, mask, sizeof mask, err);
+        int rc = spl_dataset_read_words(dataset, page, word, mask, SPL_LINEAR_WORDS, err);
         if (rc)
             return rc;
     }

@@ -34,6 +34,8 @@ struct spl_dataset {
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
+    const char *beside; // while it is opened: the path that its tiles lie beside; NULL = they cannot be read
+    struct spl_tiles *tiles; // of a collection (tiles.h); NULL = it is none
     bool verified;                /* every page had its checksum when it was opened, or has it when it is read */
     bool remote;                  /* what is wrong may have come so, and is asked for once more */
     bool lazily;                  /* it is remote, and what is large is held against checksums when it is read alone */
@@ -116,6 +118,10 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 /* Section `index` of a kind in memory, and its length; NULL and 0 where there is none. */
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
                                  uint64_t *bytes);
+
+/* Reads `count` words of page `page` from its word `word` on, which it has, wherever the page lies. */
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err);
 
 /* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held
  * against theirs whenever they are read; fills everything up to `textures` and the sizes in info. */

@@ -14,6 +14,7 @@
 #include "dataset/counts.h"
 #include "dataset/head.h"
 #include "dataset/open.h"
+#include "dataset/tiles.h"
 
 /* Numbers and sizes as the directory says; arrays still to be set. */
 static struct spl_tables describe(const struct spl_dataset *dataset, uint32_t page)
@@ -144,6 +145,8 @@ int spl_dataset_read_tables(const struct spl_dataset *dataset, uint32_t page, vo
 {
     struct spl_tables *tables = block;
     spl_assert(page < dataset->info.pages);
+    if (spl_tiles_find(dataset, page))
+        return spl_tiles_read_tables(dataset, page, block, err);
     *tables = describe(dataset, page);
     lay_out(tables, dataset->textures, dataset->maps, tables + 1);
     struct spl_error why = {0};
@@ -289,12 +292,15 @@ static int keep_first(struct spl_dataset *dataset, struct spl_error *err)
 
 int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
 {
-    bool whole = spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
+    const bool collection = json_object_get(dataset->meta, "tiles"); /* whose leaves get what hangs there */
+    bool whole = collection || spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
     if (whole && dataset->info.pages)
         spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0],
                            dataset->found[SPL_KIND_HEADS].at[dataset->info.pages - 1]);
     if (!rc && (whole || (dataset->verified && !dataset->lazily)))
         rc = read_all(dataset, err);
-    return rc || !whole ? rc : spl_dataset_check_children(dataset, err);
+    if (!rc && whole)
+        rc = spl_dataset_check_children(dataset, err);
+    return rc ? rc : spl_dataset_check_tiles(dataset, err);
 }

@@ -45,6 +45,7 @@ static void *must_have(void *p)
 
 double make_dataset_normal_error = M_PI / 180;
 bool make_dataset_station;
+const json_t *make_dataset_meta;
 size_t make_dataset_page_bytes = SPL_PAGE_BYTES;
 const char *make_dataset_unit = "us-ft", *make_dataset_crs = "EPSG:2263";
 
@@ -324,6 +325,7 @@ void make_dataset_file_panels(const char *path, const struct make_splat *splats,
     if (make_dataset_station)
         json_object_set_new(meta, "stations", json_pack("[[iiiiiiiiiiiiiiii]]", 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0,
                                                         0, 0, 1));
+    json_object_update(meta, (json_t *)make_dataset_meta);
     spl_dataset_writer_set_streams(b.writer, streams, SPL_STREAM_KNOWN_COUNT);
     must(spl_dataset_writer_finish(b.writer, b.nodes, b.node_count, b.chunks, b.chunk_count, meta, &err), &err);
     json_decref(meta);

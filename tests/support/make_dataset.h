@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include <jansson.h>
+
 #include <splatd/dataset.h>
 
 #include "dataset/panels.h"
@@ -57,6 +59,9 @@ extern const char *make_dataset_unit, *make_dataset_crs;
 
 /* META of files that follow says a station at the origin: normals show to it. */
 extern bool make_dataset_station;
+
+/* What META of files that follow says besides, borrowed; NULL = nothing. */
+extern const json_t *make_dataset_meta;
 
 /* Bytes of the pages of files that follow; default SPL_PAGE_BYTES. 0 = a page for each node. */
 extern size_t make_dataset_page_bytes;

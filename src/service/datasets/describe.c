@@ -190,6 +190,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "profile", profiled ? json_sprintf("%s/profile", entry->uri) : json_null());
     spl_profile_finish(&profile);
     set(json, "levels", count(info->levels));
+    set(json, "tiles", info->tiles ? count(info->tiles) : json_null());
     set(json, "leaf_splats", count(info->leaf_splats));
     set(json, "pruned", describe_pruned(entry->dataset));
     set(json, "page_bytes", count(info->page_bytes));

@@ -78,6 +78,10 @@ static void fill(json_t *json, const struct spl_pick *p, const struct spl_datase
     json_object_set_new(json, "depth", hit ? json_real(p->depth) : json_null());
     json_object_set_new(json, "distance", hit && isfinite(p->distance) ? json_real(p->distance) : json_null());
     json_object_set_new(json, "splat", hit && p->splat >= 0 ? json_integer(p->splat) : json_null());
+    if (dataset && spl_dataset_get_info(dataset)->tiles) {
+        const char *tile = hit && p->splat >= 0 ? spl_dataset_find_tile(dataset, (uint64_t)p->splat) : NULL;
+        json_object_set_new(json, "tile", tile ? json_string(tile) : json_null());
+    }
     json_object_set_new(json, "primitive",
                         p->primitive == SPL_SHAPE_NONE ? json_null() : json_string(spl_shape_name(p->primitive)));
     json_object_set_new(json, "plane", plane(p));

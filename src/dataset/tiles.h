@@ -1,0 +1,58 @@
+/* A collection: a dataset of coarse levels whose leaves are one a tile, each of them a dataset of its own that lies beside
+ * it (api/format.md, Collections). From outside it is one dataset: tiles' pages, nodes, chunks and ids follow its own, tile
+ * by tile, and the root of a tile's tree is the only child of its leaf. Tiles are opened when something of them is read,
+ * and not more than some at a time. */
+#ifndef SPL_DATASET_TILES_H
+#define SPL_DATASET_TILES_H
+
+#include <pthread.h>
+
+#include "dataset/dataset.h"
+
+struct spl_tile {
+    char *file; // owned; plain, beside the collection
+    uint64_t version;
+    uint32_t node, levels, depth; /* the leaf's number; of its own tree; of its root in the whole */
+    uint32_t first_page, page_count;
+    uint64_t first_node, first_chunk, first_id; /* where its own begin */
+
+    struct spl_dataset *open; // guarded by: mutex, as all below; may be NULL
+    unsigned users;
+    uint64_t used; /* when, in borrowings */
+};
+
+struct spl_tiles {
+    struct spl_tile *list; // owned
+    uint32_t count, own_pages;
+    struct spl_page_row *rows; // owned; of all pages, and the one that closes them; first_child means nothing
+    uint32_t *page_bytes;      // owned; of the pages behind its own
+    char *beside;              // owned; the collection's path; NULL: what it lies beside cannot be read
+    pthread_mutex_t mutex;
+    unsigned open_most;  /* SPL_TILES_OPEN_MAX; tests set less */
+    unsigned open_count; // guarded by: mutex, as below
+    uint64_t borrowings;
+};
+
+enum { SPL_TILES_MAX = 16384, SPL_TILES_OPEN_MAX = 64 };
+
+/* META's "tiles", held against the tables of the collection, which are all kept by now: fills dataset->tiles, info and rows,
+ * and ties leaves to tiles. Without the key it does nothing. */
+int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err);
+
+/* The tile that has page `page`, NULL: it is the collection's own. */
+struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page);
+
+/* The tile's dataset, until it is given back. SPL_E_CORRUPT where it is not what the collection was made of; as opening a
+ * dataset. Any thread; blocks on disk. */
+int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset **out,
+                     struct spl_error *err);
+void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *tile);
+
+/* spl_dataset_read_page() and _read_tables() of a page of a tile. */
+int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err);
+int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err);
+
+/* NULL-safe. */
+void spl_tiles_destroy(struct spl_tiles *tiles);
+
+#endif
