@@ -24,6 +24,16 @@ int spl_marks_find_stream(const struct spl_dataset_info *info, const char *name)
     return -1;
 }
 
+/* Why it may be missing though the scan had it. */
+static const char *find_reason(const char *name)
+{
+    static const char *const left_out[] = {"intensity", "return_number", "number_of_returns", "scan"};
+    for (size_t i = 0; i < sizeof left_out / sizeof *left_out; i++)
+        if (!strcmp(name, left_out[i]))
+            return "; one that has the same value everywhere is packed only where --keep names it";
+    return "";
+}
+
 int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name, const char *field, const char *common,
                           const char *hint, struct spl_error *err)
 {
@@ -33,8 +43,9 @@ int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name,
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s, and any has %s%s%s",
-                          info->id, name, used ? known : "none", common, hint ? "; " : "", hint ? hint : "");
+    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s, and any has %s%s%s%s",
+                          info->id, name, used ? known : "none", common, find_reason(name), hint ? "; " : "",
+                          hint ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_term *term, const char *field,

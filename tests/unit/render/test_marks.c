@@ -330,6 +330,12 @@ static void terms_meet_their_dataset(void **state)
     err = (struct spl_error){0};
     assert_int_equal(spl_marks_resolve(&soft, &bare, NULL, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "it has none"));
+    assert_null(strstr(err.message, "--keep"));
+    snprintf(soft.what.terms[0].name, sizeof soft.what.terms[0].name, "return_number");
+    err = (struct spl_error){0};
+    assert_int_equal(spl_marks_resolve(&soft, &bare, NULL, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "same value everywhere is packed only where --keep names it"));
+    snprintf(soft.what.terms[0].name, sizeof soft.what.terms[0].name, "depth");
     snprintf(info.streams[1].type, sizeof info.streams[1].type, "later"); /* a type that nobody knows yet */
     soft.what.terms[0] = term_of("height", 0, 1);
     assert_int_equal(spl_marks_resolve(&soft, &info, NULL, NULL), SPL_E_INPUT);
