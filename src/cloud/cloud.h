@@ -79,6 +79,7 @@ struct spl_cloud_info {
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     bool points_at_most; /* of points_expected some may be cells of a grid that saw nothing, which are skipped */
+    uint64_t points_behind; /* that the file has room for behind those that its header counts: not read; 0 mostly */
     uint64_t points_total;    /* with those that max_points leaves out; 0 = unknown, never where it is set */
     uint64_t file_bytes;
     uint32_t station_count;         /* grows while a PTX is read; final at the end */

@@ -120,6 +120,13 @@ static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
     }
 }
 
+/* Whole records from the last that is counted to `end`. */
+static uint64_t count_behind(const struct las *las, uint64_t end)
+{
+    const uint64_t last = las->start + las->count * las->record_bytes; /* which the file has */
+    return end > last ? (end - last) / las->record_bytes : 0;
+}
+
 static int las_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct spl_source *source = &cloud->source;
@@ -195,6 +202,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     snprintf(cloud->info.version, sizeof cloud->info.version, "1.%u, point format %u", minor, las->format);
     take_bounds(&cloud->info, h);
+    if (!compressed && !(las->format == 4 || las->format == 5 || las->format >= 9)) /* behind those lie waveforms */
+        cloud->info.points_behind = count_behind(las, all[1].count ? all[1].at : size);
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_INTENSITY;

@@ -28,6 +28,7 @@
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/said.h"
+#include "pack/strays.h"
 #include "pack/texture/pass.h"
 #include "pack/up.h"
 
@@ -347,6 +348,9 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     p.sides_known = p.points.normal || p.points.station_count || p.points.eye_count;
     if (!rc)
         rc = spl_points_order(&p.points, stage, err);
+    char strays[SPL_STRAYS_TEXT_MAX];
+    if (!rc && options->warn && spl_strays_find(&p.points, strays))
+        options->warn(options->progress_context, strays);
     const struct spl_bound bound = get_bound(&p);
     if (!rc)
         rc = spl_bound_check_size(&bound, &p.points, err);

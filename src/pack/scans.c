@@ -64,6 +64,7 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .scalars = info->scalars,
                               .counted = info->points_expected > 0 && !info->points_at_most,
                               .points_total = info->points_total,
+                              .points_behind = info->points_behind,
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},

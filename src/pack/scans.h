@@ -22,6 +22,7 @@ struct spl_scan {
     uint64_t points_expected;  /* of the header, or a guess by the file's size */
     bool counted;              /* the former is the header's, the file as large as it says, and each a point */
     uint64_t points_total;     /* as of struct spl_cloud_info */
+    uint64_t points_behind;    /* likewise */
     uint64_t max_points;       /* its share of a part; 0 = all */
     uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */
     double min[3], max[3];     /* of their coordinates; nothing while there is no point */

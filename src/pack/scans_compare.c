@@ -207,6 +207,25 @@ static void look_at_floats(const struct saying *s)
             spl_names_list(&coarse), of, step);
 }
 
+/* A writer that was stopped before it came back to the header. A few records' room may be padding. */
+static void look_at_counts(const struct saying *s)
+{
+    struct spl_names short_of = {0};
+    uint64_t behind = 0;
+    for (size_t i = 0; i < s->scans->count; i++) {
+        const struct spl_scan *scan = &s->scans->list[i];
+        if (scan->points_behind <= scan->points_total / 100)
+            continue;
+        spl_names_add(&short_of, scan->name);
+        behind += scan->points_behind;
+    }
+    if (short_of.count)
+        say(s,
+            "the header counts fewer points than the file has room for in %s: %llu more could lie there and are not read. "
+            "If they are points, mend the header's number",
+            spl_names_list(&short_of), (unsigned long long)behind);
+}
+
 /* Each scan against all others until one is not far, which in a street or among tiles is one of the next. */
 static void compare_places(const struct saying *s)
 {
@@ -250,5 +269,6 @@ void spl_scans_compare(const struct spl_scans *scans, void (*warn)(void *context
     compare_attributes(&saying);
     compare_steps(&saying);
     look_at_floats(&saying);
+    look_at_counts(&saying);
     compare_places(&saying);
 }

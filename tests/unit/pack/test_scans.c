@@ -1,4 +1,5 @@
 /* Scans that disagree: what is said of each pair, what is made of their colours, what the dataset remembers. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -82,6 +83,7 @@ struct las {
     unsigned epsg, unit; /* GeoTIFF keys; 0 = none */
     const char *wkt;     /* NULL = none */
     unsigned red, count; /* of point i: red * i */
+    unsigned uncounted;  /* of them the header says nothing */
 };
 
 /* LAS 1.2, format 2, on the same grid. */
@@ -101,7 +103,7 @@ static char *write_las(const char *name, const struct las *las)
     put(b + 100, (keys > 0) + (wkt > 0), 4);
     b[104] = 2;
     put(b + 105, 26, 2);
-    put(b + 107, las->count, 4);
+    put(b + 107, las->count - las->uncounted, 4);
     for (int k = 0; k < 3; k++)
         put_double(b + 131 + 8 * k, las->scale);
     if (keys) {
@@ -410,6 +412,37 @@ static void test_coarse_floats(void **state)
     assert_string_equal(pack_two(write_pcd("wide.pcd", 0, 5e4f), NULL, false, NULL), "");
 }
 
+/* A point in a scan of the world that has none of its own is told; a scan that thins out is not. */
+static void test_strays(void **state)
+{
+    (void)state;
+    for (int far = 0; far < 2; far++) {
+        char *path = path_of("strays.xyz");
+        FILE *f = fopen(path, "wb");
+        for (int i = 0; i < 5000; i++) {
+            double r = 0.5 + 40.0 * pow(i / 5000.0, 8);
+            fprintf(f, "%.4f %.4f %.4f\n", 600000 + r * cos(i), 5300000 + r * sin(i), 300 + 0.001 * (i % 7));
+        }
+        fprintf(f, far ? "0 0 0\n" : "600050 5300050 310\n");
+        assert_int_equal(fclose(f), 0);
+        const char *text = pack_two(path, NULL, false, NULL);
+        assert_true(!strstr(text, "strays") == !far);
+        assert_true(!far || strstr(text, "nearly all points lie between 5999"));
+    }
+}
+
+/* A header that counts less than there is, as of a writer that was stopped. */
+static void test_uncounted_points(void **state)
+{
+    (void)state;
+    const char *text = pack_two(write_las("stopped.las", &(struct las){.scale = 0.001, .red = 1, .count = 200, .uncounted = 80}),
+                                NULL, false, NULL);
+    assert_non_null(strstr(text, "in stopped.las: 80 more could lie there and are not read"));
+    assert_string_equal(pack_two(write_las("padded.las", &(struct las){.scale = 0.001, .red = 1, .count = 201, .uncounted = 1}),
+                                 NULL, false, NULL),
+                        "");
+}
+
 enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */
 
 /* Points in chunks of 10000, their red 7 but for `high` at one; the table's offset beyond the file or not. */
@@ -522,7 +555,7 @@ int main(void)
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
-        cmocka_unit_test(test_coarse_floats),
+        cmocka_unit_test(test_coarse_floats), cmocka_unit_test(test_uncounted_points), cmocka_unit_test(test_strays),
         cmocka_unit_test(test_brighter_than_the_first),
         cmocka_unit_test(test_a_part_of_the_points),
     };
