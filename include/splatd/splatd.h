@@ -5,6 +5,7 @@
 #include <splatd/api.h>
 #include <splatd/camera.h>
 #include <splatd/cancel.h>
+#include <splatd/collect.h>
 #include <splatd/color.h>
 #include <splatd/dataset.h>
 #include <splatd/error.h>

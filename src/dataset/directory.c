@@ -90,3 +90,8 @@ uint64_t spl_dataset_get_page_end(const struct spl_dataset *dataset, uint32_t pa
     spl_assert(page < dataset->info.pages);
     return dataset->rows[page + 1].first_node;
 }
+
+const struct spl_page_row *spl_dataset_get_page_rows(const struct spl_dataset *dataset)
+{
+    return dataset->rows;
+}

@@ -54,6 +54,9 @@ uint32_t spl_dataset_find_page_of_id(const struct spl_dataset *dataset, uint64_t
 /* The node behind the last one of a page. */
 uint64_t spl_dataset_get_page_end(const struct spl_dataset *dataset, uint32_t page);
 
+/* Where each page's nodes, chunks and ids begin: a row of each page, and one that closes them. Borrowed until close. */
+const struct spl_page_row *spl_dataset_get_page_rows(const struct spl_dataset *dataset);
+
 /* Words that the first `streams` streams of chunk `chunk` of the page take behind its own. */
 static inline uint32_t spl_tables_get_stream_words(const struct spl_tables *tables, uint32_t streams, uint32_t chunk)
 {

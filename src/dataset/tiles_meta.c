@@ -202,6 +202,7 @@ int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err)
     if (dataset->textures || dataset->maps)
         return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: a collection has neither textures nor maps of its own",
                               dataset->name);
+    info->points = info->leaf_splats = info->panel_points = info->mesh_points = 0; /* its leaves are none any more */
     int rc = allocate(dataset, json, &sums, err);
     for (size_t i = 0; !rc && i < json_array_size(json); i++)
         rc = add_tile(dataset, i, json_array_get(json, i), &sums, err);

@@ -204,7 +204,8 @@ static uint32_t put_linear_first(struct spl_node_encoder *w, const struct spl_tr
     uint32_t linear = 0;
     for (uint32_t i = 0; i < count; i++) {
         const struct spl_cut item = w->items[i];
-        if (node->child_count ? !node->splats[item.index].linear : !p->linear || !p->linear[node->begin + item.index])
+        if (spl_tree_node_has_points(node) ? !p->linear || !p->linear[node->begin + item.index]
+                                           : !node->splats[item.index].linear)
             continue;
         w->items[i] = w->items[linear];
         w->items[linear++] = item;
@@ -228,10 +229,10 @@ static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node 
         const uint32_t used = end - first < SPL_CHUNK_SPLATS ? end - first : SPL_CHUNK_SPLATS, c = out->chunk_count++;
         for (uint32_t i = 0; i < used; i++) {
             uint32_t at = w->items[first + i].index;
-            if (node->child_count)
-                load_inner(node, at, &splats[i], position[i]);
-            else
+            if (spl_tree_node_has_points(node))
                 load_leaf(w->points, node, at, &splats[i], position[i]);
+            else
+                load_inner(node, at, &splats[i], position[i]);
         }
         if (w->points->no_surface)
             level_radii(splats, used);
@@ -252,7 +253,7 @@ bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *nod
                      struct spl_encoded_node *out)
 {
     const struct spl_points *p = w->points;
-    bool leaf = !node->child_count;
+    bool leaf = spl_tree_node_has_points(node);
     uint32_t count = node->splat_count;
     for (int c = 0; c < 3; c++) {
         header->box_min[c] = INFINITY;

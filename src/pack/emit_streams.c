@@ -94,8 +94,8 @@ static void take_attribute(const struct attribute *attribute, const struct spl_p
                            double *values)
 {
     for (uint32_t i = 0; i < count; i++)
-        values[i] = node->child_count ? attribute->of_inner(&node->splats[items[i].index])
-                                      : attribute->of_point(points, node->begin + items[i].index);
+        values[i] = spl_tree_node_has_points(node) ? attribute->of_point(points, node->begin + items[i].index)
+                                                   : attribute->of_inner(&node->splats[items[i].index]);
 }
 
 /* The `s`-th of `scalars` that the points have. */
@@ -103,8 +103,8 @@ static void take_scalar(const struct spl_scalar_values *scalar, uint32_t s, uint
                         const struct spl_tree_node *node, const struct spl_cut *items, uint32_t count, double *values)
 {
     for (uint32_t i = 0; i < count; i++)
-        values[i] = node->child_count ? node->numbers[(size_t)items[i].index * scalars + s]
-                                      : spl_scalar_number(scalar, node->begin + items[i].index);
+        values[i] = spl_tree_node_has_points(node) ? spl_scalar_number(scalar, node->begin + items[i].index)
+                                                   : node->numbers[(size_t)items[i].index * scalars + s];
 }
 
 uint32_t spl_emitted_streams_encode(const struct spl_emitted_streams *streams, const struct spl_points *points,

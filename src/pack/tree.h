@@ -30,6 +30,12 @@ struct spl_tree_node {
     struct spl_node_panels *panels; /* made by spl_panels_make_leaves() and spl_levels_build(); NULL = none */
 };
 
+/* Are its splats points? A node of clusters whose children are left out of a file is a leaf there with clusters. */
+static inline bool spl_tree_node_has_points(const struct spl_tree_node *node)
+{
+    return !node->child_count && !node->splats;
+}
+
 struct spl_tree {
     struct spl_spill *spill;     /* where splats and numbers lie: the points' */
     struct spl_tree_node *nodes; /* breadth first, siblings consecutive */

@@ -24,7 +24,7 @@ def check(arguments, code, where):
 
 overview = check(["--help"], 0, "stdout")
 commands = re.findall(r"^  ([a-z]+) {2,}\S", overview, re.MULTILINE)
-if sorted(commands) != sorted("serve pack render tour info synth bench compare devices sign plan".split()):
+if sorted(commands) != sorted("serve pack collect render tour info synth bench compare devices sign plan".split()):
     wrong.append(f"splatd --help lists {commands}")
 for command in commands:
     text = check([command, "--help"], 0, "stdout")
@@ -38,7 +38,8 @@ for command in commands:
 # What is missing is named, beside an example that has it.
 for words, wanted in {
     "serve": r"NAME\.spld.*: splatd serve \S+\.spld", "pack": r"one scan: splatd pack \S+ -o \S+\.spld",
-    "pack a.ply": r"-o NAME\.spld", "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
+    "pack a.ply": r"-o NAME\.spld", "collect": r"one dataset: splatd collect \S+ -o \S+\.spld", "collect a.spld": r"-o NAME\.spld",
+    "collect a.spld -o b.ply": r"-o NAME\.spld, not 'b\.ply'", "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
     "render a.spld b.spld -o c.png": "takes one dataset", "tour": r"one dataset: splatd tour \S+ --path \S+ -o \S+",
     "tour a.spld -o b.mp4": "--path FILE", "tour a.spld --path b.json": r"-o OUT\.mp4",
     "info": r"one dataset: splatd info \S+\.spld", "synth": r"one SCENE: splatd synth \S+ -o \S+", "synth courtyard": "-o DIR",

@@ -204,7 +204,7 @@ static void test_one_dataset(void **state)
     const struct spl_dataset_info *info = spl_dataset_get_info(city);
     const struct spl_tables *own = spl_dataset_get_tables(city, 0);
     uint32_t page = 1;
-    uint64_t node = own->node_count, id = 0, points = own_splats, linear = 0;
+    uint64_t node = own->node_count, id = 0, points = 0, linear = 0;
     for (uint32_t c = 0; c < own->chunk_count; c++)
         id += own->chunks[c].count;
     assert_int_equal(info->tiles, tile_count);

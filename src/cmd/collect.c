@@ -1,0 +1,111 @@
+/* splatd collect: tiles in, a dataset of all of them out. On SIGINT and SIGTERM the temporary file is removed in the
+ * handler; the target is never touched before the library's last rename. */
+#include "cmd/cmd.h"
+
+#include <getopt.h>
+#include <signal.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <splatd/collect.h>
+
+#include "cmd/output.h"
+#include "cmd/progress.h"
+#include "cmd/table.h"
+#include "dataset/dataset.h"
+
+static char part_path[4096];
+
+static void remove_part(int signal_number)
+{
+    unlink(part_path);
+    signal(signal_number, SIG_DFL);
+    raise(signal_number);
+}
+
+static void catch_signals(const char *output)
+{
+    int length = snprintf(part_path, sizeof part_path, "%s.part-%ld", output, (long)getpid());
+    if (length < 0 || (size_t)length >= sizeof part_path)
+        return;
+    struct sigaction action = {.sa_handler = remove_part, .sa_flags = (int)SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, &action, NULL);
+    sigaction(SIGPIPE, &action, NULL); /* of who reads the progress */
+    signal(SIGXFSZ, SIG_IGN);          /* a file at its limit is an error like a full disk */
+}
+
+static const struct spl_cmd_option options[] = {
+    {"output", "NAME.spld", "in the folder of the tiles; replaced in one step when everything has been written",
+     .letter = 'o', SPL_CMD_TEXT(struct spl_collect_options, output)},
+    {"title", "TEXT", "what people call it, a line", SPL_CMD_TEXT(struct spl_collect_options, title)},
+    {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct spl_collect_options, description)},
+    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct spl_collect_options, threads, 1, 64)},
+};
+
+static const struct spl_cmd_table table = {
+    .command = "collect",
+    .before =
+        "usage: splatd collect TILE.spld... -o NAME.spld [--title TEXT] [--description TEXT] [--threads N]\n\n"
+        "Puts datasets of neighbouring tiles together as one, to serve and to render as a whole. Nothing is packed\n"
+        "again: NAME.spld holds what is seen from afar, a few MB, and names the tiles, which hold all that is finer\n"
+        "and stay where they are, in the same folder. A tile that changes later needs the collection made anew.\n"
+        "TILE is a dataset, a folder (all NAME.spld in it) or @LIST, a text with a path a line, relative to its own\n"
+        "folder (those with # in front are comments); up to 10,000 tiles. They have one unit, coordinate system and\n"
+        "list of attributes, and neither textures nor maps of stations.\n\n"
+        "Tiles of a survey packed each on its own, and one city of them:\n"
+        "  for tile in las/*.laz; do splatd pack $tile --keep intensity -o city/$(basename $tile .laz).spld; done\n"
+        "  splatd collect city -o city/city.spld --title 'The city'\n"
+        "Some of the tiles, by name, and what the collection is:\n"
+        "  splatd collect city/north.spld city/south.spld -o city/both.spld && splatd info city/both.spld\n"
+        "From a list of their names:\n"
+        "  splatd collect @city/tiles.txt -o city/city.spld\n\n",
+    .after = "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
+             "where all points have the same value too. Progress and the summary go to stderr.\n",
+    .options = options,
+    .count = sizeof options / sizeof *options,
+};
+
+static int print_summary(const char *output, struct spl_error *err)
+{
+    struct spl_dataset *dataset;
+    int rc = spl_dataset_open(output, false, &dataset, err);
+    if (rc)
+        return rc;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    size_t tiles = json_array_size(json_object_get(spl_dataset_get_meta(dataset), "tiles"));
+    spl_cmd_put_text(stderr, output, 0);
+    fprintf(stderr, ": a collection of %zu tile%s, version %016llx, %.2f MB\n", tiles, tiles == 1 ? "" : "s",
+            (unsigned long long)info->version, (double)info->file_bytes / 1e6);
+    spl_dataset_close(dataset);
+    return SPL_OK;
+}
+
+int spl_cmd_collect(int argc, char **argv)
+{
+    struct spl_cmd_progress progress = {0};
+    struct spl_collect_options o = {
+        .size = sizeof o, .progress = spl_cmd_progress, .progress_context = &progress};
+    struct spl_error err = {0};
+    int rc = spl_cmd_table_parse(&table, argc, argv, &o, &err);
+    if (rc == SPL_CMD_DONE)
+        return 0;
+    o.inputs = (const char *const *)&argv[optind];
+    o.input_count = (size_t)(argc - optind);
+    if (!rc && !o.input_count)
+        rc = spl_fail(&err, SPL_E_USAGE,
+                      "collect takes at least one dataset: splatd collect city -o city/city.spld");
+    if (!rc && !o.output)
+        rc = spl_fail(&err, SPL_E_USAGE, "collect needs a file to write to: -o NAME.spld");
+    if (!rc)
+        rc = spl_cmd_check_ending("-o", o.output, "spld", &err);
+    if (rc)
+        return spl_cmd_fail(&err);
+    catch_signals(o.output);
+    rc = spl_collect(&o, &err);
+    spl_cmd_progress_finish(&progress);
+    if (!rc)
+        rc = print_summary(o.output, &err);
+    return rc ? spl_cmd_fail(&err) : 0;
+}

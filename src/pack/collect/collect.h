@@ -1,0 +1,74 @@
+/* A collection while it is made: its tiles, what all of them must have alike, and their roots' splats as points. */
+#ifndef SPL_PACK_COLLECT_COLLECT_H
+#define SPL_PACK_COLLECT_COLLECT_H
+
+#include <jansson.h>
+
+#include <splatd/collect.h>
+
+#include "cloud/keep.h"
+#include "dataset/dataset.h"
+#include "pack/points.h"
+#include "pack/stage.h"
+#include "pack/tree.h"
+
+struct spl_collect_tile {
+    char *path;       // owned
+    const char *name; /* of `path`: the file's, in its folder */
+    uint64_t version;
+    double origin[3], bounds[2][3]; /* of the root's cube; least and most of its points */
+    float size;
+    size_t begin, end; /* its root's splats among the points */
+    json_t *entry;     // owned; its object in META, but for "node"
+};
+
+/* An attribute as the tiles have it, and where struct spl_points keeps it. */
+struct spl_collect_stream {
+    char name[SPL_STREAM_TEXT_MAX], type[SPL_STREAM_TEXT_MAX], unit[SPL_STREAM_TEXT_MAX];
+    double first, steps_a_unit; /* of type steps, else 0 */
+    int scalar;                 /* of struct spl_points; negative: -1 - SPL_STREAM_CLASS, … */
+};
+
+struct spl_collect {
+    const struct spl_collect_options *options;
+    struct spl_stage *stage;
+    struct spl_collect_tile *tiles; /* by name; by place once they are grouped */
+    size_t count, capacity;
+
+    /* As the first tile has it, by name, and therefore all. */
+    char *first; // owned: its name
+    char unit[SPL_STREAM_TEXT_MAX];
+    json_t *crs, *up; // owned; may be NULL
+    double up_vector[3];
+    bool has_surface;
+    struct spl_collect_stream streams[SPL_STREAMS_MAX];
+    uint32_t stream_count;
+    struct spl_keep keep;
+
+    bool has_sides; /* of every tile */
+    double bounds[2][3];
+    struct spl_points points;
+};
+
+/* Fills the tiles' names from the options, sorted by name, none twice, all in the output's folder (find.c). */
+int spl_collect_find(struct spl_collect *c, struct spl_error *err);
+
+/* Takes the attributes of the first tile, or holds those of another against them (streams.c). Only names that the packer
+ * writes, in its order, can be written again. */
+int spl_collect_take_streams(struct spl_collect *c, const struct spl_dataset *dataset, const char *name,
+                             struct spl_error *err);
+
+/* Opens the tile, holds it against the first, and adds its root's splats to the points (read.c). */
+int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struct spl_error *err);
+
+/* Sorts the tiles by place, and makes the tree: of each tile a leaf with its points below a node of its own, which lie
+ * in the order of the tiles; *first is the number of the first of these nodes, *inner of the first leaf (group.c). */
+int spl_collect_group(struct spl_collect *c, struct spl_tree *tree, uint32_t *first, uint32_t *inner,
+                      struct spl_error *err);
+
+/* META, once the tree has its levels; NULL: no memory (describe.c). */
+struct spl_default_view;
+json_t *spl_collect_describe(const struct spl_collect *c, const struct spl_tree *tree, uint32_t first,
+                             const struct spl_default_view *view);
+
+#endif
