@@ -1,0 +1,144 @@
+"""Collections over HTTP: one id, whose views are those of the same points in one dataset, to what packing them apart changes;
+picks say which tile; a tile that is replaced is told by name until the collection is made anew, and the others are served."""
+import pathlib
+import random
+import struct
+import subprocess
+import tempfile
+import time
+import zlib
+
+from harness import REAL, Daemon, run
+
+SIDE, STEP = 40, 0.5  # metres of a tile, points apart
+VIEW = "width=160&height=120&up=0,0,1&fov=60&format=png"
+WHOLE = "eye=40,-30,60&target=40,40,0"  # all four tiles
+NEAR = "eye=15,10,6&target=20,20,0"  # in the first
+
+
+def height(x, y):
+    return 3 * (x % 20 > 10) + 0.02 * y
+
+
+def write_tile(path, x0, y0, seed):
+    points = []
+    noise = random.Random(seed)
+    for i in range(int(SIDE / STEP)):
+        for j in range(int(SIDE / STEP)):
+            x, y = x0 + (i + 0.5) * STEP, y0 + (j + 0.5) * STEP
+            points.append(struct.pack("<dddBBB", x, y, height(x, y) + noise.gauss(0, 0.005), int(3 * x) % 256, int(3 * y) % 256, 90))
+    path.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex %d\n" % len(points) + b"".join(
+        b"property double %c\n" % c for c in b"xyz") + b"".join(b"property uchar %s\n" % c for c in (b"red", b"green", b"blue")) +
+        b"end_header\n" + b"".join(points))
+    return path
+
+
+def splatd(*words):
+    done = subprocess.run([REAL, *map(str, words)], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def make(folder):
+    """Tiles, the collection of them, and all of their points in one dataset."""
+    scans = [write_tile(folder / f"{k}.ply", SIDE * (k % 2), SIDE * (k // 2), k) for k in range(4)]
+    (folder / "city").mkdir()
+    for k, scan in enumerate(scans):
+        splatd("pack", scan, "-o", folder / f"city/tile-{k}.spld")
+    splatd("collect", folder / "city", "-o", folder / "city/city.spld")
+    splatd("pack", *scans, "-o", folder / "whole.spld")
+    return scans
+
+
+def pixels(png):
+    """Rows of RGB of a PNG of 8 bits without interlacing."""
+    at, data = 8, b""
+    while at < len(png):
+        length, kind = struct.unpack(">I4s", png[at:at + 8])
+        if kind == b"IHDR":
+            width, rows, _, color = struct.unpack(">IIBB", png[at + 8:at + 18])
+        data += png[at + 8:at + 8 + length] if kind == b"IDAT" else b""
+        at += length + 12
+    size, data = {2: 3, 6: 4}[color], zlib.decompress(data)
+    before, out = bytearray(width * size), []
+    for row in range(rows):
+        start = row * (width * size + 1)
+        how, line = data[start], bytearray(data[start + 1:start + 1 + width * size])
+        for i, value in enumerate(line):
+            a, b = line[i - size] if i >= size else 0, before[i]
+            c = before[i - size] if i >= size else 0
+            near = min((abs(b - c), 0, a), (abs(a - c), 1, b), (abs(a + b - 2 * c), 2, c))[2]
+            line[i] = (value + (0, a, b, (a + b) // 2, near)[how]) & 255
+        before = line
+        out += [line[i * size:i * size + 3] for i in range(width)]
+    return out
+
+
+def difference(a, b):
+    """Mean over the pixels, of 255."""
+    a, b = pixels(a), pixels(b)
+    return sum(abs(x - y) for p, q in zip(a, b) for x, y in zip(p, q)) / (3 * len(a))
+
+
+def test_a_collection_is_one_dataset():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder)
+        with Daemon(REAL, datasets=[folder / "city/city.spld", folder / "whole.spld"]) as d:
+            about = d.ask("/v1/datasets/city").json()
+            whole = d.ask("/v1/datasets/whole").json()
+            assert about["tiles"] == 4 and whole["tiles"] is None
+            assert about["leaf_splats"] == whole["leaf_splats"] == 4 * int(SIDE / STEP)**2
+            assert all(abs(a - b) < 0.1 for end in ("min", "max") for a, b in zip(about["bounds"][end], whole["bounds"][end]))
+            for place in WHOLE, NEAR:
+                for more in "", "&lod=3", "&method=nearest", "&supersample=2":
+                    a, b = (d.ask(f"/v1/datasets/{name}/view?{VIEW}&{place}{more}") for name in ("city", "whole"))
+                    assert a.status == b.status == 200 and a.headers["Splatd-Complete"] == "true"
+                    assert difference(a.body, b.body) < 4, (place, more, difference(a.body, b.body))
+            for x, y in ((40, 60), (120, 60), (60, 20), (110, 25)):
+                a, b = (d.ask(f"/v1/datasets/{name}/pick?{VIEW.replace('&format=png', '')}&{WHOLE}&lod=0&x={x}&y={y}").json()
+                        for name in ("city", "whole"))
+                assert (a["position"] is None) == (b["position"] is None)
+                if a["position"]:
+                    assert all(abs(p - q) < 0.3 for p, q in zip(a["position"], b["position"])), (a, b)
+                    tile = (a["position"][0] > SIDE) + 2 * (a["position"][1] > SIDE)
+                    assert a["tile"] == f"tile-{tile}.spld" and "tile" not in b, a
+
+
+def test_pages_come_and_go():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder)
+        with Daemon(REAL, datasets=[folder / "city/city.spld"]) as d:
+            whole = d.ask(f"/v1/datasets/city/view?{VIEW}&{WHOLE}").body
+        with Daemon(REAL, "--tables", "30000", datasets=[folder / "city/city.spld"]) as d:
+            for _ in range(2):
+                again = d.ask(f"/v1/datasets/city/view?{VIEW}&{WHOLE}&near=0.0501")
+                near = d.ask(f"/v1/datasets/city/view?{VIEW}&{NEAR}&near=0.0501")
+                assert again.status == near.status == 200
+            reply = d.ask(f"/v1/datasets/city/view?{VIEW}&{WHOLE}")
+            assert reply.headers["Splatd-Complete"] == "false" or reply.body == whole
+
+
+def test_a_tile_that_is_replaced():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        scans = make(folder)
+        write_tile(scans[3], SIDE, SIDE, 77)
+        splatd("pack", scans[3], "-o", folder / "city/tile-3.spld")
+        with Daemon(REAL, datasets=[folder / "city"]) as d:
+            assert d.ask(f"/v1/datasets/city/view?{VIEW}&{NEAR}&far=20").status == 200
+            above = f"/v1/datasets/city/view?{VIEW.replace('up=0,0,1', 'up=1,0,0')}&eye=60,60,20&target=60,60,0.5"
+            bad = d.ask(above)
+            assert bad.status == 500 and "tile-3.spld is another one now" in bad.json()["detail"], bad.body
+            assert d.ask(f"/v1/datasets/tile-3/view?{VIEW}&{WHOLE}").status == 200
+            splatd("collect", folder / "city", "-o", folder / "city/city.spld")
+            for _ in range(100):
+                if d.ask(above).status == 200:
+                    break
+                time.sleep(0.1)
+            else:
+                raise AssertionError("the new collection is not served")
+
+
+run(globals())
