@@ -20,6 +20,8 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "support/folder.h"
+#include "support/make_maps.h"
+#include "support/make_textures.h"
 #include "support/sanitised.h"
 
 enum { tiles = 11, points = 9000, side = 10 }; /* 11 of them are two levels above the tiles' own */
@@ -376,7 +378,21 @@ static void test_what_is_no_city_is_refused(void **state)
         pack_tile(2, "other.spld", &others[i].how, others[i].fractions);
         refuse(SPL_E_INPUT, "a.spld", "other.spld", others[i].says);
     }
+    pack_tile(4, "steps.spld", &(struct spl_pack_options){0}, true); /* the same steps, from another first */
+    refuse(SPL_E_INPUT, "other.spld", "steps.spld", "steps.spld: attribute \"intensity\" (steps from 40025 in 100 a unit)");
+    unlink(in_folder("steps.spld"));
     unlink(in_folder("other.spld"));
+    struct spl_dataset *plain = open_dataset("a.spld");
+    struct spl_dictionary dictionary = make_dictionary(16, 8, 3);
+    struct make_maps maps = make_maps(plain, 2, 5);
+    make_textured_file(plain, &dictionary, 2, 7, in_folder("b.spld"));
+    refuse(SPL_E_INPUT, "a.spld", "b.spld", "b.spld: it has textures (16 atoms)");
+    make_mapped_file(plain, &maps, in_folder("b.spld"));
+    refuse(SPL_E_INPUT, "a.spld", "b.spld", "b.spld: it has maps of 2 stations");
+    unlink(in_folder("b.spld"));
+    spl_dictionary_finish(&dictionary);
+    free_maps(&maps);
+    spl_dataset_close(plain);
     refuse(SPL_E_INPUT, "a.spld", tile_name(1), "a.spld and tile-01.spld are the same dataset (version");
     refuse(SPL_E_USAGE, "a.spld", "a.spld", "a.spld is named twice");
     refuse(SPL_E_INPUT, "a.spld", "city.spld", "city.spld: it is a collection itself");
