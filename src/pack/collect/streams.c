@@ -35,7 +35,8 @@ static bool is_same(const struct spl_collect_stream *a, const struct spl_stream 
 static void advise(const char *name, bool lacks, char *out, size_t size)
 {
     if (!strcmp(name, spl_streams_known[SPL_STREAM_CLASS].name))
-        snprintf(out, size, "scans with classes and scans without are collected apart");
+        snprintf(out, size, "--keep none without class leaves classes out; tiles whose scans have none are collected "
+                            "apart");
     else if (lacks)
         snprintf(out, size, "pack the one without it again with --keep %s, which keeps it where all points have the "
                             "same too, or all of them without it: --keep none and the names of the others", name);
