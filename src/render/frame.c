@@ -326,10 +326,10 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
 {
     struct spl_gpu *gpu = tile->renderer->gpu;
     uint64_t ticket;
+    spl_kernels_begin(&tile->renderer->kernels, gpu, tile->camera.projection == SPL_ORTHOGRAPHIC);
     int rc = spl_gpu_begin(gpu, err);
     if (rc)
         return rc;
-    tile->renderer->kernels.parallel = tile->camera.projection == SPL_ORTHOGRAPHIC;
     if (tile->paint)
         spl_paint_see(tile->paint, &tile->camera, spl_gpu_buffer_map(tile->renderer->scratch.palette));
     rc = record(tile, err);

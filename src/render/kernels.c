@@ -1,5 +1,5 @@
-/* Kernels by name and constants. A few dozen are ever made, so a walk over them costs less than recording the dispatch
- * that asked. Belongs to the renderer's thread. */
+/* Kernels by name and constants. So few are kept that a walk over them costs less than recording the dispatch that asked.
+ * Belongs to the renderer's thread. */
 #include "render/kernels.h"
 
 #include <stdio.h>
@@ -11,6 +11,7 @@
 struct spl_kernel_made {
     struct spl_kernel_key key;
     struct spl_gpu_kernel *kernel;
+    uint64_t used; /* turn in which it was got last */
 };
 
 static bool is_same(const struct spl_kernel_key *a, const struct spl_kernel_key *b)
@@ -29,6 +30,24 @@ static int make(struct spl_gpu *gpu, const struct spl_kernel_key *key, struct sp
     return spl_gpu_kernel_create(gpu, name, key->constants, SPL_KERNEL_CONSTANTS, out, err);
 }
 
+static void drop_oldest(struct spl_kernels *kernels, struct spl_gpu *gpu)
+{
+    size_t oldest = 0;
+    for (size_t i = 1; i < kernels->count; i++)
+        oldest = kernels->made[i].used < kernels->made[oldest].used ? i : oldest;
+    spl_gpu_kernel_destroy(gpu, kernels->made[oldest].kernel);
+    kernels->made[oldest] = kernels->made[--kernels->count];
+}
+
+void spl_kernels_begin(struct spl_kernels *kernels, struct spl_gpu *gpu, bool parallel)
+{
+    kernels->parallel = parallel;
+    kernels->turn++;
+    if (kernels->count > SPL_KERNELS_MOST)
+        while (kernels->count > SPL_KERNELS_KEPT)
+            drop_oldest(kernels, gpu);
+}
+
 int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const struct spl_kernel_key *wanted,
                     struct spl_gpu_kernel **out, struct spl_error *err)
 {
@@ -37,6 +56,7 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
     for (size_t i = 0; i < kernels->count; i++) {
         if (is_same(&kernels->made[i].key, key)) {
             *out = kernels->made[i].kernel;
+            kernels->made[i].used = kernels->turn;
             return SPL_OK;
         }
     }
@@ -44,7 +64,7 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
         return SPL_E_NOMEM;
     int rc = make(gpu, key, out, err);
     if (!rc)
-        kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out};
+        kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out, kernels->turn};
     return rc;
 }
 

@@ -1,5 +1,6 @@
-/* The renderer's kernels, made when first used and kept: a name and constants name one. Everything belongs to the
- * renderer's thread. */
+/* The renderer's kernels, made when first used and kept while they are: a name and constants name one. Views differ in
+ * constants in thousands of ways, and a software driver takes megabytes a kernel, which no memory limit sees: of more than
+ * SPL_KERNELS_MOST those go that were used longest ago. Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_KERNELS_H
 #define SPL_RENDER_KERNELS_H
 
@@ -23,10 +24,17 @@ struct spl_kernel_key {
 struct spl_kernels {
     struct spl_kernel_made *made;
     size_t count, capacity;
+    uint64_t turn; /* the tile's that is recorded: when a kernel was used */
     bool parallel; /* the frame's rays are: what is got is made so */
 };
 
-/* Gets or makes the kernel of `key`; it lives until finish. SPL_E_NOMEM, and as spl_gpu_kernel_create(). */
+enum { SPL_KERNELS_MOST = 128, SPL_KERNELS_KEPT = 96 };
+
+/* A tile is about to be recorded, and nothing that was recorded before is under way: what was got before is to be got
+ * again. */
+void spl_kernels_begin(struct spl_kernels *kernels, struct spl_gpu *gpu, bool parallel);
+
+/* Gets or makes the kernel of `key`; it lives until begin or finish. SPL_E_NOMEM, and as spl_gpu_kernel_create(). */
 int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const struct spl_kernel_key *key,
                     struct spl_gpu_kernel **out, struct spl_error *err);
 void spl_kernels_finish(struct spl_kernels *kernels, struct spl_gpu *gpu);
