@@ -86,6 +86,11 @@ size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t in
  * blocks on disk. What a daemon reads pages with. */
 int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, void *out, struct spl_error *err);
 
+/* Reads `count` words of page `page` from its word `word` on, which it has, wherever the page lies, without
+ * its checksum. SPL_E_CORRUPT as of read_page. Any thread; blocks on disk. */
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err);
+
 /* Textures; see dictionary.h, texture.h. `dictionary` has count 0 where the dataset has none. */
 const struct spl_dictionary *spl_dataset_get_dictionary(const struct spl_dataset *dataset);
 

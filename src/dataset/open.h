@@ -119,10 +119,6 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
                                  uint64_t *bytes);
 
-/* Reads `count` words of page `page` from its word `word` on, which it has, wherever the page lies. */
-int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
-                           struct spl_error *err);
-
 /* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held
  * against theirs whenever they are read; fills everything up to `textures` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);

@@ -188,20 +188,27 @@ static void put_values(struct spl_collect *c, uint32_t s, const double *values, 
 }
 
 static int take_chunk(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_dataset *dataset,
-                      const struct spl_tables *tables, uint32_t index, const uint32_t *page, struct spl_error *err)
+                      const struct spl_tables *tables, uint32_t index, struct spl_error *err)
 {
-    const struct spl_chunk *chunk = &tables->chunks[index];
-    const uint32_t *words = page + chunk->geometry_word + spl_chunk_words(chunk);
+    uint32_t read[SPL_CHUNK_WORDS_MAX + SPL_STREAMS_MAX * SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
+    struct spl_chunk own = tables->chunks[index], *chunk = &own;
+    const size_t all = spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, tables->stream_count, index) +
+                       SPL_PAGE_TAIL_WORDS; /* which the page has */
+    const uint32_t *words = read + spl_chunk_words(chunk);
+    spl_assert(all <= sizeof read / sizeof *read);
     const struct spl_node *root = tables->nodes;
     struct spl_points *p = &c->points;
     uint32_t count;
     const struct spl_stream *streams = spl_dataset_get_streams(dataset, &count);
-    int rc = reserve(c, chunk->count, err);
+    int rc = spl_dataset_read_words(dataset, 0, chunk->geometry_word, read, all, err);
+    chunk->geometry_word = 0;
+    if (!rc)
+        rc = reserve(c, chunk->count, err);
     for (uint32_t i = 0; i < chunk->count && !rc; i++) {
         struct spl_splat splat;
         size_t at = p->count + i;
         double place[3];
-        spl_chunk_decode(chunk, page, i, &splat);
+        spl_chunk_decode(chunk, read, i, &splat);
         for (int a = 0; a < 3; a++)
             place[a] = p->axis[a][at] = root->origin[a] + (double)splat.position[a];
         if (!within(place) || !(splat.radius > 0 && (double)splat.radius <= most))
@@ -233,13 +240,11 @@ static int take_root(struct spl_collect *c, struct spl_collect_tile *tile, const
 {
     struct spl_tables *read = NULL;
     const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, 0, &read, err);
-    size_t bytes;
-    const uint32_t *page = tables ? spl_dataset_get_page(dataset, 0, &bytes) : NULL;
     int rc = tables ? SPL_OK : SPL_E_CORRUPT;
     tile->begin = c->points.count;
     for (uint32_t i = 0; !rc && i < tables->nodes[0].chunk_count; i++)
         if (spl_chunk_kind(&tables->chunks[i]) != SPL_CHUNK_LINES)
-            rc = take_chunk(c, tile, dataset, tables, i, page, err);
+            rc = take_chunk(c, tile, dataset, tables, i, err);
     tile->end = c->points.count;
     if (!rc) {
         memcpy(tile->origin, tables->nodes[0].origin, sizeof tile->origin);
