@@ -144,10 +144,11 @@ int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, 
                           struct spl_error *err)
 {
     struct spl_tables *read = NULL;
-    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, 0, &read, err);
+    struct spl_error why = {0};
+    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, 0, &read, &why);
     size_t bytes;
     const uint32_t *page = tables ? spl_dataset_get_page(dataset, 0, &bytes) : NULL;
-    int rc = tables ? SPL_OK : SPL_E_CORRUPT;
+    int rc = tables ? SPL_OK : spl_fail_field(err, why.code, why.field, "%s", why.message);
     tile->begin = c->points.count;
     tile->first_vertex = c->wires.count;
     for (uint32_t i = 0; !rc && i < tables->nodes[0].chunk_count; i++)
