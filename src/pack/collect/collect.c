@@ -85,7 +85,6 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
 {
     struct spl_default_view view;
     struct spl_chunk_options chunk;
-    struct spl_wires wires = {0};
     double unit_m = 0;
     unsigned neighbours;
     spl_unit_parse(c->unit, &unit_m);
@@ -101,7 +100,7 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     if (!rc)
         rc = check_meta(c, meta, err);
     if (!rc)
-        rc = spl_emit(tree, &c->points, &wires, &chunk, writer, c->stage, emitted, err);
+        rc = spl_emit(tree, &c->points, &c->wires, &chunk, writer, c->stage, emitted, err);
     if (!rc) {
         spl_stage_begin(c->stage, "writing", NULL, 0);
         rc = spl_dataset_writer_finish(writer, emitted->nodes, tree->count, emitted->chunks, emitted->chunk_count, meta,
@@ -123,6 +122,7 @@ static void finish(struct spl_collect *c)
     json_decref(c->crs);
     json_decref(c->up);
     spl_points_finish(&c->points);
+    spl_wires_finish(&c->wires);
 }
 
 static int collect(const struct spl_collect_options *options, struct spl_error *err)
@@ -152,6 +152,8 @@ static int collect(const struct spl_collect_options *options, struct spl_error *
         rc = spl_collect_group(&c, &tree, &first, &inner, err);
     if (!rc)
         rc = spl_levels_build(&tree, &c.points, &stage, err);
+    if (!rc)
+        rc = spl_collect_place_lines(&c, &tree, first, inner, err);
     if (!rc) {
         leave_roots_out(&tree, first, inner);
         rc = write(&c, &tree, first, &said, writer, &emitted, err);

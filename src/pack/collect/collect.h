@@ -2,6 +2,8 @@
 #ifndef SPL_PACK_COLLECT_COLLECT_H
 #define SPL_PACK_COLLECT_COLLECT_H
 
+#include <math.h>
+
 #include <jansson.h>
 
 #include <splatd/collect.h>
@@ -11,6 +13,7 @@
 #include "pack/points.h"
 #include "pack/stage.h"
 #include "pack/tree.h"
+#include "pack/wires/wires.h"
 
 struct spl_collect_tile {
     char *path;       // owned
@@ -19,6 +22,7 @@ struct spl_collect_tile {
     double origin[3], bounds[2][3]; /* of the root's cube; least and most of its points */
     float size;
     size_t begin, end; /* its root's splats among the points */
+    size_t first_vertex, end_vertex; /* its root's lines among those of the wires */
     json_t *entry;     // owned; its object in META, but for "node"
 };
 
@@ -48,6 +52,7 @@ struct spl_collect {
     bool has_sides; /* of every tile */
     double bounds[2][3];
     struct spl_points points;
+    struct spl_wires wires;
 };
 
 /* Fills the tiles' names from the options, sorted by name, none twice, all in the output's folder (find.c). */
@@ -60,6 +65,25 @@ int spl_collect_take_streams(struct spl_collect *c, const struct spl_dataset *da
 
 /* Opens the tile, holds it against the first, and adds its root's splats to the points (read.c). */
 int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struct spl_error *err);
+
+#define SPL_COLLECT_MOST 1e15 /* of coordinates and lengths, as of a node's */
+
+static inline bool spl_collect_is_place(const double v[3])
+{
+    return fabs(v[0]) <= SPL_COLLECT_MOST && fabs(v[1]) <= SPL_COLLECT_MOST && fabs(v[2]) <= SPL_COLLECT_MOST;
+}
+
+/* The part of it that reads splats (splats.c). */
+int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, const struct spl_dataset *dataset,
+                          struct spl_error *err);
+
+/* Adds a chunk of lines of a tile whose root lies at `origin` to the wires (lines.c). */
+int spl_collect_take_lines(struct spl_collect *c, const struct spl_chunk *chunk, const double origin[3],
+                           const uint32_t *page, struct spl_error *err);
+
+/* Says which of them each node has; once levels are built, which need the nodes' points (lines.c). */
+int spl_collect_place_lines(struct spl_collect *c, struct spl_tree *tree, uint32_t first, uint32_t inner,
+                            struct spl_error *err);
 
 /* Sorts the tiles by place, and makes the tree: of each tile a leaf with its points below a node of its own, which lie
  * in the order of the tiles; *first is the number of the first of these nodes, *inner of the first leaf (group.c). */

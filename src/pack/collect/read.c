@@ -1,21 +1,11 @@
 /* One tile: opened, held against the first, its root's splats read, closed. Only the head of its first page is kept
- * meanwhile, and of its pages the words of the root's chunks alone are touched, so that a tile costs the same however
- * large it is. Panels and meshes are the splats that they are from afar; vertices of lines are left out, since the
- * splats that lines stand for are there too. The caller's thread. */
+ * meanwhile, so that a tile costs the same however large it is. The caller's thread. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "dataset/chunk.h"
 #include "pack/collect/collect.h"
-
-static const double most = 1e15; /* of coordinates and lengths, as in a node */
-
-static bool within(const double v[3])
-{
-    return fabs(v[0]) <= most && fabs(v[1]) <= most && fabs(v[2]) <= most;
-}
 
 /* What no collection has, whatever the other tiles are. */
 static int check(const struct spl_collect_tile *tile, const struct spl_dataset_info *info, const json_t *meta,
@@ -34,7 +24,7 @@ static int check(const struct spl_collect_tile *tile, const struct spl_dataset_i
                               "%.200s: it has maps of %u stations, which a collection has not; pack it with "
                               "--no-panoramas",
                               tile->path, info->maps);
-    if (!within(info->bounds_min) || !within(info->bounds_max))
+    if (!spl_collect_is_place(info->bounds_min) || !spl_collect_is_place(info->bounds_max))
         return spl_fail_field(err, SPL_E_INPUT, "inputs",
                               "%.200s: its bounds (x from %g to %g) are not finite; pack it again", tile->path,
                               info->bounds_min[0], info->bounds_max[0]);
@@ -137,125 +127,6 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
     return NULL;
 }
 
-/* Room for `more` points with all that the tiles have. */
-static int reserve(struct spl_collect *c, size_t more, struct spl_error *err)
-{
-    struct spl_points *p = &c->points;
-    size_t capacity = p->capacity + p->capacity / 2;
-    if (more > SPL_POINTS_MAX - p->count)
-        return spl_fail_field(err, SPL_E_LIMIT, "inputs", "the tiles' roots have more than %u splats; collect fewer",
-                              SPL_POINTS_MAX);
-    if (p->count + more <= p->capacity)
-        return SPL_OK;
-    capacity = capacity < p->count + more ? p->count + more : capacity;
-    struct {
-        void **at;
-        size_t size;
-    } arrays[] = {{(void **)&p->axis[0], sizeof **p->axis}, {(void **)&p->axis[1], sizeof **p->axis},
-                  {(void **)&p->axis[2], sizeof **p->axis}, {(void **)&p->color_class, sizeof *p->color_class},
-                  {(void **)&p->normal, sizeof *p->normal}, {(void **)&p->radius, sizeof *p->radius},
-                  {(void **)&p->linear, sizeof *p->linear}, {(void **)&p->uncertainty, sizeof *p->uncertainty}};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays + c->stream_count; i++) {
-        size_t s = i - sizeof arrays / sizeof *arrays;
-        bool attribute = i >= sizeof arrays / sizeof *arrays;
-        if (attribute && c->streams[s].scalar < 0)
-            continue;
-        void **at = attribute ? &p->scalar[c->streams[s].scalar].values : arrays[i].at;
-        void *larger = spl_spill_realloc(p->spill, *at, capacity + SPL_POINTS_PAD,
-                                         attribute ? sizeof(double) : arrays[i].size, err);
-        if (!larger)
-            return SPL_E_NOMEM;
-        *at = larger;
-    }
-    p->capacity = capacity;
-    return SPL_OK;
-}
-
-/* Of a chunk's splats `values`, what is number `s` among the attributes. */
-static void put_values(struct spl_collect *c, uint32_t s, const double *values, uint32_t count)
-{
-    struct spl_points *p = &c->points;
-    int scalar = c->streams[s].scalar;
-    for (uint32_t i = 0; i < count; i++) {
-        size_t at = p->count + i;
-        if (scalar == -1 - SPL_STREAM_CLASS)
-            p->color_class[at] |= (uint32_t)(values[i] >= 0 && values[i] <= 255 ? values[i] : 0) << 24;
-        else if (scalar < 0)
-            p->uncertainty[at] = (float)(values[i] >= 0 && values[i] <= most ? values[i] : 0);
-        else
-            ((double *)p->scalar[scalar].values)[at] = values[i];
-    }
-}
-
-static int take_chunk(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_dataset *dataset,
-                      const struct spl_tables *tables, uint32_t index, struct spl_error *err)
-{
-    uint32_t read[SPL_CHUNK_WORDS_MAX + SPL_STREAMS_MAX * SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
-    struct spl_chunk own = tables->chunks[index], *chunk = &own;
-    const size_t all = spl_chunk_words(chunk) + spl_tables_get_stream_words(tables, tables->stream_count, index) +
-                       SPL_PAGE_TAIL_WORDS; /* which the page has */
-    const uint32_t *words = read + spl_chunk_words(chunk);
-    spl_assert(all <= sizeof read / sizeof *read);
-    const struct spl_node *root = tables->nodes;
-    struct spl_points *p = &c->points;
-    uint32_t count;
-    const struct spl_stream *streams = spl_dataset_get_streams(dataset, &count);
-    int rc = spl_dataset_read_words(dataset, 0, chunk->geometry_word, read, all, err);
-    chunk->geometry_word = 0;
-    if (!rc)
-        rc = reserve(c, chunk->count, err);
-    for (uint32_t i = 0; i < chunk->count && !rc; i++) {
-        struct spl_splat splat;
-        size_t at = p->count + i;
-        double place[3];
-        spl_chunk_decode(chunk, read, i, &splat);
-        for (int a = 0; a < 3; a++)
-            place[a] = p->axis[a][at] = root->origin[a] + (double)splat.position[a];
-        if (!within(place) || !(splat.radius > 0 && (double)splat.radius <= most))
-            return spl_fail_field(err, SPL_E_CORRUPT, "inputs",
-                                  "%.200s: a splat of its root lies at x = %g with radius %g; pack it again",
-                                  tile->path, place[0], (double)splat.radius);
-        for (int a = 0; a < 3; a++)
-            p->normal[at][a] = c->has_surface ? splat.normal[a] : a == 2;
-        p->radius[at] = splat.radius;
-        p->uncertainty[at] = 0;
-        p->linear[at] = splat.linear;
-        p->color_class[at] =
-            (uint32_t)splat.color[0] | (uint32_t)splat.color[1] << 8 | (uint32_t)splat.color[2] << 16;
-    }
-    for (uint32_t s = 0; s < count && !rc; s++) {
-        const struct spl_stream_code code = {tables->base[s][index], tables->width[s][index]};
-        double values[SPL_CHUNK_SPLATS];
-        for (uint32_t i = 0; i < chunk->count; i++)
-            values[i] = spl_stream_decode(&streams[s], code, words, i);
-        put_values(c, s, values, chunk->count);
-        words += spl_stream_words(code.width, chunk->count);
-    }
-    p->count += rc ? 0 : chunk->count;
-    return rc;
-}
-
-static int take_root(struct spl_collect *c, struct spl_collect_tile *tile, const struct spl_dataset *dataset,
-                     struct spl_error *err)
-{
-    struct spl_tables *read = NULL;
-    const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, 0, &read, err);
-    int rc = tables ? SPL_OK : SPL_E_CORRUPT;
-    tile->begin = c->points.count;
-    for (uint32_t i = 0; !rc && i < tables->nodes[0].chunk_count; i++)
-        if (spl_chunk_kind(&tables->chunks[i]) != SPL_CHUNK_LINES)
-            rc = take_chunk(c, tile, dataset, tables, i, err);
-    tile->end = c->points.count;
-    if (!rc) {
-        memcpy(tile->origin, tables->nodes[0].origin, sizeof tile->origin);
-        tile->size = tables->nodes[0].size;
-    }
-    if (!rc && tile->end == tile->begin)
-        rc = spl_fail_field(err, SPL_E_INPUT, "inputs", "%.200s: its root has no splats; pack it again", tile->path);
-    free(read);
-    return rc;
-}
-
 int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struct spl_error *err)
 {
     const struct spl_dataset_opening how = {.tables_bytes = 1, .cancelled = c->stage->cancelled};
@@ -275,7 +146,7 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
     if (!rc && !c->first && !(c->first = strdup(tile->name)))
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the names of tiles");
     if (!rc)
-        rc = take_root(c, tile, dataset, err);
+        rc = spl_collect_take_root(c, tile, dataset, err);
     if (!rc && !(tile->entry = describe(tile, dataset)))
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing %.200s", tile->path);
     if (!rc) {

@@ -24,7 +24,7 @@
 #include "support/make_textures.h"
 #include "support/sanitised.h"
 
-enum { tiles = 11, points = 9000, side = 10 }; /* 11 of them are two levels above the tiles' own */
+enum { tiles = 11, points = 9000, on_wire = 1000, side = 10 }; /* 11 of them are two levels above the tiles' own */
 
 static const char *tile_name(int i)
 {
@@ -38,7 +38,7 @@ static uint8_t color_of(int tile, int channel)
     return (uint8_t)(20 + 20 * (channel == 1 ? tiles - tile : tile));
 }
 
-/* A square of ground with a step in it: one colour, one class; intensities around a hundred times the tile. */
+/* A square of ground with a step in it and a wire above: one colour, one class; intensities around a hundred times the tile. */
 static void write_scan(const char *path, int tile, bool fractions)
 {
     uint64_t random = (uint64_t)tile * 77 + 5;
@@ -48,9 +48,11 @@ static void write_scan(const char *path, int tile, bool fractions)
                "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar classification\n"
                "property double intensity\nend_header\n", points);
     for (int i = 0; i < points; i++) {
-        double x = side * uniform(&random), y = side * uniform(&random);
+        double x = side * uniform(&random), y = side * uniform(&random), z = 0.002 * uniform(&random);
+        z += i < on_wire ? 4 : x > side / 2 ? 1 : 0;
+        y = i < on_wire ? 3 + 0.001 * y : y;
         fprintf(f, "%.4f %.4f %.4f %d %d %d %d %.2f\n", 500000 + side * (tile % 4) + x, 5400000 + side * (tile / 4) + y,
-                0.002 * uniform(&random) + (x > side / 2 ? 1 : 0), color_of(tile, 0), color_of(tile, 1), 90, 2 + tile % 3,
+                z, color_of(tile, 0), color_of(tile, 1), 90, 2 + tile % 3,
                 100 * tile + i % 9 + (fractions ? 0.25 : 0));
     }
     assert_int_equal(fclose(f), 0);
@@ -132,35 +134,45 @@ static uint64_t number_of(const json_t *entry, const char *key)
     return (uint64_t)json_integer_value(json_object_get(entry, key));
 }
 
-/* Splats of the tile's leaf: where the tile is, with its colour and values. Returns how many. */
+/* Splats of the tile's leaf: where the tile is, with its colour and values. `cell`: how far those of panels stand over its
+ * edges. Returns how many. */
 static uint32_t check_leaf(const struct spl_dataset *city, const struct spl_tables *tables, const struct spl_node *leaf,
-                           const struct spl_dataset_info *tile, int number)
+                           const struct spl_dataset_info *tile, int number, double cell)
 {
-    uint32_t count = 0, streams;
+    uint32_t count = 0, pieces = 0, streams;
     size_t bytes;
     const uint32_t *page = spl_dataset_get_page(city, 0, &bytes);
     spl_dataset_get_streams(city, &streams);
     int class = spl_dataset_find_stream(city, "class"), intensity = spl_dataset_find_stream(city, "intensity");
     for (uint32_t c = 0; c < leaf->chunk_count; c++) {
         const struct spl_chunk *chunk = &tables->chunks[leaf->first_chunk + c];
-        assert_int_equal(spl_chunk_kind(chunk), SPL_CHUNK_DISCS);
-        for (uint32_t i = 0; i < chunk->count; i++, count++) {
+        bool lines = spl_chunk_kind(chunk) == SPL_CHUNK_LINES;
+        assert_true(lines || spl_chunk_kind(chunk) == SPL_CHUNK_DISCS);
+        pieces += spl_chunk_count_pieces(chunk);
+        for (uint32_t i = 0; i < chunk->count; i++) {
             struct spl_splat splat;
             double value;
             spl_chunk_decode(chunk, page, i, &splat);
+            if (lines)
+                assert_true(fabs(leaf->origin[2] + (double)splat.position[2] - 4) < 0.1);
             for (int a = 0; a < 3; a++) {
                 double at = leaf->origin[a] + (double)splat.position[a];
-                assert_true(at > tile->bounds_min[a] - 0.02 && at < tile->bounds_max[a] + 0.02);
+                if (!(at > tile->bounds_min[a] - 0.02 - cell && at < tile->bounds_max[a] + 0.02 + cell))
+                    fail_msg("%d: %.4f is not within %.4f, %.4f", a, at, tile->bounds_min[a], tile->bounds_max[a]);
             }
             for (int a = 0; a < 3; a++)
                 assert_in_range(splat.color[a] + 8, a == 2 ? 90 + 5 : color_of(number, a) + 5,
                                 a == 2 ? 90 + 11 : color_of(number, a) + 11);
+            if (lines)
+                continue;
+            count++;
             assert_true(spl_dataset_find_value(city, class, chunk->first_id + i, &value));
             assert_true(value == 2 + number % 3);
             assert_true(spl_dataset_find_value(city, intensity, chunk->first_id + i, &value));
             assert_true(value >= 100 * number && value <= 100 * number + 8);
         }
     }
+    assert_true(tile->pieces > 0 && pieces > 0);
     return count;
 }
 
@@ -247,8 +259,8 @@ static void test_a_tree_above_the_tiles(void **state)
         root.depth = 3;
         assert_null(spl_node_judge_child(&tables->nodes[node], &root));
         for (uint32_t c = 0; c < root.chunk_count; c++)
-            splats += chunks[c].count;
-        uint32_t own = check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), i);
+            splats += spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS ? chunks[c].count : 0;
+        uint32_t own = check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), i, 0);
         assert_in_range(own, splats / 6, splats / 3);
         assert_true(tables->nodes[node].spacing > 1.5f * root.spacing && tables->nodes[node].spacing < 3 * root.spacing);
         check_entry(entry, tile);
@@ -310,6 +322,19 @@ static void test_order_and_threads_change_nothing(void **state)
     unlink(in_folder("other.spld"));
 }
 
+static double get_cell(const struct spl_dataset *tile)
+{
+    uint64_t count;
+    float most = 0;
+    const struct spl_node *root = spl_dataset_get_nodes(tile, &count);
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(tile, &count);
+    for (uint32_t c = 0; c < root->chunk_count; c++)
+        if (spl_kind_has_panels(spl_chunk_kind(&chunks[c])))
+            most = fmaxf(most, chunks[c].step);
+    assert_true(most > 0);
+    return (double)most;
+}
+
 /* A single tile; bare points; panels, which are splats from afar. */
 static void test_other_kinds_of_tiles(void **state)
 {
@@ -332,7 +357,8 @@ static void test_other_kinds_of_tiles(void **state)
             assert_int_equal(spl_dataset_get_info(city)->has_surface, k != 1);
             assert_int_equal(tables->node_count, count == 1 ? 1 : 3);
             assert_int_equal(node, count == 1 ? 0 : 1); /* y weighs more than x: tile 8 comes later */
-            assert_true(check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), 3) > 0);
+            assert_true(check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), 3,
+                                   k == 2 ? 2 * get_cell(tile) : 0) > 0);
             check_streams(city, tile);
             free(read);
             spl_dataset_close(tile);
