@@ -192,7 +192,8 @@ SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
 
 /* The default view as a camera of the given size: the narrower the image, the wider its vertical field of view, so that
- * what the view shows is not cut. */
+ * what the view shows is not cut. Its near is splat_radius; an orthographic camera that is made of it may begin at the eye,
+ * near 0. */
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 

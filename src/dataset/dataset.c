@@ -404,15 +404,12 @@ int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t w
                                    struct spl_camera *camera, struct spl_error *err)
 {
     const struct spl_dataset_info *info = &dataset->info;
-    double square = 0;
-    for (int a = 0; a < 3; a++)
-        square += (info->bounds_max[a] - info->bounds_min[a]) * (info->bounds_max[a] - info->bounds_min[a]);
     double fov = info->default_fit[0] > 0 && width && height ? spl_fit_fov(info->default_fit, width, height)
                                                              : info->default_fov;
     int rc = spl_camera_set_fov(camera, fov, width, height, err);
     if (!rc)
         rc = spl_camera_look_at(camera, info->default_eye, info->default_target, info->default_up, err);
-    camera->near = fmax(1e-4 * sqrt(square), info->splat_radius);
+    camera->near = info->splat_radius; /* depths are floats, as exact however small it is */
     camera->far = INFINITY;
     return rc;
 }

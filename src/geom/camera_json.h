@@ -79,6 +79,7 @@ struct spl_camera_names {
 /* What stands in for parameters that were left out: the default view of a dataset. */
 struct spl_camera_defaults {
     double eye[3], target[3], up[3], fov, near, far;
+    double parallel_near; /* near of parallel rays; 0 = they begin at the eye */
     double view_height; /* of a view by its name that is orthographic; 0 = it is none */
     double fit[2]; /* degrees across and upright that an image of any shape shows; 0 = fov in all of them */
     const struct spl_camera_places *places; // may be NULL: nothing is known but the world
@@ -138,7 +139,7 @@ const char *spl_json_show_shape(const json_t *json, char text[40]);
 
 /* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
  * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up
- * is +z, near SPL_CAMERA_NEAR_DEFAULT, far infinite. The size is 1280x720 where it is left
+ * is +z, near SPL_CAMERA_NEAR_DEFAULT (0 of parallel rays), far infinite. The size is 1280x720 where it is left
  * out; one side that is left out follows from the other (geom/size.h). The outcome lies within
  * `limits` and has passed spl_camera_check(). */
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,

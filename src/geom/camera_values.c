@@ -248,7 +248,7 @@ static int resolve(const struct spl_value *values, const struct spl_camera_defau
         (rc = spl_camera_resolve_pose(values, defaults, camera, &distance, err)) ||
         (is_orthographic(values) && (rc = resolve_orthographic(values, defaults, camera, distance, err))))
         return rc;
-    camera->near = get(values, SPL_CAMERA_near, defaults->near);
+    camera->near = get(values, SPL_CAMERA_near, is_orthographic(values) ? defaults->parallel_near : defaults->near);
     camera->far = get(values, SPL_CAMERA_far, defaults->far);
     if (given(values, SPL_CAMERA_near) && !given(values, SPL_CAMERA_far) && camera->far <= camera->near)
         camera->far = INFINITY;

@@ -42,13 +42,16 @@ static void unpack_normal(uint32_t word, float out[3])
     out[2] = z * scale;
 }
 
-/* NaN, where there is nothing, stays. */
+/* NaN, where there is nothing, stays. A disc whose centre lies behind the near plane is drawn whole: what of it lies before
+ * the eye counts as at the eye. */
 static void add_advance(const struct spl_tile *tile, uint32_t layer, float *depths)
 {
     if (tile->advance == 0 || (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE))
         return;
-    for (uint32_t x = 0; x < tile->width; x++)
-        depths[x] = (float)((double)depths[x] + tile->advance);
+    for (uint32_t x = 0; x < tile->width; x++) {
+        double depth = (double)depths[x] + tile->advance;
+        depths[x] = depth < 0 ? 0 : (float)depth;
+    }
 }
 
 void spl_readback_tile(const struct spl_tile *tile, const uint32_t *words, struct spl_image images[SPL_LAYER_COUNT])

@@ -244,6 +244,72 @@ static void sections_and_picks_are_true(void **state)
     done(dataset);
 }
 
+/* A disc that the eye's plane cuts is drawn or not by its centre, and before the eye nothing is. */
+static void nothing_is_before_the_eye(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_cube(4000, origin, 0.06);
+    for (int i = 0; i < 2 * SPL_METHOD_COUNT; i++) {
+        struct spl_view view = parallel(1.5, 120, 90);
+        back_off(&view, -3);
+        view.camera.near = i % 2 ? 0.1 : 0;
+        view.method = (enum spl_method)(i / 2);
+        struct spl_frame frame = render(dataset, &view);
+        const float *depth = frame.images[SPL_LAYER_DEPTH].pixels, *range = frame.images[SPL_LAYER_RANGE].pixels;
+        size_t hits = 0, close = 0;
+        for (uint32_t k = 0; k < 120 * 90; k++) {
+            if (isnan(depth[k]))
+                continue;
+            hits++;
+            close += depth[k] < 0.05f;
+            if (!(depth[k] >= 0 && range[k] == depth[k]))
+                fail_msg("%s: depth %g, range %g", spl_method_name(view.method), (double)depth[k], (double)range[k]);
+        }
+        assert_true(hits > 1000 && (i % 2 || close > 20));
+        spl_frame_finish(&frame);
+    }
+    done(dataset);
+}
+
+/* A wall straight before the eye, and one stray point: wherever that is, depths of the wall are as exact as floats of
+ * their size. */
+static void strays_cost_no_depth(void **state)
+{
+    (void)state;
+    enum { side = 32, wall = side * side };
+    static const double strays[] = {2, 1e4, 5e6, 1e9};
+    struct make_splat splats[wall + 1];
+    for (int i = 0; i < wall; i++)
+        splats[i] = (struct make_splat){.position = {origin[0] + 0.05 * (i % side), origin[1], origin[2] + 0.05 * (i / side)},
+                                        .normal = {0, 1, 0}, .radius = 0.05f, .color = {200, 100, 50}};
+    for (int i = 0; i < 4 * SPL_METHOD_COUNT; i++) {
+        const double away = strays[i / SPL_METHOD_COUNT], middle = 0.05 * side / 2;
+        const double target[3] = {origin[0] + middle, origin[1], origin[2] + middle}, eye[3] = {target[0], origin[1] + 8, target[2]};
+        splats[wall] = splats[0];
+        for (int a = 0; a < 3; a++)
+            splats[wall].position[a] += away;
+        struct spl_dataset *dataset = make_dataset(splats, wall + 1);
+        assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+        struct spl_view view = parallel(1.2, 100, 100);
+        view.camera.near = 0;
+        view.method = (enum spl_method)(i % SPL_METHOD_COUNT);
+        assert_int_equal(spl_camera_look_at(&view.camera, eye, target, (double[]){0, 0, 1}, NULL), SPL_OK);
+        struct spl_frame frame = render(dataset, &view);
+        const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+        size_t hits = 0;
+        for (uint32_t k = 0; k < 100 * 100; k++) {
+            if (isnan(depth[k]))
+                continue;
+            hits++;
+            if (!(fabs((double)depth[k] - 8) < 2e-3)) /* the splats' own, which are stored to 0.05 of their radius, or so */
+                fail_msg("%s, a stray %g away: depth %.6f", spl_method_name(view.method), away, (double)depth[k]);
+        }
+        assert_true(hits > (view.method == SPL_METHOD_POINTS ? 300 : 9000));
+        spl_frame_finish(&frame);
+        done(dataset);
+    }
+}
+
 /* Pixels of a wall of discs whose plane the rays lie in, `turn` radians from the image's rows, and columns or rows, along
  * whichever it is longer, that have none of it. */
 static size_t count_wall(struct spl_view *view, double turn, size_t *gaps)
@@ -303,6 +369,8 @@ int main(int argc, char **argv)
         frames_test(soft_spheres_are_those_from_afar),
         frames_test(tiles_change_no_byte),
         frames_test(sections_and_picks_are_true),
+        frames_test(nothing_is_before_the_eye),
+        frames_test(strays_cost_no_depth),
         frames_test(walls_along_their_edge_are_lines),
     };
     return frames_run(argc, argv, "parallel", tests, sizeof tests / sizeof *tests);

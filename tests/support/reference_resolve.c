@@ -188,6 +188,7 @@ void reference_resolve_pixel(const struct scene *s, uint32_t x, uint32_t y, stru
     }
     float z = covered ? (float)(depth / near_count + s->advance) : NAN;
     const bool parallel = s->camera.projection == SPL_ORTHOGRAPHIC;
+    z = parallel && z < 0 ? 0 : z; /* of a disc that reaches before the eye */
     if (images[SPL_LAYER_DEPTH].pixels)
         ((float *)images[SPL_LAYER_DEPTH].pixels)[pixel] = z;
     if (images[SPL_LAYER_RANGE].pixels) {

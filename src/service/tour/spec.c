@@ -142,9 +142,10 @@ static int read_path(json_t *body, const struct spl_camera_defaults *defaults, c
     json_t *json = json_object_get(body, "path");
     const struct spl_camera *camera = &out->view.view.camera;
     struct spl_camera_defaults own = *defaults;
-    own.near = camera->near;
-    own.far = camera->far;
     const json_t *settings = json_object_get(body, "settings");
+    if (json_object_get(settings, "near"))
+        own.near = own.parallel_near = camera->near;
+    own.far = camera->far;
     struct spl_path_value values[SPL_PATH_VALUES];
     struct spl_path_options options = {.width = json_object_get(settings, sides[0]) ? camera->width : 0,
                                        .height = json_object_get(settings, sides[1]) ? camera->height : 0,

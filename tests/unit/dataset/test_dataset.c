@@ -91,6 +91,26 @@ static void test_round_trip(void **state)
     spl_dataset_close(NULL);
 }
 
+/* One stray point makes the bounds what they like, and hides nothing. */
+static void test_near_does_not_follow_the_bounds(void **state)
+{
+    (void)state;
+    enum { count = 500 };
+    static const double strays[] = {0, 1e3, 1e6, 1e9};
+    struct make_splat *splats = some_splats(count);
+    for (size_t i = 0; i < sizeof strays / sizeof *strays; i++) {
+        splats[count - 1].position[1] = strays[i];
+        struct spl_dataset *dataset = make_dataset_levels(splats, count, 1);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        struct spl_camera camera;
+        assert_true(info->bounds_max[1] - info->bounds_min[1] >= strays[i]);
+        assert_int_equal(spl_dataset_get_default_camera(dataset, 640, 480, &camera, NULL), SPL_OK);
+        assert_true(camera.near == info->splat_radius && camera.near > 0.009 && camera.near < 0.02);
+        spl_dataset_close(dataset);
+    }
+    free(splats);
+}
+
 /* A file's bytes in memory, to be damaged. */
 struct bytes {
     uint8_t *data;
@@ -433,6 +453,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_near_does_not_follow_the_bounds),
         cmocka_unit_test(test_every_flipped_bit),
         cmocka_unit_test(test_every_truncation),
         cmocka_unit_test(test_other_files),

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "geom/camera_json.h"
+#include "geom/size.h"
 
 #define NODE                                                                                                           \
     "[0.78387787227503695,0.60698607043454015,0.13077993598406572,0,"                                                  \
@@ -104,6 +105,35 @@ static void every_form_hits_the_golden_pixel(void **state)
         assert_true(spl_camera_project(&camera, point, pixel, &depth));
         if (!(fabs(pixel[0] - rows[i].u) < 1e-9 && fabs(pixel[1] - rows[i].v) < 1e-9 && fabs(depth - 8) < 1e-9))
             fail_msg("%s: pixel %.12f %.12f depth %.12f", rows[i].text, pixel[0], pixel[1], depth);
+    }
+}
+
+/* Where it is not said: of parallel rays the eye, whatever pinholes of the dataset begin at. */
+static void near_of_parallel_rays_is_the_eye(void **state)
+{
+    (void)state;
+    static const struct spl_camera_defaults dataset = {.up = {0, 0, 1}, .fov = 60, .near = 0.25, .far = INFINITY};
+    static const struct {
+        const char *camera;
+        double near, near_of_no_dataset;
+    } rows[] = {
+        {"{" POSE ",\"view_height\":6}", 0, 0},
+        {"{" POSE ",\"units_per_pixel\":0.01}", 0, 0},
+        {"{" POSE ",\"projection\":\"orthographic\",\"fx\":80}", 0, 0},
+        {"{" POSE ",\"view_height\":6,\"near\":0.5}", 0.5, 0.5},
+        {"{" POSE ",\"fov\":60}", 0.25, SPL_CAMERA_NEAR_DEFAULT},
+        {"{" POSE ",\"projection\":\"equirectangular\"}", 0.25, SPL_CAMERA_NEAR_DEFAULT},
+    };
+    for (size_t i = 0; i < 2 * sizeof rows / sizeof *rows; i++) {
+        struct spl_camera camera;
+        struct spl_error err;
+        char text[1024];
+        snprintf(text, sizeof text, "{\"camera\":%s}", rows[i / 2].camera);
+        if (read_camera(text, i % 2 ? NULL : &dataset, &camera, &err))
+            fail_msg("%s: %s: %s", text, err.field, err.message);
+        const double wanted = i % 2 ? rows[i / 2].near_of_no_dataset : rows[i / 2].near;
+        if (camera.near != wanted)
+            fail_msg("%s: near %g, not %g", text, camera.near, wanted);
     }
 }
 
@@ -374,6 +404,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_form_hits_the_golden_pixel),
+        cmocka_unit_test(near_of_parallel_rays_is_the_eye),
         cmocka_unit_test(lenses_hit_the_golden_pixel),
         cmocka_unit_test(what_is_seen_all_around_is_level),
         cmocka_unit_test(an_aspect_ratio_decides_the_side_that_is_left_out),
