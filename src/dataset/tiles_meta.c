@@ -58,6 +58,7 @@ static int get_file(const struct spl_dataset *dataset, size_t index, const json_
 /* What all tiles have together so far, their collection's own among it. */
 struct sums {
     uint64_t pages, page_room, levels;
+    double radii; /* of all leaf splats */
     struct spl_page_row row; /* the next page's */
 };
 
@@ -107,6 +108,8 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
     struct spl_dataset_info *info = &dataset->info;
     struct spl_tile *tile = &dataset->tiles->list[index];
     const json_t *pages = json_object_get(json, "pages");
+    const json_t *radius = json_object_get(json, "splat_radius");
+    const uint64_t leaves_before = info->leaf_splats;
     uint64_t node, levels;
     const struct {
         const char *member;
@@ -126,8 +129,11 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
             (*more[i].sum += number) > sum_most)
             rc = wrong(dataset, index, more[i].member, "is more than all together can have", err);
     }
+    if (!rc && !(json_number_value(radius) > 0 && json_number_value(radius) <= 1e15))
+        rc = wrong(dataset, index, "splat_radius", "is no number that it can be", err);
     if (rc)
         return rc;
+    sums->radii += json_number_value(radius) * (double)(info->leaf_splats - leaves_before);
     tile->node = (uint32_t)node;
     tile->levels = (uint32_t)levels;
     tile->first_page = (uint32_t)sums->pages;
@@ -218,6 +224,8 @@ int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err)
     info->chunks = sums.row.first_chunk;
     info->ids = sums.row.first_id;
     info->levels = (uint32_t)sums.levels;
+    if (info->leaf_splats)
+        info->splat_radius = sums.radii / (double)info->leaf_splats;
     info->tiles = tiles->count;
     memset(info->attribute_bits, 0, sizeof info->attribute_bits); /* of tiles only they themselves know */
     for (uint32_t s = 0; s < info->stream_count; s++)

@@ -120,6 +120,7 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
         (json_int_t)i->leaf_splats, "splats", (json_int_t)i->splats, "pieces", (json_int_t)i->pieces, "panels",
         (json_int_t)i->panels, "panel_points", (json_int_t)i->panel_points, "meshes", (json_int_t)i->meshes, "bounds",
         "min", vector(i->bounds_min), "max", vector(i->bounds_max), "pages", pages);
+    failed |= !entry || json_object_set_new(entry, "splat_radius", json_real(i->splat_radius)) != 0;
     failed |= !entry || json_object_set_new(entry, "mesh_points", json_integer((json_int_t)i->mesh_points)) != 0;
     if (!failed)
         return entry;

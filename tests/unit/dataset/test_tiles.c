@@ -1,6 +1,7 @@
 /* A collection is one dataset from outside: its tiles' pages, nodes, chunks, ids and values are found as those of the tiles
  * themselves are; few tiles are open at a time; one that is not what the collection was made of is refused by name, and so is a
  * META that cannot be. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -84,6 +85,7 @@ static json_t *describe(unsigned t)
                      "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats, "splats",
                      (json_int_t)info->splats, "pieces", 0, "panels", 0, "panel_points", 0, "meshes", 0, "mesh_points", 0,
                      "pages", pages);
+    json_object_set_new(json, "splat_radius", json_real(info->splat_radius));
     spl_dataset_close(tile);
     assert_non_null(json);
     return json;
@@ -217,6 +219,7 @@ static void test_one_dataset(void **state)
     assert_int_equal(info->pages, page);
     assert_true(info->nodes == node && info->ids == id && info->points == points && info->leaf_splats == points);
     assert_int_equal(info->levels, 4);
+    assert_true(fabs(info->splat_radius - 0.1) < 0.02); /* the tiles', not that of what is seen from afar */
     assert_null(spl_dataset_find_tile(city, id));
     assert_int_equal(spl_dataset_count_linear(city, &linear, NULL), SPL_OK);
     spl_dataset_close(city);
@@ -285,7 +288,8 @@ static void test_forged(void **state)
                 {"pages", "[]", "tiles[3].pages"},               {"pages", "[[1,1,1]]", "tiles[3].pages"},
                 {"pages", "[[0,1,1,64]]", "tiles[3].pages"},     {"pages", "[[1,1,1,63]]", "tiles[3].pages"},
                 {"pages", "[[1,1,1,4294967296]]", "tiles[3].pages"},
-                {"pages", "7", "tiles[3].pages"}};
+                {"pages", "7", "tiles[3].pages"},                {"splat_radius", "0", "tiles[3].splat_radius"},
+                {"splat_radius", "\"1\"", "tiles[3].splat_radius"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         json_t *forged = json_deep_copy(tiles);
         json_object_set_new(json_array_get(forged, 3), rows[i].key, json_loads(rows[i].value, JSON_DECODE_ANY, NULL));
