@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "cloud/path_reader.h"
+#include "geom/camera_json.h"
 #include "geom/size.h"
 
 static const double fov_default = 60;
@@ -122,9 +123,9 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
             return spl_fail_field(err, SPL_E_INPUT, name,
                                   "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name,
                                   reader->list);
-        if (number && !(json_number_value(value) > 0 && json_number_value(value) <= 1000))
-            return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name,
-                                                          "fps must be a number above 0, up to 1000, not %g",
+        if (number && !spl_camera_path_takes_fps(json_number_value(value)))
+            return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name, "fps must be %g to %g, not %g",
+                                                          SPL_CAMERA_PATH_FPS_MIN, SPL_CAMERA_PATH_FPS_MAX,
                                                           json_number_value(value))
                                          : spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number, not %s",
                                                           spl_json_type_name(value));
@@ -216,7 +217,7 @@ static int load_file(struct spl_path_reader *reader, const char *file, struct sp
         struct spl_error why = {0};
         if (!json)
             rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", file, where.line, where.column,
-                          where.text);
+                          spl_json_fault(&where));
         else if ((rc = read_json(reader, json, &why)))
             spl_fail_field(err, rc, why.field, "%s: %s", file, why.message);
         json_decref(json);

@@ -54,7 +54,7 @@ int spl_path_read_nerfstudio(struct spl_path_reader *reader, const json_t *json,
         (rc = spl_path_set_size(reader, width, height, err)))
         return rc;
     double fps = json_number_value(json_object_get(json, "fps"));
-    reader->path->fps = fps > 0 && fps <= 1000 ? fps : 0;
+    reader->path->fps = spl_camera_path_takes_fps(fps) ? fps : 0;
     reader->path->closed = json_is_true(json_object_get(json, "is_cycle"));
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};

@@ -147,7 +147,7 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
     document = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
     if (!document)
         rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", path, where.line, where.column,
-                      where.text);
+                      spl_json_fault(&where));
     else if (json_object_get(document, "frames"))
         rc = spl_view_list_read_transforms(list, path, document, photographs, err);
     else if (json_object_get(document, "panoramas"))

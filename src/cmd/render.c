@@ -14,6 +14,7 @@
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "dataset/dataset.h"
+#include "geom/camera_json.h"
 #include "geom/ground.h"
 #include "geom/ray_list.h"
 #include "image/vectors.h"
@@ -37,7 +38,7 @@ static int read_rays(struct spl_cmd_render *a, struct spl_error *err)
         json_t *list = json_loadf(file, JSON_REJECT_DUPLICATES, &where);
         rc = list ? spl_rays_from_json(list, &a->rays, err)
                   : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file,
-                                   where.line, where.column, where.text);
+                                   where.line, where.column, spl_json_fault(&where));
         json_decref(list);
     } else {
         rc = spl_rays_from_npy(file, (uint64_t)status.st_size, a->rays_file, &a->rays, err);

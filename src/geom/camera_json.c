@@ -105,6 +105,18 @@ int spl_value_from_choice(struct spl_value *value, enum spl_value_kind kind, con
     return 0;
 }
 
+const char *spl_json_fault(const json_error_t *where)
+{
+    switch (json_error_code(where)) {
+    case json_error_null_character:
+        return "\\u0000 stands in a text, where none may be";
+    case json_error_null_byte_in_key:
+        return "\\u0000 stands in a name, where none may be";
+    default:
+        return where->text;
+    }
+}
+
 const char *spl_json_type_name(const json_t *json)
 {
     static const char *const names[] = {

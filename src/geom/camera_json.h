@@ -131,6 +131,9 @@ int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct
 /* A number of an object. What stands before the last dot of `path` is for messages only. */
 int spl_json_get_number(const json_t *object, const char *path, double *out, struct spl_error *err);
 
+/* Why jansson has refused a text, for messages; where.text, but for what that tells in names of its own. */
+const char *spl_json_fault(const json_error_t *where);
+
 /* "an object", "text", …: for messages. */
 const char *spl_json_type_name(const json_t *json);
 

@@ -14,7 +14,7 @@ const char *const spl_path_positions_names[] = {"centripetal", "uniform", "linea
 const char *const spl_path_rotations_names[] = {"squad", "slerp", NULL};
 const char *const spl_path_ease_names[] = {"none", "in", "out", "in-out", NULL};
 
-static const double fps_default = 30, fps_max = 1000, seconds_max = 86400;
+static const double fps_default = 30, seconds_min = 1e-3, seconds_max = 86400;
 static const double time_max = 1e20, step_min = 1e-12; /* speeds between keys stay finite, nanoseconds of 1970 count */
 
 void spl_camera_path_finish(struct spl_camera_path *path)
@@ -86,10 +86,11 @@ int spl_camera_path_count(const struct spl_camera_path *path, size_t frames, dou
                           size_t most, size_t *count_out, double *fps_out, struct spl_error *err)
 {
     bool timed = path->times && path->count > 1, given = !isnan(seconds);
-    if (!isnan(fps) && !(fps > 0 && fps <= fps_max))
-        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps must be above 0, up to %g, not %g", fps_max, fps);
-    if (!isnan(seconds) && !(seconds > 0 && seconds <= seconds_max))
-        return spl_fail_field(err, SPL_E_INPUT, "seconds", "seconds must be above 0, up to %g, not %g", seconds_max,
+    if (!isnan(fps) && !spl_camera_path_takes_fps(fps))
+        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps must be %g to %g, not %g", SPL_CAMERA_PATH_FPS_MIN,
+                              SPL_CAMERA_PATH_FPS_MAX, fps);
+    if (!isnan(seconds) && !(seconds >= seconds_min && seconds <= seconds_max))
+        return spl_fail_field(err, SPL_E_INPUT, "seconds", "seconds must be %g to %g, not %g", seconds_min, seconds_max,
                               seconds);
     if (frames && !isnan(seconds))
         return spl_fail_field(err, SPL_E_INPUT, "seconds", "'frames' and 'seconds' exclude each other");

@@ -3,6 +3,7 @@
 #ifndef SPL_GEOM_CAMERA_PATH_H
 #define SPL_GEOM_CAMERA_PATH_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include <splatd/camera.h>
@@ -10,6 +11,13 @@
 #include "base/error.h"
 
 enum { SPL_CAMERA_PATH_MAX = 100000 }; /* cameras */
+#define SPL_CAMERA_PATH_FPS_MIN 1e-3
+#define SPL_CAMERA_PATH_FPS_MAX 1e3
+
+static inline bool spl_camera_path_takes_fps(double fps)
+{
+    return fps >= SPL_CAMERA_PATH_FPS_MIN && fps <= SPL_CAMERA_PATH_FPS_MAX;
+}
 
 /* What may change along a path beside the camera: numbers that a key may say. */
 enum { SPL_PATH_VALUES = 3 };

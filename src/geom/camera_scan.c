@@ -11,13 +11,15 @@ static const enum spl_camera_param scan[] = {SPL_CAMERA_azimuth, SPL_CAMERA_elev
 
 int spl_camera_take_scan(const struct spl_value *v, struct spl_value own[SPL_CAMERA_PARAMS], struct spl_error *err)
 {
+    const int first = !given(v, scan[0]); // of the two that is there, maybe alone
+    if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].n[0] != SPL_EQUIRECTANGULAR)
+        return spl_fail_field(err, SPL_E_INPUT, spl_camera_param_names[scan[first]],
+                              "'%s' goes with projection equirectangular alone", spl_camera_param_names[scan[first]]);
+    if (!given(v, scan[!first]))
+        return spl_camera_missing(scan[!first], scan[first], err);
     for (int i = 0; i < 2; i++) {
         const double *n = v[scan[i]].n, most = i ? 90 : 360;
         const char *name = spl_camera_param_names[scan[i]];
-        if (!given(v, scan[!i]))
-            return spl_camera_missing(scan[!i], scan[i], err);
-        if (!given(v, SPL_CAMERA_projection) || v[SPL_CAMERA_projection].n[0] != SPL_EQUIRECTANGULAR)
-            return spl_fail_field(err, SPL_E_INPUT, name, "'%s' goes with projection equirectangular alone", name);
         if (given(v, scan_sides[i]))
             return spl_camera_conflict(v, scan_sides[i], scan[i], err);
         if (!(fabs(n[0]) <= most && fabs(n[1]) <= most && fabs(n[1] - n[0]) <= 360))

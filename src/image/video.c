@@ -1,8 +1,8 @@
 /* Pictures to H.264 in an MP4 file: libswscale to YUV 4:2:0 (BT.709, limited range, and the file says so), libavcodec,
  * libavformat with the index in front, so that a browser starts before it has all of it.
  *
- * One encoder thread and no dates or versions in the file: the same pictures give the same bytes. FFmpeg's errors are
- * told in its own words. A video belongs to one thread. */
+ * One encoder thread, x264's arithmetic that is the same on every processor, and no dates or versions in the file: the
+ * same pictures give the same bytes. FFmpeg's errors are told in its own words. A video belongs to one thread. */
 #include "image/video.h"
 
 #include <errno.h>
@@ -70,6 +70,9 @@ static int open_codec(struct spl_video *video, uint32_t width, uint32_t height, 
         codec->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
     video->ff->av_opt_set(codec->priv_data, "preset", "veryfast", 0); /* x264's; other encoders have their own ways */
     video->ff->av_opt_set(codec->priv_data, "crf", "20", 0);
+    /* Without it what later frames owe to blocks (mbtree) is computed by each processor's own code, with other results.
+     * AVX-512's in x264 164 even depends on what memory held before, where a row's blocks are no multiple of 8. */
+    video->ff->av_opt_set(codec->priv_data, "x264-params", "cpu-independent=1", 0);
     int rc = video->ff->avcodec_open2(codec, encoder, NULL);
     return rc < 0 ? fail_av(err, video, rc, encoder->name) : 0;
 }

@@ -137,6 +137,27 @@ def test_head_of_every_route_is_followed_by_the_next_reply():
                     assert wire.reply()[0] == 200 and wire.ended(), (path, status)
 
 
+def test_a_head_without_a_length_says_that_the_connection_ends():
+    """What a view has that nobody has rendered, no HEAD knows, and libmicrohttpd would frame it wrongly. Whoever has sent
+    the next request right behind has to read that it was not taken; once rendered, the length is told and it is."""
+    behind = "GET /v1/status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+    with with_tours() as d:
+        for i, wish in enumerate(("", "Connection: keep-alive\r\n")):
+            path = f"{VIEW}?width={64 + i}"
+            head = f"HEAD {path} HTTP/1.1\r\nHost: localhost\r\n{wish}\r\n"
+            with Wire(d) as wire:
+                wire.send(head + behind)
+                status, headers, _ = wire.reply(head=True)
+                assert status == 200 and "content-length" not in headers and headers["connection"] == "close", headers
+                assert wire.ended()
+            length = len(d.ask(path).body)
+            with Wire(d) as wire:
+                wire.send(head + behind)
+                status, headers, _ = wire.reply(head=True)
+                assert status == 200 and int(headers["content-length"]) == length, headers
+                assert headers.get("connection", "").lower() != "close" and wire.reply()[0] == 200 and wire.ended()
+
+
 AMBIGUOUS = [
     ("Content-Length: 2\r\nContent-Length: 40", b"{}"),
     ("Content-Length: 0\r\nContent-Length: 2", b"{}"),

@@ -289,6 +289,7 @@ def test_bad_tours_are_refused_by_field():
         ("", "body"), ("[]", "body"), ("{", "body"), ({}, "path"), ({"path": 5}, "path"), ({"path": {}}, "path"),
         ({"path": "1 2 3"}, "tz"), ({**body(), "shade": 1}, "shade"), ({**body(), "frames": 0}, "frames"),
         ({**body(), "frames": 1.5}, "frames"), ({**body(), "frames": "2"}, "frames"), ({**body(), "fps": 0}, "fps"),
+        ({**body(), "fps": 1e-300}, "fps"), ({"path": {"keyframes": [look(3)]}, "seconds": 1e-300}, "seconds"),
         ({**body(), "seconds": 2}, "seconds"), ({"path": body()["path"]}, "frames"),
         ({"path": {"keyframes": [look(3), {"camera": {"eye": [1, 2]}}]}}, "keyframes[1].camera.eye"),
         ({"path": {"keyframes": [look(3), look(4, soft_opacity=1.5)]}}, "keyframes[1].soft_opacity"),

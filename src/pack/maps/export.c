@@ -13,6 +13,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "geom/camera_json.h"
 #include "geom/polar.h"
 #include "image/load.h"
 
@@ -211,7 +212,7 @@ int spl_map_edits_init(struct spl_map_edits *edits, const char *folder, struct s
                             (long long)status.st_size, list_bytes_max);
     if (!rc && !(document = json_load_file(path, JSON_REJECT_DUPLICATES, &where)))
         rc = spl_fail_field(err, SPL_E_INPUT, "maps", "%s: broken JSON at line %d, column %d: %s", path, where.line,
-                            where.column, where.text);
+                            where.column, spl_json_fault(&where));
     edits->list = json_incref(json_object_get(document, "maps"));
     if (!rc && !json_array_size(edits->list))
         rc = spl_fail_field(err, SPL_E_INPUT, "maps", "%s: holds no maps", path);

@@ -8,6 +8,8 @@
 
 #include <ctype.h>
 
+#include "geom/camera_json.h"
+
 enum { depth_max = 64, number_max = 2048 /* bytes; no double's exact digits are more than 1100 */ };
 
 struct size {
@@ -79,6 +81,6 @@ json_t *spl_body_parse(const char *body, size_t length, size_t values_max, size_
     json_t *document = json_loadb(length ? body : "", length, JSON_REJECT_DUPLICATES, &where);
     if (!document)
         spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
-                       where.text);
+                       spl_json_fault(&where));
     return document;
 }

@@ -263,6 +263,7 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[]}", "keyframes"},
         {"{\"keyframes\":[],\"frames\":[]}", "frames"},
         {"{\"keyframes\":[],\"fps\":0}", "fps"},
+        {"{\"keyframes\":[],\"fps\":1e-300}", "fps"},
         {"{\"keyframes\":[],\"closed\":1}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"), "keyframes[1].camera.projection"},

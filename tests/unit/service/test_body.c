@@ -69,6 +69,13 @@ static void broken_bodies_are_refused(void **state)
         assert_non_null(strstr(err.message, "broken JSON"));
     }
     assert_null(spl_body_parse(NULL, 0, 1000, 1000, &err));
+    static const char *const nul[] = {"{\"path\":\"1 0\\u0000 2\"}", "{\"pa\\u0000th\":1}"};
+    for (size_t i = 0; i < sizeof nul / sizeof *nul; i++) { /* in our words, not in those of the parser's options */
+        assert_int_equal(parse(nul[i], 1000, &err), SPL_E_INPUT);
+        assert_non_null(strstr(err.message, "\\u0000"));
+        assert_null(strstr(err.message, "JSON_"));
+        assert_non_null(strstr(err.message, "line 1"));
+    }
 }
 
 static void texts_are_no_longer_than_was_said(void **state)
