@@ -26,6 +26,7 @@ struct request {
     const char *target_begin, *target_end; // of libmicrohttpd's own text; for framing.c alone
     char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
+    size_t body_counted; /* bytes of it in spl_http.body_bytes */
     const struct spl_token *token; // may be NULL; what it shows, only while it is routed
     char grant[96];                // "exp=…&sig=…" of a signed URL, which its query has no more; else ""
     int64_t expires_s;             // Unix time, of that; 0 = it is not signed
@@ -45,7 +46,7 @@ struct request {
     bool wants_body;               /* it is routed again once its body is there */
     size_t body_most;              /* bytes that body may have, set by then; 0 = body_max */
     bool is_long;                  /* it has more than body_max: one of spl_http.long_bodies */
-    uint64_t steps, stepped_ns;    /* how far it has come then, and when; for long_bodies.c alone */
+    uint64_t steps, stepped_ns;    /* how far its body has come, and when; for bodies.c alone */
     struct spl_ray_wish *ray_wish; // may be NULL; the list of rays being read that it waits for
     struct spl_rays *rays;         // may be NULL: not read yet; with what stood beside it in JSON:
     json_t *rest;                  // may be NULL: the query has it

@@ -1,12 +1,11 @@
 /* libmicrohttpd without threads, driven by the uv loop: its epoll descriptor is polled, its timeouts run on a timer,
  * and a request that waits for a view is suspended, so that nothing here ever blocks.
  *
- * Bodies past body_max are read and dropped up to drain_max, because a client that is cut off while sending seldom
- * reads the reply. A PUT is routed before its body, which change_route.c takes whatever its size; one that
- * wants a body like others (wants_body) is routed again behind it. Invariants: a
- * suspended request is in `waiting`, or has a change; libmicrohttpd 0.9.75 goes on with what lies in its buffer (the
- * next chunk, the end of the body) though the request was suspended a moment ago, and nothing is taken then: it asks
- * again once it is resumed. Owned by the loop's thread. */
+ * A PUT is routed before its body, which change_route.c takes whatever its size; one that wants a body like others
+ * (wants_body) is routed again behind it; bodies.c keeps them. Invariants: a suspended request is in `waiting`, or has
+ * a change; libmicrohttpd 0.9.75 goes on with what lies in its buffer (the next chunk, the end of the body) though the
+ * request was suspended a moment ago, and nothing is taken then: it asks again once it is resumed. Owned by the loop's
+ * thread. */
 #include "service/http.h"
 
 #include <stdio.h>
@@ -14,7 +13,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/array.h"
 #include "base/clock.h"
 #include "base/memory.h"
 #include "service/access/door.h"
@@ -24,7 +22,7 @@
 #include "service/reply.h"
 #include "service/state.h"
 
-enum { drain_max = 8 * body_max, idle_s = 30 };
+enum { idle_s = 30 };
 
 /* The first thing MHD says of a request: its target, still encoded. What is returned becomes the request's context. */
 static void *on_uri(void *context, const char *uri, struct MHD_Connection *handle)
@@ -73,10 +71,10 @@ void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode
     request->service->http->requests_open--;
     if (request->response)
         MHD_destroy_response(request->response);
-    spl_long_body_end(request);
+    spl_body_end_long(request);
     spl_rays_destroy(request->rays);
     json_decref(request->rest);
-    free(request->body);
+    spl_body_drop(request);
     free(request->uri);
     free(request);
 }
@@ -106,6 +104,7 @@ static void count_reply(struct request *request)
 static void prepare_reply(struct request *request)
 {
     request->prepared = true;
+    spl_body_drop(request); // nobody reads it any more, however long the reply is written
     if (request->service->draining || request->closes)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_CONNECTION, "close");
     MHD_add_response_header(request->response, "X-Request-Id", request->id);
@@ -130,37 +129,10 @@ static enum MHD_Result send_reply(struct request *request)
     return again ? queued : MHD_YES;
 }
 
-/* Bytes of a body that are kept, and that are read at all. */
-static size_t get_most(const struct request *request)
-{
-    return request->body_most > body_max ? request->body_most : body_max;
-}
-
-static size_t get_drained(const struct request *request)
-{
-    return get_most(request) > drain_max ? get_most(request) : drain_max;
-}
-
-static bool append_body(struct request *request, const char *data, size_t length)
-{
-    request->body_seen += length;
-    if (request->body_seen > get_most(request))
-        return request->body_seen <= get_drained(request);
-    if (!spl_long_body_begin(request))
-        return true;
-    /* a long one has all its room at once, most of it untouched: growing copies, which took 80 ms of 16 MiB */
-    const size_t room = request->is_long ? get_most(request) : request->body_seen;
-    if (spl_array_reserve(request->body, request->body_capacity, room, NULL))
-        return false;
-    memcpy(request->body + request->body_length, data, length);
-    request->body_length += length;
-    return true;
-}
-
 static void refuse_body(struct request *request)
 {
     char detail[64];
-    snprintf(detail, sizeof detail, "the body is larger than %zu MiB", get_most(request) >> 20);
+    snprintf(detail, sizeof detail, "the body is larger than %zu MiB", spl_body_get_most(request) >> 20);
     spl_reply_problem(request, MHD_HTTP_CONTENT_TOO_LARGE, "limit", "body", detail);
 }
 
@@ -170,7 +142,7 @@ static bool announces_more(struct request *request, uint64_t most)
     const char *length = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_LENGTH);
     bool asks = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_EXPECT);
     uint64_t announced = length ? strtoull(length, NULL, 10) : 0;
-    return announced > (asks ? most : get_drained(request));
+    return announced > (asks ? most : spl_body_get_drained(request));
 }
 
 /* What can be said before the body: that it is too large, or all of a PUT that is refused. */
@@ -188,7 +160,7 @@ static bool answer_headers(struct request *request)
         if (!request->wants_body)
             return announces_more(request, 0);
     }
-    if (!announces_more(request, get_most(request)))
+    if (!announces_more(request, spl_body_get_most(request)))
         return false;
     refuse_body(request);
     return true;
@@ -201,11 +173,11 @@ static bool take_body(struct request *request, const char *data, size_t length)
     if (request->change)
         return spl_change_take(request, data, length);
     bool refused = request->response != NULL;
-    if (!refused && !append_body(request, data, length) && request->body_seen <= get_drained(request))
+    if (!refused && !spl_body_append(request, data, length) && request->body_seen <= spl_body_get_drained(request))
         return false; // no memory
     if (refused)
         request->body_seen += length; // read and dropped
-    if (request->body_seen <= get_drained(request))
+    if (request->body_seen <= spl_body_get_drained(request))
         return true;
     spl_refuse_on_socket(request, refused ? request->status : MHD_HTTP_CONTENT_TOO_LARGE, "body",
                          "the body is not taken, and too long to be read to its end");
@@ -241,10 +213,12 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_change_end(request);
     } else if (!request->response) {
         spl_connection_enter(request->connection, PHASE_WORKING);
-        if (request->body_seen > get_most(request))
+        if (request->body_seen > spl_body_get_most(request))
             refuse_body(request);
         else
             spl_route(request, method);
+        if (!request->place)
+            spl_body_drop(request); // it is read, however long its view takes
     }
     return request->suspended ? MHD_YES : send_reply(request);
 }

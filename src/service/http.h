@@ -56,6 +56,7 @@ struct spl_http {
     LIST_HEAD(, connection) connections;
     size_t connections_open, requests_open;
     size_t long_bodies; /* of requests, longer than body_max */
+    size_t body_bytes;  /* of the others, as far as they are counted */
     uv_timer_t slow_timer; /* connections that take too long */
 
     LIST_HEAD(, request) waiting;
@@ -85,10 +86,14 @@ void spl_connections_watch(struct spl_service *service);                    /* f
  * `version` are libmicrohttpd's method, where the request's bytes begin, and version. */
 bool spl_check_framing(struct request *request, const char *line, const char *version);
 
-/* long_bodies.c: one of the few whose bodies may be long at a time, at each piece of it that is there; false: there are
- * enough, and it is refused. And its place for another: idempotent. */
-bool spl_long_body_begin(struct request *request);
-void spl_long_body_end(struct request *request);
+/* bodies.c: keeps a piece of the body, or refuses the request where others have what it needs, and keeps nothing more;
+ * false: the connection had better end, without memory or past what is read at all. */
+bool spl_body_append(struct request *request, const char *data, size_t length);
+size_t spl_body_get_most(const struct request *request);    /* bytes that are kept */
+size_t spl_body_get_drained(const struct request *request); /* that are read at all */
+char *spl_body_take(struct request *request);    /* the caller's, to free; may be NULL */
+void spl_body_drop(struct request *request);     /* idempotent, as the next */
+void spl_body_end_long(struct request *request); /* its place among long ones is another's */
 
 /* oversize.c: requests that libmicrohttpd would not answer are `abandoned`, answered past it. The first looks at the
  * target, still encoded; the second is for when the headers are there. */

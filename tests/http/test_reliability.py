@@ -1,11 +1,13 @@
-"""What nothing may take down: random requests, clients that leave in the middle of a reply, a clock that jumps, a dataset
-that is cut while it is served, days of work. deploy/operating.md says what each looks like from outside.
+"""What nothing may take down: random requests, clients that leave in the middle of a reply, bodies without an end, a clock
+that jumps, a dataset that is cut while it is served, days of work. deploy/operating.md says what each looks like from outside.
 
 By option, through the environment: SPLATD_RANDOM_REQUESTS=100000 (2000), SPLATD_RANDOM_SEED=N, SPLATD_SOAK_S=1800 (1).
 A soak of any length judges what a request leaves behind; from 1800 s on also what an hour does."""
+import json
 import os
 import re
 import random
+import select
 import shutil
 import socket
 import struct
@@ -88,6 +90,65 @@ def test_clients_that_leave_in_the_middle_of_a_reply():
         eventually(lambda: d.status()["memory"]["reply_bytes"] == 0)
         eventually(lambda: descriptors() <= before + 1)
         assert d.ops("/healthz").status == 200
+
+
+def test_bodies_on_their_way_have_memory_together():
+    """Clients that send all but the last byte of a MiB: 128 MiB are kept, whatever they all do then; small ones get in."""
+    small = json.dumps({"width": 16, "height": 16}).encode()
+    body = small[:-1] + b" " * ((1 << 20) - len(small)) + b"}"
+
+    def hold(d, count, length=len(body) - 1):
+        held = []
+        for _ in range(count):
+            held.append(socket.create_connection(("127.0.0.1", d.port), 60))
+            held[-1].sendall(f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body[:length])
+        return held
+
+    def fill(d):
+        held = hold(d, 140)
+        while d.post(body).status != 503:  # who was refused for one of these does not come again
+            held += hold(d, 2)
+            assert len(held) < 800, "nobody is refused"
+        return held
+
+    def finish(held):
+        heads = []
+        for s in held:
+            s.sendall(body[-1:])
+            heads.append(s.recv(4096))
+            s.close()
+        return heads
+
+    def all_are_taken(d):
+        return all(head.startswith(b"HTTP/1.1 200 ") for head in finish(hold(d, 128)))
+    with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+        held = fill(d)
+        assert d.post(small).status == 200 and d.post(small[:-1] + b" " * 60000 + b"}").status == 200
+        heads = finish(held)
+        taken = [head for head in heads if head.startswith(b"HTTP/1.1 200 ")]
+        refused = [head for head in heads if head.startswith(b"HTTP/1.1 503 ")]
+        assert 120 <= len(taken) <= 128 and len(taken) + len(refused) == len(heads), (len(taken), len(refused))
+        assert all(b"\r\nRetry-After: " in head and b"application/problem+json" in head for head in refused), refused[0]
+        assert d.post(body).status == 200 and all_are_taken(d)
+        for s in hold(d, 150):  # away
+            s.close()
+        eventually(lambda: all_are_taken(d))
+        too_long = []
+        for _ in range(20):  # 413, and cut
+            s = socket.create_connection(("127.0.0.1", d.port), 60)
+            s.sendall(f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n200000\r\n".encode() + bytes(2 << 20))
+            too_long.append(s)
+        assert d.post(b"[" + body[1:]).status == 400 and d.post(body, VIEW.replace("wall", "none")).status == 404
+        eventually(lambda: all_are_taken(d))
+        for s in too_long:
+            s.close()
+        held = fill(d)
+        eventually(lambda: d.post(body).status == 200, 9)  # who fell silent for 5 s gives way
+        told = select.select(held, [], [], 0)[0]
+        assert told and b" 408 " in told[0].recv(4096).split(b"\r\n")[0], told
+        for s in held:
+            s.close()
+        eventually(lambda: all_are_taken(d))
 
 
 def test_a_clock_that_jumps():

@@ -109,10 +109,8 @@ void spl_tour_wish_add(struct request *request, struct spl_tours *tours, struct 
     spl_places_hook_init(&wish->places, entry->places, true);
     wish->defaults.places = &wish->places.hook;
     wish->limits = spl_tour_get_limits(service);
-    wish->body = request->body;
     wish->body_length = request->body_length;
-    request->body = NULL;
-    request->body_length = request->body_capacity = 0;
+    wish->body = spl_body_take(request);
     request->wish = wish;
     tours->wishes++;
     service->library->tasks++; // it holds a reference

@@ -103,7 +103,7 @@ static void let_go(struct request *request)
     request->rays = NULL;
     json_decref(request->rest);
     request->rest = NULL;
-    spl_long_body_end(request);
+    spl_body_end_long(request);
 }
 
 static void answer(struct request *request, const struct spl_call *call)
@@ -195,11 +195,10 @@ void spl_make_rays(struct request *request, const struct spl_call *call)
         spl_reply_error(request, &err);
         return;
     }
-    *wish = (struct spl_ray_wish){.request = request, .service = service, .call = *call, .body = request->body,
-                                  .length = request->body_length, .npy = is_npy(request)};
+    *wish = (struct spl_ray_wish){.request = request, .service = service, .call = *call, .length = request->body_length,
+                                  .npy = is_npy(request)};
     wish->work.data = wish;
-    request->body = NULL;
-    request->body_length = request->body_capacity = 0;
+    wish->body = spl_body_take(request);
     spl_catalog_entry_ref(call->entry);
     request->ray_wish = wish;
     service->library->tasks++;
