@@ -96,8 +96,11 @@ int spl_dataset_read_values(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     const json_t *streams = json_object_get(dataset->meta, "streams");
+    const json_t *tiles = dataset->tiles ? json_object_get(dataset->meta, "tile_values") : NULL; /* of a collection */
     for (uint32_t s = 0; s < info->stream_count; s++) {
-        const json_t *values = json_object_get(json_array_get(streams, s), "values");
+        const json_t *values = tiles ? json_array_get(json_object_get(tiles, "streams"), s)
+                                     : json_object_get(json_array_get(streams, s), "values");
+        values = json_is_null(values) ? NULL : values;
         const char *what =
             values ? spl_values_from_json(values, info->leaf_splats, &dataset->stream_values[s]) : NULL;
         if (what)
@@ -107,7 +110,8 @@ int spl_dataset_read_values(struct spl_dataset *dataset, struct spl_error *err)
         if (values)
             info->stream_values = dataset->stream_values;
     }
-    const json_t *heights = json_object_get(dataset->meta, "heights");
+    const json_t *heights = json_object_get(tiles ? tiles : dataset->meta, "heights");
+    heights = json_is_null(heights) ? NULL : heights;
     const char *what = heights ? spl_values_from_json(heights, info->leaf_splats, &dataset->heights) : NULL;
     if (what)
         return spl_fail_field(err, SPL_E_CORRUPT, "heights",

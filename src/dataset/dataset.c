@@ -371,6 +371,11 @@ int spl_dataset_read_page(const struct spl_dataset *dataset, uint32_t index, voi
     return rc;
 }
 
+uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
+{
+    return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
+}
+
 size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
 {
     spl_assert(index < dataset->info.pages);

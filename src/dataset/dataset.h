@@ -78,6 +78,9 @@ const struct spl_chunk *spl_dataset_get_chunks(const struct spl_dataset *dataset
 const uint32_t *spl_dataset_get_chunk_textures(const struct spl_dataset *dataset);
 const json_t *spl_dataset_get_meta(const struct spl_dataset *dataset);
 
+/* Pages that the dataset has itself: all of them, but of a collection those of its coarse levels, which come first. */
+uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset);
+
 /* Bytes of page `index` (< info.pages). */
 size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index);
 

@@ -73,7 +73,15 @@ static const char *judge(const struct spl_dataset *dataset, const struct spl_til
                : "has pages of other sizes";
 }
 
-/* Under the lock. */
+/* What opening a tile said, without its path, which clients have no business with. */
+static const char *without_path(const char *message, const char *path)
+{
+    const size_t length = path ? strlen(path) : 0;
+    const char *rest = length && !strncmp(message, path, length) ? message + length : message;
+    return rest + strspn(rest, ": ");
+}
+
+/* Under the lock. What is wrong with a tile is wrong with the collection, whatever it is. */
 static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, struct spl_error *err)
 {
     const struct spl_dataset_opening how = {.cancelled = dataset->cancelled}; /* the root's tables alone are kept */
@@ -82,14 +90,18 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
     char *path = path_of(dataset->tiles, tile, &why);
     int rc = path ? spl_dataset_open_as(path, &how, &own, &why) : SPL_E_NOMEM;
     const char *what = rc ? NULL : judge(dataset, tile, own);
+    if (what)
+        rc = spl_fail(err, SPL_E_CORRUPT, "%s: its tile %s %s: make the collection anew, with splatd collect",
+                      spl_dataset_get_name(dataset), tile->file, what);
+    else if (rc)
+        rc = spl_fail(err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
+                      "%s: its tile %s cannot be read: %s; put it back, or make the collection anew, with splatd collect",
+                      spl_dataset_get_name(dataset), tile->file, without_path(why.message, path));
     free(path);
-    if (what) {
+    if (rc) {
         spl_dataset_close(own);
-        return spl_fail(err, SPL_E_CORRUPT, "%s: its tile %s %s: make the collection anew, with splatd collect",
-                        spl_dataset_get_name(dataset), tile->file, what);
+        return rc;
     }
-    if (rc)
-        return spl_fail(err, rc, "%s: its tile %s cannot be read: %s", spl_dataset_get_name(dataset), tile->file, why.message);
     own->verified = dataset->verified; /* pages are held against their checksums when they are read */
     tile->open = own;
     dataset->tiles->open_count++;

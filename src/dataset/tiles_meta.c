@@ -205,6 +205,9 @@ int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err)
     if (dataset->tables_limit == UINT64_MAX)
         return spl_fail(err, SPL_E_USAGE, "%s: this goes through all of a dataset, and it is a collection of %zu: name one of "
                         "its tiles", dataset->name, json_array_size(json));
+    if (dataset->remote)
+        return spl_fail(err, SPL_E_UNSUPPORTED, "%s: it is a collection, whose tiles are files beside it: it is served from a disk, "
+                        "not from a server", dataset->name);
     if (dataset->textures || dataset->maps)
         return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: a collection has neither textures nor maps of its own",
                               dataset->name);

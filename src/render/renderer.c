@@ -106,8 +106,9 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
     if (rc)
         return rc;
     spl_residency_begin_walk(residency, asker);
+    const uint32_t own = spl_dataset_get_info(dataset)->tiles ? spl_dataset_get_own_pages(dataset) : resident->device_slots;
     uint32_t next = *page;
-    for (; next < resident->device_slots && next < *page + preload_ahead; next++) {
+    for (; next < own && next < *page + preload_ahead; next++) { // tiles' come as views need them
         bool first = next == SPL_FIRST_SLOT;
         struct spl_error why = {0};
         if (!first && (spl_dataset_is_remote(dataset) || !spl_residency_has_room(residency, resident, next)))

@@ -120,6 +120,47 @@ def test_pages_come_and_go():
             assert reply.headers["Splatd-Complete"] == "false" or reply.body == whole
 
 
+def test_what_is_missing_stops_nothing_else():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder)
+        (folder / "city/tile-1.spld").rename(folder / "aside")
+        with Daemon(REAL, datasets=[folder / "city"]) as d:
+            assert d.ask(f"/v1/datasets/tile-2/view?{VIEW}&{WHOLE}").status == 200
+            near = f"/v1/datasets/city/view?{VIEW}&eye=55,10,6&target=60,20,0"
+            bad = d.ask(near)
+            assert bad.status == 500 and "tile-1.spld cannot be read" in bad.json()["detail"], bad.body
+            assert top not in bad.json()["detail"], bad.body
+            assert d.ask(f"/v1/datasets/city/view?{VIEW}&{NEAR}&far=15").status == 200
+            (folder / "aside").rename(folder / "city/tile-1.spld")
+            assert d.ask(near).status == 200
+
+
+def test_values_are_those_of_the_tiles():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder)
+        with Daemon(REAL, datasets=[folder / "city/city.spld", folder / "whole.spld"]) as d:
+            a, b = (next(x for x in d.ask(f"/v1/datasets/{name}").json()["attributes"] if x["name"] == "uncertainty")["values"]
+                    for name in ("city", "whole"))
+            assert a["count"] == b["count"], (a, b)
+            assert 0.7 < a["p99"] / b["p99"] < 1.4, (a["p99"], b["p99"])
+
+
+def test_a_collection_is_not_uploaded():
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder)
+        tokens = folder / "tokens"
+        tokens.write_text("0123456789abcdef0123456789abcdef view,admin\n")
+        tokens.chmod(0o400)
+        body = (folder / "city/city.spld").read_bytes()
+        with Daemon(REAL, "--tokens", str(tokens), datasets=[folder / "city"]) as d:
+            reply = d.ask("/v1/datasets/town", "PUT", body, {"Authorization": "Bearer 0123456789abcdef0123456789abcdef"})
+            assert reply.status == 422 and "files beside it" in reply.json()["detail"], reply.body
+            assert not (folder / "city/town.spld").exists()
+
+
 def test_a_tile_that_is_replaced():
     with tempfile.TemporaryDirectory() as top:
         folder = pathlib.Path(top)

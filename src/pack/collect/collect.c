@@ -96,7 +96,10 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     json_t *meta = spl_collect_describe(c, tree, first, &view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the collection");
-    rc = spl_said_add(said, c->points.up, meta, err);
+    if (json_object_set_new(meta, "tile_values", spl_collect_describe_values(c)))
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing the collection");
+    if (!rc)
+        rc = spl_said_add(said, c->points.up, meta, err);
     if (!rc)
         rc = check_meta(c, meta, err);
     if (!rc)
@@ -121,6 +124,7 @@ static void finish(struct spl_collect *c)
     free(c->first);
     json_decref(c->crs);
     json_decref(c->up);
+    spl_collect_finish_values(c);
     spl_points_finish(&c->points);
     spl_wires_finish(&c->wires);
 }

@@ -10,6 +10,7 @@
 
 #include "cloud/keep.h"
 #include "dataset/dataset.h"
+#include "dataset/values.h"
 #include "pack/points.h"
 #include "pack/stage.h"
 #include "pack/tree.h"
@@ -46,6 +47,7 @@ struct spl_collect {
     double up_vector[3];
     bool has_surface;
     struct spl_collect_stream streams[SPL_STREAMS_MAX];
+    struct spl_values values[SPL_STREAMS_MAX], heights; /* of all tiles' leaves, by stream */
     uint32_t stream_count;
     struct spl_keep keep;
 
@@ -72,6 +74,13 @@ static inline bool spl_collect_is_place(const double v[3])
 {
     return fabs(v[0]) <= SPL_COLLECT_MOST && fabs(v[1]) <= SPL_COLLECT_MOST && fabs(v[2]) <= SPL_COLLECT_MOST;
 }
+
+/* Adds what the tile says of its values, which c->streams are those of (values.c). */
+int spl_collect_add_values(struct spl_collect *c, const struct spl_dataset_info *info, struct spl_error *err);
+
+/* META's "tile_values"; NULL: no memory. */
+json_t *spl_collect_describe_values(struct spl_collect *c);
+void spl_collect_finish_values(struct spl_collect *c);
 
 /* The part of it that reads splats (splats.c). */
 int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, const struct spl_dataset *dataset,

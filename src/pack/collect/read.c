@@ -144,6 +144,8 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
         rc = compare(c, tile, info, meta, err);
     if (!rc)
         rc = spl_collect_take_streams(c, dataset, tile->path, err);
+    if (!rc)
+        rc = spl_collect_add_values(c, info, err);
     if (!rc && !c->first && !(c->first = strdup(tile->name)))
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the names of tiles");
     if (!rc)

@@ -154,11 +154,17 @@ int spl_incoming_check(struct spl_incoming *incoming, const char *target, const 
         return fail(incoming, err, "sync");
     struct spl_error why = {0};
     int rc = spl_catalog_entry_open(incoming->path, target, how, entry, &why);
+    if (!rc && (*entry)->info->tiles) { // nor may who uploads one see what lies beside it by naming it
+        spl_catalog_entry_destroy(*entry);
+        *entry = NULL;
+        rc = spl_fail(&why, SPL_E_INPUT, "a collection is made of files beside it, which no upload brings along: upload its "
+                                         "tiles, and let splatd collect make it where they lie");
+    }
     if (!rc)
         return 0;
     char message[sizeof why.message];
     spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
-    const char *advice = rc == SPL_E_INPUT && incoming->bytes ? ": pack the scan first, then PUT that file" : "";
+    const char *advice = rc == SPL_E_INPUT && incoming->bytes && !strstr(message, "collection") ? ": pack the scan first, then PUT that file" : "";
     spl_incoming_abort(incoming);
     return spl_fail(err, rc, "%s%s", message, advice);
 }
