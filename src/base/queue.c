@@ -99,6 +99,22 @@ void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns)
     return item;
 }
 
+size_t spl_queue_take_if(struct spl_queue *queue, bool (*take)(void *item, void *context), void *context)
+{
+    pthread_mutex_lock(&queue->mutex);
+    size_t kept = 0, before = queue->length;
+    for (size_t i = 0; i < before; i++) {
+        void *item = queue->items[(queue->first + i) % queue->capacity];
+        if (!take(item, context))
+            queue->items[(queue->first + kept++) % queue->capacity] = item;
+    }
+    queue->length = kept;
+    if (kept < before)
+        pthread_cond_broadcast(&queue->drained);
+    pthread_mutex_unlock(&queue->mutex);
+    return before - kept;
+}
+
 void spl_queue_interrupt(struct spl_queue *queue)
 {
     pthread_mutex_lock(&queue->mutex);

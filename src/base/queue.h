@@ -28,6 +28,11 @@ int spl_queue_push(struct spl_queue *queue, void *item, uint64_t deadline_ns, st
  * and a consumer was interrupted. */
 void *spl_queue_pop(struct spl_queue *queue, uint64_t deadline_ns);
 
+/* Has `take` look at every item inside, oldest first and each once, and takes out those that it returns true for, which
+ * are its own then; the others keep their order. `take` is called under the queue's lock: it neither waits nor uses the
+ * queue. How many were taken out. */
+size_t spl_queue_take_if(struct spl_queue *queue, bool (*take)(void *item, void *context), void *context);
+
 /* Makes one pop() on an empty queue, the one that waits or the next, return NULL. */
 void spl_queue_interrupt(struct spl_queue *queue);
 

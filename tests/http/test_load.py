@@ -43,6 +43,27 @@ def test_a_full_queue_is_said_at_once():
         assert counters["refused_full"] == got.count(503) and counters["frames"] == got.count(200) + 1
 
 
+def test_who_asks_again_finds_no_queue_full_of_what_nobody_waits_for():
+    """Behind a frame that takes longer than the deadline: clients with their timeout ask again, and so do others."""
+    with Daemon(FAKE, "--queue", "4", "--deadline", "1500", "--cache", "0", FAKE_HANG_MS=8000, FAKE_FRAME_MS=0) as d:
+        hangs = threading.Thread(target=lambda: d.ask(fresh(SMALL)))
+        hangs.start()
+        eventually(lambda: d.status()["queues"]["render"]["length"] == 0 and d.status()["counters"]["requests"] > 1)
+        for _ in range(2):
+            replies = together(4, lambda i: d.ask(fresh(SMALL)))
+            assert [reply.json()["type"] for reply in replies] == ["urn:splatd:error:timeout"] * 4, [r.body for r in replies]
+        left = [d.connect() for _ in range(4)]
+        for connection in left:
+            connection.request("GET", fresh(SMALL))
+        eventually(lambda: d.status()["queues"]["render"]["length"] == 4)
+        assert d.ask(fresh(SMALL)).json()["type"] == "urn:splatd:error:busy"  # these are waited for
+        for connection in left:
+            connection.close()
+        eventually(lambda: d.status()["counters"]["clients_left"] == 4)
+        assert d.ask(fresh(SMALL)).status in (200, 503) and d.status()["counters"]["refused_full"] == 1
+        hangs.join()
+
+
 def test_the_deadline_ends_a_wait():
     with Daemon(FAKE, "--deadline", "300", FAKE_FRAME_MS=200) as d:
         got = statuses(together(6, lambda i: d.ask(fresh(SMALL))))

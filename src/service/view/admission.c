@@ -3,10 +3,15 @@
  * What one view may cost is bounded where requests are read; here it is bounded what all of them together may. Small
  * views, of a tile at most, are counted: `queue` of them may wait. Of larger ones as many are let in as have
  * samples_max samples and frame_bytes_max bytes together, `queue` at most; of tours' frames likewise, apart from them.
- * One alone always gets in. Bytes count from here to take(), so no thread behind ever waits for memory. Owned by the
- * loop's thread. */
+ * One alone always gets in. Bytes count from here to take(), so no thread behind ever waits for memory.
+ *
+ * Who has had a timeout asks again while what was asked first still waits: where there is no room, the jobs that are
+ * over leave their queue at once, before the gpu thread has come to them. Those that it has taken it looks after
+ * itself, between two turns. Owned by the loop's thread. */
 #include "base/clock.h"
 #include "service/view/stages.h"
+
+TAILQ_HEAD(over, spl_job);
 
 static const double short_budget_ms = 1000;
 static const uint64_t planned_side = 2; /* supersample that a plan is taken to choose where time is no object */
@@ -52,6 +57,31 @@ static struct spl_load *get_load(struct spl_pipeline *pipeline, const struct spl
     return job->behind ? &pipeline->behind_load : job->large ? &pipeline->large_load : NULL;
 }
 
+/* Of a queue to the gpu thread, whose lock makes the job ours. */
+static bool take_over(void *item, void *context)
+{
+    struct over *over = context;
+    struct spl_job *job = item;
+    if (!spl_job_is_over(job))
+        return false;
+    TAILQ_INSERT_TAIL(over, job, turn);
+    return true;
+}
+
+/* Finishes the jobs of a queue that are over. Nothing that would say that work goes on: a device that hangs has its
+ * clients ask again and again. */
+static void sweep(struct spl_pipeline *pipeline, struct spl_queue *queue)
+{
+    struct over over = TAILQ_HEAD_INITIALIZER(over);
+    struct spl_job *job;
+    spl_queue_take_if(queue, take_over, &over);
+    while ((job = TAILQ_FIRST(&over))) {
+        TAILQ_REMOVE(&over, job, turn);
+        spl_pipeline_let_out(pipeline, job);
+        spl_pipeline_hand_back(pipeline, job);
+    }
+}
+
 int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err)
 {
     job->large = spl_request_is_large(&job->request);
@@ -59,14 +89,20 @@ int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, stru
     job->bytes = spl_view_get_frame_bytes(&job->request.view);
     struct spl_load *load = get_load(pipeline, job);
     struct spl_queue *queue = job->behind ? pipeline->behind : job->large ? pipeline->large : pipeline->render;
+    bool full = spl_queue_get_length(queue) == spl_queue_get_capacity(queue);
+    if (full || (load && !has_room(pipeline, load, job)))
+        sweep(pipeline, queue);
     if (load && !has_room(pipeline, load, job))
         return refuse(0, load, err);
     struct spl_load counted = load ? *load : (struct spl_load){0};
     counted.jobs++;
     counted.samples += job->samples;
     counted.bytes += job->bytes;
-    if (!spl_queue_try_push(queue, job)) // from now on it is the gpu thread's
+    job->counted = load != NULL;
+    if (!spl_queue_try_push(queue, job)) { // from now on it is the gpu thread's
+        job->counted = false;
         return refuse(spl_queue_get_capacity(queue), load, err);
+    }
     if (load)
         *load = counted;
     if (queue != pipeline->render)
@@ -74,11 +110,12 @@ int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, stru
     return 0;
 }
 
-void spl_pipeline_let_out(struct spl_pipeline *pipeline, const struct spl_job *job)
+void spl_pipeline_let_out(struct spl_pipeline *pipeline, struct spl_job *job)
 {
     struct spl_load *load = get_load(pipeline, job);
-    if (!load)
+    if (!job->counted)
         return;
+    job->counted = false;
     load->jobs--;
     load->samples -= job->samples;
     load->bytes -= job->bytes;

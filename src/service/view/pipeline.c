@@ -63,6 +63,11 @@ void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job)
     spl_frame_end(job->steps, NULL);
     job->steps = NULL;
     spl_frame_finish(&job->frame);
+    spl_pipeline_hand_back(pipeline, job);
+}
+
+void spl_pipeline_hand_back(struct spl_pipeline *pipeline, struct spl_job *job)
+{
     bool room = spl_queue_try_push(pipeline->done, job);
     spl_assert(room);
     pipeline->options.wake(pipeline->options.wake_context);

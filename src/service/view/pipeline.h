@@ -45,6 +45,7 @@ struct spl_job {
     struct spl_frame_stats stats;
     struct spl_encoded encoded;
     bool large; /* the way that it goes; set by submit(), with what it counts for there */
+    bool counted;
     uint64_t samples, bytes;
     double queue_ms, encode_ms;     /* queue: what it waited for the device, between its tiles too */
     double pages_ms;                /* what it waited for pages */
@@ -98,7 +99,8 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
  * nobody refers to. References that others hold must be gone before. NULL-safe. */
 void spl_pipeline_destroy(struct spl_pipeline *pipeline);
 
-/* Loop thread, as take(); never blocks. SPL_E_BUSY when what waits on the job's way is as much as may. */
+/* Loop thread, as take(); never blocks. SPL_E_BUSY when what waits on the job's way is as much as may; jobs that wait
+ * for the device and are over, dropped or past their deadline, do not count then: they are finished with that error. */
 int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
 
 /* A finished job or NULL; never blocks. */

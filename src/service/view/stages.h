@@ -64,9 +64,10 @@ void spl_far_picks_init(struct spl_far_picks *far);
 int spl_far_picks_take(struct spl_pipeline *pipeline, struct spl_job *job);
 void spl_far_picks_finish(struct spl_far_picks *far);
 
-/* admission.c: lets the job in on its way to the gpu thread and counts it, until it is let out. Loop's thread. */
+/* admission.c: lets the job in on its way to the gpu thread and counts it, until it is let out. Where there is no room,
+ * those go first that wait there although nobody waits for them. Loop's thread. */
 int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err);
-void spl_pipeline_let_out(struct spl_pipeline *pipeline, const struct spl_job *job);
+void spl_pipeline_let_out(struct spl_pipeline *pipeline, struct spl_job *job); /* idempotent */
 
 /* Is the image more than is encoded in no time? */
 bool spl_pipeline_image_is_large(const struct spl_view *view);
@@ -90,6 +91,9 @@ void spl_pipeline_touch(struct spl_pipeline *pipeline);
 
 /* Hands a job back to the loop, with `err` set or `encoded` filled. */
 void spl_pipeline_finish_job(struct spl_pipeline *pipeline, struct spl_job *job);
+
+/* The same for one that has not begun; says nothing of whether work goes on. */
+void spl_pipeline_hand_back(struct spl_pipeline *pipeline, struct spl_job *job);
 
 /* Sets the error of a job that nobody waits for, or whose deadline has passed; true then. */
 bool spl_job_is_over(struct spl_job *job);

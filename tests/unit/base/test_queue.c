@@ -82,6 +82,55 @@ static void an_interruption_ends_one_wait(void **state)
     spl_queue_destroy(queue);
 }
 
+static bool is_odd(void *item, void *context)
+{
+    *(int **)context = item; // the last that it was asked of
+    return ((int *)item - items) % 2;
+}
+
+static bool is_any(void *item, void *context)
+{
+    return item && !context;
+}
+
+static void *push_one(void *queue)
+{
+    assert_int_equal(spl_queue_push(queue, &items[9], SPL_NEVER, NULL), 0);
+    return NULL;
+}
+
+static void what_is_taken_out_leaves_the_rest_in_order(void **state)
+{
+    (void)state;
+    struct spl_queue *queue;
+    int *last = NULL;
+    assert_int_equal(spl_queue_create(5, &queue, NULL), 0);
+    assert_int_equal(spl_queue_take_if(queue, is_odd, &last), 0);
+    assert_null(last);
+    for (int first = 0; first < 5; first++) { // wherever the ring begins
+        for (int i = 0; i < 5; i++)
+            assert_true(spl_queue_try_push(queue, &items[i]));
+        assert_int_equal(spl_queue_take_if(queue, is_odd, &last), 2);
+        assert_ptr_equal(last, &items[4]);
+        assert_int_equal(spl_queue_get_length(queue), 3);
+        assert_true(spl_queue_try_push(queue, &items[5]));
+        for (int i = 0; i < 6; i += i == 4 ? 1 : 2)
+            assert_ptr_equal(spl_queue_pop(queue, 0), &items[i]);
+        assert_null(spl_queue_pop(queue, 0));
+        assert_true(spl_queue_try_push(queue, &items[6]));
+        assert_int_equal(spl_queue_take_if(queue, is_odd, &last), 0);
+        assert_ptr_equal(spl_queue_pop(queue, 0), &items[6]);
+    }
+    for (int i = 0; i < 5; i++)
+        assert_true(spl_queue_try_push(queue, &items[i]));
+    pthread_t producer; // who waits for room, if it does by now, has it
+    pthread_create(&producer, NULL, push_one, queue);
+    assert_int_equal(spl_queue_take_if(queue, is_any, NULL), 5);
+    pthread_join(producer, NULL);
+    assert_ptr_equal(spl_queue_pop(queue, 0), &items[9]);
+    spl_queue_destroy(queue);
+}
+
 struct crowd {
     struct spl_queue *queue;
     atomic_int next, seen[4096];
@@ -130,6 +179,7 @@ int main(void)
         cmocka_unit_test(waits_end_at_their_deadline),
         cmocka_unit_test(closing_keeps_what_is_inside),
         cmocka_unit_test(an_interruption_ends_one_wait),
+        cmocka_unit_test(what_is_taken_out_leaves_the_rest_in_order),
         cmocka_unit_test(every_item_comes_out_once),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,134 @@
+/* Who is let into a full pipeline, on a fake renderer: views that are over make room, once and at once. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "service/view/pipeline.h"
+
+static struct spl_counters counters;
+
+static void no_wake(void *context)
+{
+    (void)context;
+}
+
+static struct spl_pipeline *start(size_t queue)
+{
+    struct spl_pipeline_options options = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake};
+    struct spl_pipeline *pipeline = NULL;
+    struct spl_error err = {0};
+    memset(&counters, 0, sizeof counters);
+    assert_int_equal(spl_pipeline_create(&options, &pipeline, &err), 0);
+    while (spl_pipeline_get_state(pipeline) == SPL_PIPELINE_STARTING)
+        usleep(1000);
+    return pipeline;
+}
+
+/* A large one is a small picture of many samples. */
+static struct spl_job *make_job(bool large)
+{
+    static const struct spl_camera_defaults defaults = {
+        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    const char *query = large ? "width=2048&height=256&supersample=4" : "width=8&height=4&format=raw";
+    struct spl_job *job = calloc(1, sizeof *job);
+    assert_non_null(job);
+    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
+    job->accepted_ns = spl_now_ns();
+    job->deadline_ns = job->accepted_ns + 60 * SPL_NS_PER_S;
+    return job;
+}
+
+static struct spl_job *take(struct spl_pipeline *pipeline)
+{
+    struct spl_job *job;
+    while (!(job = spl_pipeline_take(pipeline)))
+        usleep(500);
+    return job;
+}
+
+static size_t get_waiting(struct spl_pipeline *pipeline, size_t *large)
+{
+    struct spl_pipeline_status status;
+    spl_pipeline_get_status(pipeline, &status);
+    if (large)
+        *large = status.large_length;
+    return status.render_length;
+}
+
+/* While another view takes long; nobody else does. */
+static void check_room(bool large)
+{
+    setenv("FAKE_FRAME_MS", "30000", 1);
+    struct spl_pipeline *pipeline = start(2);
+    struct spl_job *drawn = make_job(false), *next[5], *job;
+    size_t counted;
+    for (int i = 0; i < 5; i++)
+        next[i] = make_job(large);
+    assert_int_equal(spl_pipeline_submit(pipeline, drawn, NULL), 0);
+    while (get_waiting(pipeline, NULL))
+        usleep(500);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(spl_pipeline_submit(pipeline, next[i], NULL), i < 2 ? 0 : SPL_E_BUSY);
+    assert_null(spl_pipeline_take(pipeline));
+    spl_cancel_set(&next[0]->dropped);
+    usleep(20000);
+    uint64_t still = spl_pipeline_get_still_ns(pipeline);
+    assert_int_equal(spl_pipeline_submit(pipeline, next[2], NULL), 0);
+    assert_true(spl_pipeline_get_still_ns(pipeline) >= still); // a device that hangs does not seem to move
+    assert_int_equal(spl_pipeline_submit(pipeline, next[3], NULL), SPL_E_BUSY);
+    next[1]->deadline_ns = spl_now_ns();
+    assert_int_equal(spl_pipeline_submit(pipeline, next[3], NULL), 0);
+    assert_int_equal(spl_pipeline_submit(pipeline, next[4], NULL), SPL_E_BUSY);
+    assert_int_equal(get_waiting(pipeline, &counted), large ? 0 : 2);
+    assert_int_equal(counted, large ? 2 : 0);
+    for (int i = 0; i < 2; i++) {
+        job = spl_pipeline_take(pipeline);
+        assert_ptr_equal(job, next[i]);
+        assert_int_equal(job->err.code, i ? SPL_E_TIMEOUT : SPL_E_CANCELLED);
+        spl_job_destroy(job);
+    }
+    assert_null(spl_pipeline_take(pipeline));
+    get_waiting(pipeline, &counted);
+    assert_int_equal(counted, large ? 2 : 0); // let out once
+    unsetenv("FAKE_FRAME_MS");
+    spl_cancel_set(&drawn->dropped);
+    for (int i = 1; i < 4; i++) {
+        job = take(pipeline);
+        assert_ptr_equal(job, i == 1 ? drawn : next[i]);
+        assert_int_equal(job->err.code, i == 1 ? SPL_E_CANCELLED : 0);
+        spl_job_destroy(job);
+    }
+    get_waiting(pipeline, &counted);
+    assert_int_equal(counted, 0);
+    spl_job_destroy(next[4]);
+    spl_pipeline_destroy(pipeline);
+    assert_int_equal(counters.frames, 2);
+}
+
+static void views_that_are_over_make_room(void **state)
+{
+    (void)state;
+    check_room(false);
+}
+
+static void large_views_that_are_over_make_room(void **state)
+{
+    (void)state;
+    check_room(true);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(views_that_are_over_make_room),
+        cmocka_unit_test(large_views_that_are_over_make_room),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
