@@ -28,6 +28,7 @@ static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 whe
 static const double volume_from = 0.4;                  /* roundness from which all of a radius is that of a volume */
 static const double fades = 0.8, lasts = 1.2; /* growth of sigma_0 / sigma_1 over a wider view: noise, a volume */
 static const double in_volume = 0.6, at_border = 0.6, along_border = 0.8; /* of a radius amid a surface */
+static const double well_within = 0.8; /* of a wide view, where it is no border's: nearest point in each quarter */
 static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
 struct spl_moments spl_moments_of(const struct spl_points *p, size_t i, const struct spl_nearest *near)
@@ -240,4 +241,17 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
         return fmax(radius, fmin(0.65 * place.gap, 3 * radius));
     return fmin(fmax(at_border * radius, fmin(0.5 * place.gap, 3 * radius)),
                 along_border * least_radius(p, i, list, v->k));
+}
+
+bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)
+{
+    double nearest[8];
+    spl_neighbours_find(v->neighbours, i, v->wide, near);
+    struct spl_moments around = spl_moments_of(v->points, i, near);
+    struct spread wide = spread_of(&around);
+    if (wide.sigma[1] < linear_below * wide.sigma[2] || roundness(&wide) > 0)
+        return false;
+    eighths(v->points, i, near->index, near->count, wide.normal, coplanar, nearest);
+    struct place place = place_of(nearest);
+    return !place.open && place.gap < well_within * near->farthest;
 }

@@ -28,4 +28,7 @@ struct spl_vicinity {
 double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, double reach, struct spl_nearest *near,
                            double normal[3], double *round, bool *edge);
 
+/* Whether a wider view of point i shows a surface that goes on all around it. `near` as above. */
+bool spl_radius_on_surface(const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near);
+
 #endif

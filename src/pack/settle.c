@@ -1,7 +1,9 @@
 /* The radius that a point's own neighbours give (radius.c) makes blobs of stray points. So none exceeds a small
  * multiple of the median of its neighbours' radii (a stray beside a surface), nor of the median of the few thousand
- * points around it (a flock of strays). Radii are read as they were estimated until all of a block, and of those that
- * wait, are settled, so that no result depends on the order. */
+ * points around it (a flock of strays). These are counted, so where most lie in a densely scanned spot of a few
+ * centimetres they say nothing of the floor beside it: a surface that goes on all around a point is held against what
+ * a hundred others of the run have, which is more than a flock. Radii are read as they were estimated until all of a
+ * block, and of those that wait, are settled, so that no result depends on the order. */
 #include "pack/settle.h"
 
 #include <math.h>
@@ -11,22 +13,30 @@
 #include "base/memory.h"
 #include "pack/median.h"
 
-enum { run_points = 4096, run_sample = 256 };
+enum { run_points = 4096, run_sample = 256, flock = 128 };
 static const float stray_limit = 2.5f; /* times the median radius of the neighbours */
 
-/* Multiplies limit[] by the median radius of the run that each point belongs to. */
+/* Multiplies limit[] by the median radius of the run that each point belongs to, on a surface by what `flock` of its
+ * points exceed if that is more. */
 static void limit_runs(const struct spl_settle_block *block)
 {
     const float *radius = block->points->radius;
+    struct spl_nearest near;
+    spl_nearest_init(&near);
     for (size_t run = block->begin; run < block->end; run += run_points) {
         size_t n = block->end - run < run_points ? block->end - run : run_points;
         size_t sample = n < run_sample ? n : run_sample;
         float radii[run_sample];
         for (size_t i = 0; i < sample; i++)
             radii[i] = radius[run + i * n / sample];
-        float median = spl_median(radii, sample);
-        for (size_t i = run; i < run + n; i++)
-            block->limit[i - block->begin] *= median;
+        float median = spl_median(radii, sample); /* and sorts them */
+        float sparse = n > flock ? radii[sample - 1 - sample * flock / n] : median;
+        for (size_t i = run; i < run + n; i++) {
+            float *limit = &block->limit[i - block->begin];
+            *limit *= median;
+            if (radius[i] > *limit && sparse > median && spl_radius_on_surface(block->vicinity, i, &near))
+                *limit *= sparse / median;
+        }
     }
 }
 

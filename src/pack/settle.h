@@ -2,7 +2,7 @@
 #ifndef SPL_PACK_SETTLE_H
 #define SPL_PACK_SETTLE_H
 
-#include "pack/points.h"
+#include "pack/radius.h"
 
 /* Points [begin, end) whose radii and normals are estimated; `limit` is scratch of one float a point. */
 struct spl_settle_block {
@@ -10,6 +10,7 @@ struct spl_settle_block {
     size_t begin, end;
     const uint32_t *neighbours; /* k a point of the block, unused ones UINT32_MAX */
     unsigned k;
+    const struct spl_vicinity *vicinity; /* the same points */
     float *limit; /* in: times the median radius of its surroundings, which a point's radius may be */
 };
 

@@ -24,7 +24,7 @@
 enum { block_points = 1 << 16 };
 static const float lone_radius = 0.01f;             /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
-static const float flat_limit = 4, round_limit = 2; /* times the median radius of the run of points around */
+static const float flat_limit = 4, round_limit = 2; /* times what is usual in the run of points around */
 enum { wide_factor = 3 };
 
 struct block {
@@ -127,7 +127,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             if (s->edge)
                 s->edge[i] = edge;
         }
-        const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, w->limit};
+        const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, &vicinity, w->limit};
         if (spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
             atomic_store(&s->failed, true);
