@@ -131,7 +131,7 @@ def test_what_is_missing_stops_nothing_else():
             bad = d.ask(near)
             assert bad.status == 500 and "tile-1.spld cannot be read" in bad.json()["detail"], bad.body
             assert top not in bad.json()["detail"], bad.body
-            good = d.ask(f"/v1/datasets/city/view?{VIEW}&{NEAR}&far=7")
+            good = d.ask(f"/v1/datasets/city/view?{VIEW}&eye=25,10,6&target=10,10,0")  # away from it
             assert good.status == 200, good.body
             (folder / "aside").rename(folder / "city/tile-1.spld")
             assert d.ask(near).status == 200
