@@ -15,7 +15,7 @@ ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "http"))
 from harness import REAL, TEXTURED, Daemon, run
 
-COMMANDS = "serve pack render tour info synth bench compare devices sign plan".split()
+COMMANDS = "serve pack collect render tour info synth bench compare devices sign plan".split()
 SERVICE = "http://127.0.0.1:8080"
 # What an example of a reader's own site needs, which no test has.
 ELSEWHERE = re.compile(r"https://|s3://|\$TOKEN|docker |kubectl ")

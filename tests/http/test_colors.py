@@ -43,8 +43,8 @@ def test_they_count_where_they_change_something():
         for query in ["shade=none", "shade=auto", "edl_strength=1&edl_radius=4", "color_by=rgb", "ramp=turbo&range=0..1"]:
             assert tag(query) == tag(""), query
         assert tag("layer=depth&shade=edl&color_by=class") == tag("layer=depth")
-        for even in "color_by=class", "color_by=flat:red":  # which show no shape by themselves
-            assert tag(even) == tag(even + "&shade=edl") != tag(even + "&shade=none"), even
+        for even, shade in (("color_by=class", "edl"), ("color_by=flat:red", "edl%2Bheadlight")):  # which show no shape by themselves
+            assert tag(even) == tag(f"{even}&shade={shade}") != tag(even + "&shade=none"), even
         assert tag("color_by=height") == tag("color_by=height&shade=none")
         assert tag("shade=edl&edl_radius=2") == tag("shade=edl") and tag("color_by=plane:0,0,1,0,0,1.0") == tag("color_by=plane:0,0,1,0,0,1")
         queries = ["", "shade=edl", "shade=edl&edl_radius=3", "shade=sun:1,2", "shade=sun:1,3", "color_by=class", "color_by=height",
