@@ -28,13 +28,13 @@ static double *radii_of(const double (*position)[3], size_t count)
 static void test_dense_spots_leave_the_floor_alone(void **state)
 {
     (void)state;
-    enum { floor = 40000, targets = 3, most = 10000 };
+    enum { floor_points = 40000, targets = 3, most = 10000 };
     static const double place[targets][2] = {{3.2, 3.2}, {1.1, 4.4}, {5.2, 0.9}};
     static const size_t points[targets] = {3000, 6000, most};
-    double(*position)[3] = malloc((floor + targets * most) * sizeof *position);
+    double(*position)[3] = malloc((floor_points + targets * most) * sizeof *position);
     uint64_t random = 21;
-    size_t count = floor, away = 0, other = 0;
-    for (size_t i = 0; i < floor; i++) {
+    size_t count = floor_points, away = 0, other = 0;
+    for (size_t i = 0; i < floor_points; i++) {
         position[i][0] = 6.3 * uniform(&random);
         position[i][1] = 6.3 * uniform(&random);
         position[i][2] = 0.002 * uniform(&random);
@@ -43,9 +43,9 @@ static void test_dense_spots_leave_the_floor_alone(void **state)
         for (size_t i = 0; i < points[t]; i++, count++)
             for (int c = 0; c < 3; c++)
                 position[count][c] = (c < 2 ? place[t][c] : 0) + (c < 2 ? 0.05 : 0.002) * uniform(&random);
-    double *alone = radii_of((const double(*)[3])position, floor);
+    double *alone = radii_of((const double(*)[3])position, floor_points);
     double *beside = radii_of((const double(*)[3])position, count);
-    for (size_t i = 0; i < floor; i++) {
+    for (size_t i = 0; i < floor_points; i++) {
         double x = position[i][0], y = position[i][1];
         bool near = fmin(x, y) < 0.2 || fmax(x, y) > 6.1; /* the floor's border */
         for (int t = 0; t < targets; t++)
