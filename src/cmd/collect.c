@@ -1,9 +1,8 @@
-/* splatd collect: tiles in, a dataset of all of them out. On SIGINT and SIGTERM the temporary file is removed in the
+/* splatd collect: tiles in, a dataset of all of them out. On SIGINT and SIGTERM the temporary file is removed in a
  * handler; the target is never touched before the library's last rename. */
 #include "cmd/cmd.h"
 
 #include <getopt.h>
-#include <signal.h>
 #include <stdio.h>
 #include <unistd.h>
 
@@ -12,28 +11,15 @@
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "cmd/table.h"
+#include "cmd/unfinished.h"
 #include "dataset/dataset.h"
 
-static char part_path[4096];
-
-static void remove_part(int signal_number)
+static void clean_up_on_signals(const char *output)
 {
-    unlink(part_path);
-    signal(signal_number, SIG_DFL);
-    raise(signal_number);
-}
-
-static void catch_signals(const char *output)
-{
-    int length = snprintf(part_path, sizeof part_path, "%s.part-%ld", output, (long)getpid());
-    if (length < 0 || (size_t)length >= sizeof part_path)
-        return;
-    struct sigaction action = {.sa_handler = remove_part, .sa_flags = (int)SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGHUP, &action, NULL);
-    sigaction(SIGPIPE, &action, NULL); /* of who reads the progress */
-    signal(SIGXFSZ, SIG_IGN);          /* a file at its limit is an error like a full disk */
+    char path[4096];
+    int length = snprintf(path, sizeof path, "%s.part-%ld", output, (long)getpid());
+    if (length >= 0 && (size_t)length < sizeof path)
+        spl_cmd_remove_unfinished(path);
 }
 
 static const struct spl_cmd_option options[] = {
@@ -102,7 +88,7 @@ int spl_cmd_collect(int argc, char **argv)
         rc = spl_cmd_check_ending("-o", o.output, "spld", &err);
     if (rc)
         return spl_cmd_fail(&err);
-    catch_signals(o.output);
+    clean_up_on_signals(o.output);
     rc = spl_collect(&o, &err);
     spl_cmd_progress_finish(&progress);
     if (!rc)

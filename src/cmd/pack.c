@@ -2,49 +2,33 @@
  * is never touched before the library's last rename. */
 #include "cmd/pack.h"
 
-#include <signal.h>
 #include <stdio.h>
 #include <unistd.h>
 
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/table.h"
+#include "cmd/unfinished.h"
 #include "service/datasets/catalog.h"
 
-/* Of the dataset; of the scan while photographs or maps are put onto it, and of its points where it has panels; and the
- * parts of these two. */
-enum { parts = 5 };
-static char part_paths[parts][4096];
-
-static void remove_part(int signal_number)
+/* The dataset's temporary file; the scan's while photographs or maps are put onto it, and its points' where it has
+ * panels; and the parts of these two. */
+static void clean_up_on_signals(const char *output)
 {
-    for (int i = 0; i < parts; i++)
-        if (part_paths[i][0])
-            unlink(part_paths[i]);
-    signal(signal_number, SIG_DFL);
-    raise(signal_number);
-}
-
-static void catch_signals(const char *output)
-{
-    long pid = (long)getpid();
     static const char *const of[2] = {"scan", "points"};
-    int length = snprintf(part_paths[0], sizeof part_paths[0], "%s.part-%ld-points.part-%ld", output, pid, pid);
-    if (length < 0 || (size_t)length >= sizeof part_paths[0]) {
-        part_paths[0][0] = 0;
+    long pid = (long)getpid();
+    char path[4096];
+    int length = snprintf(path, sizeof path, "%s.part-%ld-points.part-%ld", output, pid, pid); /* the longest */
+    if (length < 0 || (size_t)length >= sizeof path)
         return;
-    }
-    snprintf(part_paths[0], sizeof part_paths[0], "%s.part-%ld", output, pid);
+    snprintf(path, sizeof path, "%s.part-%ld", output, pid);
+    spl_cmd_remove_unfinished(path);
     for (int i = 0; i < 2; i++) {
-        snprintf(part_paths[1 + i], sizeof part_paths[1 + i], "%s.part-%ld-%s", output, pid, of[i]);
-        snprintf(part_paths[3 + i], sizeof part_paths[3 + i], "%s.part-%ld-%s.part-%ld", output, pid, of[i], pid);
+        snprintf(path, sizeof path, "%s.part-%ld-%s", output, pid, of[i]);
+        spl_cmd_remove_unfinished(path);
+        snprintf(path, sizeof path, "%s.part-%ld-%s.part-%ld", output, pid, of[i], pid);
+        spl_cmd_remove_unfinished(path);
     }
-    struct sigaction action = {.sa_handler = remove_part, .sa_flags = (int)SA_RESETHAND};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGHUP, &action, NULL);
-    sigaction(SIGPIPE, &action, NULL); /* of who reads the progress */
-    signal(SIGXFSZ, SIG_IGN); /* a file at its limit is an error like a full disk */
 }
 
 /* A file may have any name, a dataset that is served may not. */
@@ -70,7 +54,7 @@ int spl_cmd_pack(int argc, char **argv)
     if (rc)
         return spl_cmd_fail(&err);
     warn_of_name(a.pack.output);
-    catch_signals(a.pack.output);
+    clean_up_on_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);
     if (!rc)

@@ -106,7 +106,8 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
     if (rc)
         return rc;
     spl_residency_begin_walk(residency, asker);
-    const uint32_t own = spl_dataset_get_info(dataset)->tiles ? spl_dataset_get_own_pages(dataset) : resident->device_slots;
+    bool tiled = spl_dataset_get_info(dataset)->tiles;
+    const uint32_t own = tiled ? spl_dataset_get_own_pages(dataset) : resident->device_slots;
     uint32_t next = *page;
     for (; next < own && next < *page + preload_ahead; next++) { // tiles' come as views need them
         bool first = next == SPL_FIRST_SLOT;

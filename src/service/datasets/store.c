@@ -164,7 +164,8 @@ int spl_incoming_check(struct spl_incoming *incoming, const char *target, const 
         return 0;
     char message[sizeof why.message];
     spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
-    const char *advice = rc == SPL_E_INPUT && incoming->bytes && !strstr(message, "collection") ? ": pack the scan first, then PUT that file" : "";
+    bool unpacked = rc == SPL_E_INPUT && incoming->bytes && !strstr(message, "collection");
+    const char *advice = unpacked ? ": pack the scan first, then PUT that file" : "";
     spl_incoming_abort(incoming);
     return spl_fail(err, rc, "%s%s", message, advice);
 }
