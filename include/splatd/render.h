@@ -121,6 +121,7 @@ struct spl_renderer_options {
     uint32_t first_page_chunks; /* most chunks in one of these pages: the draw list has room for them from the start */
     void (*wake)(void *context); /* by threads of the renderer's, several at once, when a page was read; may be NULL */
     void *wake_context;
+    unsigned sharers; /* renderers that take of the same device memory: what memory_limit 0 gives is divided; 0 = 1 */
 };
 #define SPL_TILE_SAMPLES (4ull << 20)
 

@@ -20,9 +20,8 @@ static const char *const unknown[] = {
     "What a GPU hour, a core hour, a TB stored and a TB sent cost: yours to multiply. The order above is that of a "
     "service "
     "whose GPUs cost most.",
-    "Whether views spread evenly. A dataset is one daemon's (deploy/haproxy.cfg), a daemon draws on one device, so "
-    "what all "
-    "look at has the views a second of one device, whatever the sum says.",
+    "Whether views spread evenly. A dataset is one daemon's (deploy/haproxy.cfg), a daemon draws on the devices of one "
+    "machine, so what all look at has the views a second of one machine, whatever the sum says.",
     "Several datasets as one: each has an id of its own, and a view shows one of them. Somebody has to say which, a "
     "map's "
     "tiles by their place, and nothing is drawn across their borders.",

@@ -57,7 +57,7 @@ static bool parse_uuid(const char *text, uint8_t uuid[16])
     return digits == 32;
 }
 
-static bool matches(const struct spl_device_info *info, const char *wanted)
+bool spl_gpu_matches(const struct spl_device_info *info, const char *wanted)
 {
     static const uint8_t no_uuid[16];
     uint8_t uuid[16] = {0};
@@ -96,7 +96,8 @@ static int open_device(const struct spl_gpu_backend *backend, uint32_t index, co
         return code;
     }
     // after the test, which says what the device can do and not what it may take
-    limits->memory_bytes = options->memory_limit ? options->memory_limit : limits->memory_bytes / 4 * 3;
+    uint64_t share = limits->memory_bytes / 4 * 3 / (options->sharers ? options->sharers : 1);
+    limits->memory_bytes = options->memory_limit ? options->memory_limit : share;
     if (limits->memory_bytes < spl_gpu_get_memory(gpu))
         limits->memory_bytes = spl_gpu_get_memory(gpu);
     *out = gpu;
@@ -115,7 +116,7 @@ int spl_gpu_open(const struct spl_gpu_options *options, struct spl_gpu **out, st
         for (size_t i = 0; i < count; i++) {
             const struct spl_device_info *info = &devices[i];
             struct spl_error failure = {0};
-            if (info->software != software || !matches(info, options->device))
+            if (info->software != software || !spl_gpu_matches(info, options->device))
                 continue;
             if (info->unusable[0]) {
                 append(reasons, sizeof reasons, info, info->unusable);

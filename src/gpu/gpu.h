@@ -24,7 +24,8 @@ struct spl_gpu_options {
     const char *device; /* as spl_renderer_options.device */
     bool require_gpu;
     bool debug;
-    uint64_t memory_limit; /* 0 = 3/4 of the device's */
+    uint64_t memory_limit; /* 0 = 3/4 of the device's, */
+    unsigned sharers;      /* divided by so many; 0 = 1 */
     const char *cache_dir; /* pipeline cache; NULL = $XDG_CACHE_HOME/splatd or ~/.cache/splatd; "" = none */
 };
 
@@ -50,6 +51,9 @@ uint64_t spl_gpu_get_memory(const struct spl_gpu *gpu); /* bytes of all live buf
 
 /* Warnings and errors of validation layers and GL debug output since the process began; any thread. */
 uint64_t spl_gpu_count_complaints(void);
+
+/* Does `wanted`, as of spl_gpu_options.device, mean this device? */
+bool spl_gpu_matches(const struct spl_device_info *info, const char *wanted);
 
 /* Every device of every backend, unusable ones with a reason; returns how many there are, writes at most capacity. */
 size_t spl_gpu_list(struct spl_device_info *devices, size_t capacity);

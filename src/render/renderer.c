@@ -32,6 +32,7 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
         .require_gpu = options->require_gpu,
         .debug = options->debug,
         .memory_limit = options->memory_limit,
+        .sharers = options->sharers,
     };
     rc = spl_gpu_open(&gpu, &renderer->gpu, err);
     if (!rc) {

@@ -145,7 +145,7 @@ void spl_reply_error(struct request *request, const struct spl_error *err)
     spl_reply_problem(request, status, info->name, err->field, err->message);
     if (request->response && info->retry)
         spl_reply_add_header(request, MHD_HTTP_HEADER_RETRY_AFTER, "%u",
-                             spl_pipeline_get_retry_after(request->service->views->pipeline, request->large));
+                             spl_fleet_get_retry_after(request->service->views->fleet, request->large));
 }
 
 struct pieces {

@@ -130,7 +130,7 @@ static void announce(struct spl_service *service)
 {
     const struct spl_catalog *catalog = &service->library->catalog;
     struct spl_pipeline_status status;
-    spl_pipeline_get_status(service->views->pipeline, &status);
+    spl_fleet_get_status(service->views->fleet, &status);
     spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
                  status.device.driver, status.device.software ? ", software" : "");
     for (size_t i = 0; i < catalog->count; i++) {
@@ -153,7 +153,7 @@ static void announce(struct spl_service *service)
 static void on_wake(uv_async_t *handle)
 {
     struct spl_service *service = handle->data;
-    enum spl_pipeline_state state = spl_pipeline_get_state(service->views->pipeline);
+    enum spl_pipeline_state state = spl_fleet_get_state(service->views->fleet);
     spl_library_take_changes(service); // first, so that what does not fit is not announced
     if (state == SPL_PIPELINE_READY && !service->http->daemon && !service->draining) {
         if (spl_http_start(service, &service->failure))
@@ -165,7 +165,7 @@ static void on_wake(uv_async_t *handle)
     spl_views_complete(service);
     spl_tours_pump(service->tours);
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
-        service->failure = *spl_pipeline_get_failure(service->views->pipeline);
+        service->failure = *spl_fleet_get_failure(service->views->fleet);
         drain(service);
     }
 }

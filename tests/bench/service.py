@@ -1,6 +1,6 @@
 """The figures of RESULTS.md about the service under load, one subcommand each, on the scan that measure.py takes.
 
-usage: service.py cached|saturation|overload|throughput|connections|tours [FRAMES]
+usage: service.py cached|saturation|overload|throughput|devices|connections|tours [FRAMES]
 
 Prints what was measured and how it stands to its bound; exit 1 beyond one, 77 without the data. What is bounded is a
 ratio of one run, or processor time: machines are shared and change within minutes. Where two programs are compared
@@ -38,10 +38,11 @@ def fresh(path):
 class Service:
     """with Service() as s: a daemon that serves the scan, once it answers."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, **environment):
         self.port, self.ops = free_port(), free_port()
         self.process = subprocess.Popen([SPLATD, "serve", "--listen", f"127.0.0.1:{self.port}", "--ops-listen",
-                                         f"127.0.0.1:{self.ops}", "--quiet", *arguments, packed(scan(), "grenoble")])
+                                         f"127.0.0.1:{self.ops}", "--quiet", *arguments, packed(scan(), "grenoble")],
+                                        env={**os.environ, **environment})
         self.pid = self.process.pid
 
     def status(self):
@@ -290,6 +291,28 @@ def throughput():
         asking.join()
 
 
+def devices():
+    """Views over HTTP for four clients: a daemon with two devices against one with one, a round of each in turn."""
+    paths = [view_query(i / 19) for i in range(20)]
+    for what, environment in (("a core a device", {"LP_NUM_THREADS": "0"}), ("all cores each", {})):
+        with Service("--cache", "0", "--device", "vulkan:0", **environment) as one, \
+                Service("--cache", "0", "--device", "vulkan:0,vulkan:0", **environment) as two:
+            same = all(get(one.port, path)[2] == get(two.port, path)[2] for path in paths)
+            rounds = {one: [], two: []}
+            for _ in range(5):
+                for s in (one, two):
+                    used, began = processor_s(s.pid), time.monotonic()
+                    ask_all(s.port, paths, 4)
+                    rounds[s].append(((time.monotonic() - began) / len(paths), (processor_s(s.pid) - used) / len(paths)))
+            single, double = ([statistics.median(x) for x in zip(*rounds[s])] for s in (one, two))
+            rate = statistics.median(a[0] / b[0] for a, b in zip(rounds[one], rounds[two]))
+            print(f"{what}: {1 / single[0]:.2f} views/s with one device, {1 / double[0]:.2f} with two: {rate:.2f} times the "
+                  f"rate; {1000 * single[1]:.0f} and {1000 * double[1]:.0f} ms of processor time a view; bytes "
+                  f"{'equal' if same else 'DIFFER'}", flush=True)
+            if environment:
+                bound("time of a view with two devices to that with one", 1 / rate, 1 / 1.6, "times")
+
+
 def tours():
     total = int(sys.argv[2]) if len(sys.argv) > 2 else 300
     path = {"keyframes": [{"camera": camera} for camera in cameras(2)]}
@@ -398,7 +421,7 @@ def connections():
 
 
 if __name__ == "__main__":
-    figures = {f.__name__: f for f in (cached, saturation, overload, throughput, connections, tours)}
+    figures = {f.__name__: f for f in (cached, saturation, overload, throughput, devices, connections, tours)}
     if not 2 <= len(sys.argv) <= (3 if sys.argv[1:2] == ["tours"] else 2) or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)

@@ -3,7 +3,8 @@
  * tile like the real one's, which those of soft models base and concentric end early where that is asked for; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
  * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
  * takes to put them on the device, and FAKE_HANG_MS that the first frame
- * ignores its deadline for, as a hanging driver does; FAKE_LOSE_LOADING pages of one dataset in which the device is lost.
+ * ignores its deadline for, as a hanging driver does; FAKE_LOSE_LOADING pages of one dataset in which the device is lost;
+ * FAKE_LOSE_FRAME that every frame begun meanwhile loses it, FAKE_REFUSE datasets that have no room; device "other" is of another kind.
  * TSan sees all of it, which it cannot with a driver that compiles its own code. */
 #include <splatd/render.h>
 
@@ -32,7 +33,7 @@ static long setting(const char *name, long otherwise)
 
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
 {
-    static long opened;
+    static _Atomic long opened;
     if (options->require_gpu || opened++ >= setting("FAKE_OPEN_LIMIT", 1000))
         return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
     usleep((useconds_t)setting("FAKE_OPEN_MS", 0) * 1000);
@@ -40,6 +41,8 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
         return SPL_E_NOMEM;
     (*out)->device =
         (struct spl_device_info){.backend = "fake", .name = "flat colour", .driver = "tests", .software = true};
+    if (options->device && !strcmp(options->device, "other"))
+        strcpy((*out)->device.name, "another colour");
     return 0;
 }
 
@@ -55,9 +58,13 @@ const struct spl_device_info *spl_renderer_get_device(const struct spl_renderer 
 
 int spl_renderer_add(struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
 {
+    static _Atomic long refused;
     (void)renderer;
     (void)dataset;
-    (void)err;
+    if (refused < setting("FAKE_REFUSE", 0)) {
+        refused++;
+        return spl_fail(err, SPL_E_LIMIT, "the fake device has no room");
+    }
     return 0;
 }
 
@@ -86,8 +93,8 @@ bool spl_renderer_wait(struct spl_renderer *renderer, uint64_t deadline_ns)
 int spl_renderer_preload_page(struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t *page,
                               bool *more, struct spl_error *err)
 {
-    static long late, losses;
-    static const struct spl_dataset *loser; /* the first that is loaded once it is set */
+    static _Atomic long late, losses;
+    static const struct spl_dataset *_Atomic loser; /* the first that is loaded once it is set */
     *more = false;
     if (losses < setting("FAKE_LOSE_LOADING", 0) && (!loser || loser == dataset)) {
         losses++;
@@ -234,7 +241,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     uint64_t tile = steps->left < SPL_TILE_SAMPLES ? steps->left : SPL_TILE_SAMPLES;
     double share = (double)tile / (double)spl_view_get_samples(&steps->view);
     *more = false;
-    if (renderer->lose_next || renderer->lost) {
+    if (renderer->lose_next || renderer->lost || setting("FAKE_LOSE_FRAME", 0)) {
         renderer->lost = true;
         return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
     }

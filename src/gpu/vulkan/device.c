@@ -16,6 +16,7 @@ static void vk_close(struct spl_gpu *base)
         vkDestroyPipelineCache(gpu->device, gpu->cache, NULL);
         vkDestroyDevice(gpu->device, NULL);
     }
+    vk_instance_give_back(gpu->instance);
     free(gpu);
 }
 
@@ -102,16 +103,15 @@ static int create_device(struct vk_gpu *gpu, bool *atomics_64, struct spl_error 
 static int vk_open(uint32_t index, const struct spl_gpu_options *options, struct spl_gpu **out, struct spl_error *err)
 {
     VkPhysicalDeviceProperties properties;
-    VkInstance instance;
     bool atomics_64;
     struct vk_gpu *gpu = spl_alloc(1, sizeof *gpu, err);
     if (!gpu)
         return SPL_E_NOMEM;
     gpu->base.backend = &spl_gpu_vulkan;
-    int code = vk_instance_get(options->debug, &instance, err);
+    int code = vk_instance_take(options->debug, &gpu->instance, err);
     if (code < 0)
         goto failed;
-    if (!vk_device_get(instance, index, &gpu->physical, &gpu->base.info, &gpu->family)) {
+    if (!vk_device_get(gpu->instance, index, &gpu->physical, &gpu->base.info, &gpu->family)) {
         code = spl_fail(err, SPL_E_NO_DEVICE, "vulkan: device %u has gone", index);
         goto failed;
     }

@@ -1,14 +1,21 @@
-/* The instance, one per process (two once something is opened for debugging), made when first asked for and never given
- * back: with it would go all drivers, whose unloading and loading again is slow and leaks inside them. Any thread. */
+/* Instances, made when first asked for and kept for the life of the process: with the last would go all drivers, whose
+ * unloading and loading again is slow and leaks inside them. Each device that is open has one to itself, as software
+ * drivers run what all devices of an instance are given one after the other. Any thread. */
 #include "gpu/vulkan/vk.h"
 
+#include <limits.h>
 #include <pthread.h>
 #include <string.h>
 
 #include "base/log.h"
 
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static VkInstance instances[2]; // guarded by: mutex; plain, debugging
+static struct {
+    VkInstance instance;
+    bool debug;
+    unsigned devices; /* that are open on it */
+} known[32];              // guarded by: mutex, as is:
+static size_t known_count;
 
 static VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                                  VkDebugUtilsMessageTypeFlagsEXT types,
@@ -79,13 +86,53 @@ static int create(bool debug, VkInstance *out, struct spl_error *err)
     return 0;
 }
 
-int vk_instance_get(bool debug, VkInstance *out, struct spl_error *err)
+/* The one with the fewest devices, which must be `devices` at most; NULL: none. With the mutex held. */
+static VkInstance find(bool debug, unsigned devices, bool takes)
 {
+    size_t best = known_count;
+    for (size_t i = 0; i < known_count; i++)
+        if (known[i].debug == debug && known[i].devices <= devices &&
+            (best == known_count || known[i].devices < known[best].devices))
+            best = i;
+    if (best == known_count)
+        return NULL;
+    known[best].devices += takes;
+    return known[best].instance;
+}
+
+static int get(bool debug, bool takes, VkInstance *out, struct spl_error *err)
+{
+    const size_t most = sizeof known / sizeof *known;
     int code = 0;
     pthread_mutex_lock(&mutex);
-    if (!instances[debug])
-        code = create(debug, &instances[debug], err);
-    *out = instances[debug];
+    *out = find(debug, takes ? 0 : UINT_MAX, takes);
+    if (!*out && known_count == most)
+        *out = find(debug, UINT_MAX, takes);
+    if (!*out && known_count == most)
+        code = spl_fail(err, SPL_E_LIMIT, "vulkan: %zu devices are open", most);
+    if (!*out && !code && !(code = create(debug, out, err))) {
+        known[known_count].instance = *out;
+        known[known_count].debug = debug;
+        known[known_count++].devices = takes;
+    }
     pthread_mutex_unlock(&mutex);
     return code;
+}
+
+int vk_instance_get(VkInstance *out, struct spl_error *err)
+{
+    return get(false, false, out, err);
+}
+
+int vk_instance_take(bool debug, VkInstance *out, struct spl_error *err)
+{
+    return get(debug, true, out, err);
+}
+
+void vk_instance_give_back(VkInstance instance)
+{
+    pthread_mutex_lock(&mutex);
+    for (size_t i = 0; i < known_count; i++)
+        known[i].devices -= instance && known[i].instance == instance;
+    pthread_mutex_unlock(&mutex);
 }

@@ -109,7 +109,7 @@ size_t vk_list(struct spl_device_info *devices, size_t capacity)
     struct spl_device_info info = {.backend = "vulkan", .name = "none"};
     VkInstance instance;
     size_t count = 0;
-    if (vk_instance_get(false, &instance, &err) < 0) {
+    if (vk_instance_get(&instance, &err) < 0) {
         snprintf(info.unusable, sizeof info.unusable, "%.*s", (int)sizeof info.unusable - 1, err.message);
         if (capacity)
             devices[0] = info;

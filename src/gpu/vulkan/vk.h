@@ -16,6 +16,7 @@ struct vk_list {
 
 struct vk_gpu {
     struct spl_gpu base;           /* first */
+    VkInstance instance;           // its own; NULL = not opened
     VkPhysicalDevice physical;
     VkPhysicalDeviceMemoryProperties memory;
     VkDevice device;
@@ -45,9 +46,12 @@ struct vk_kernel {
     VkPipeline pipeline;
 };
 
-/* instance.c. Borrowed for the life of the process; with `debug` it carries the validation layer where that is
- * installed. */
-int vk_instance_get(bool debug, VkInstance *out, struct spl_error *err);
+/* instance.c. Kept for the life of the process. get() borrows any, for who looks at devices; take() one that no other
+ * open device has, as far as there are enough, until give_back(); with `debug` it carries the validation layer where
+ * that is installed. */
+int vk_instance_get(VkInstance *out, struct spl_error *err);
+int vk_instance_take(bool debug, VkInstance *out, struct spl_error *err);
+void vk_instance_give_back(VkInstance instance); /* NULL-safe */
 
 /* list.c. Fills `err` with `what` and the name of `result`; the code is SPL_E_DEVICE_LOST for a lost device, else
  * `code`. */

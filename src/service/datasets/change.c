@@ -121,7 +121,7 @@ static void hand_to_device(struct change *change, struct spl_catalog_slot *slot)
     struct spl_catalog_entry *entry = change->entry;
     change->entry = NULL;
     slot->next = change->loading = entry;
-    spl_pipeline_add(change->service->views->pipeline, entry);
+    spl_fleet_add(change->service->views->fleet, entry);
 }
 
 static void serve(struct change *change, struct spl_catalog_slot *slot)

@@ -181,7 +181,7 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splats", count(info->splats));
     set(json, "points", count(info->points));
     set(json, "bytes", count(info->file_bytes));
-    set(json, "resident_bytes", count(atomic_load(&entry->resident_bytes)));
+    set(json, "resident_bytes", count(spl_catalog_entry_get_resident_bytes(entry)));
     set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
     if (!full)
         return json;

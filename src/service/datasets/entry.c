@@ -30,6 +30,8 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     if (!(entry = spl_alloc(1, sizeof *entry, err)))
         return rc;
     atomic_init(&entry->references, 1);
+    for (size_t i = 0; i < SPL_DEVICES_MAX; i++)
+        entry->replicas[i].entry = entry;
     if ((rc = spl_dataset_open_as(path, how, &entry->dataset, err)))
         goto done;
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
@@ -96,6 +98,14 @@ void spl_catalog_entry_destroy(struct spl_catalog_entry *entry)
     spl_saved_destroy(entry->saved);
     spl_dataset_close(entry->dataset);
     free(entry);
+}
+
+uint64_t spl_catalog_entry_get_resident_bytes(const struct spl_catalog_entry *entry)
+{
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < SPL_DEVICES_MAX; i++)
+        bytes += atomic_load(&entry->replicas[i].resident_bytes);
+    return bytes;
 }
 
 bool spl_catalog_id_is_valid(const char *id, size_t length)

@@ -1,8 +1,8 @@
 /* One version of one dataset, opened for serving. Immutable but for the fields that say who owns them; references are
  * counted, so that a version that was replaced or dropped lives until the last request about it is answered.
  *
- * Life: open() on any thread → add to the pipeline, which makes it resident → ready, references come and go → the last
- * unref() sends it back through the gpu thread, which lets its pages go → destroyed. */
+ * Life: open() on any thread → add to the fleet, whose devices make it resident → ready, references come and go → the
+ * last unref() sends it back through the gpu threads, which let its pages go → destroyed. */
 #ifndef SPL_SERVICE_ENTRY_H
 #define SPL_SERVICE_ENTRY_H
 
@@ -28,6 +28,25 @@ enum spl_entry_state {
     SPL_ENTRY_GONE,     /* the device has let go of it */
 };
 
+enum { SPL_DEVICES_MAX = 16 }; /* that serve at a time */
+
+/* An entry on one device. */
+struct spl_replica {
+    struct spl_catalog_entry *entry;
+    _Atomic uint64_t resident_bytes; /* on the device */
+    bool there;                      // owned by: loop, until the last unref; it is resident, or was put aside
+
+    /* Owned by whoever it was passed to last: the loop, or the gpu thread between add or release and the change. */
+    STAILQ_ENTRY(spl_replica) link;
+    enum spl_entry_state state;
+    struct spl_error err;
+    TAILQ_ENTRY(spl_replica) resident; // owned by: gpu
+    uint32_t pages_wanted;             // owned by: gpu; first page that is not there yet
+    bool loading;                      // owned by: gpu
+    bool aside;                        // owned by: gpu; no frame of it is begun any more
+    uint64_t lost_ns;                  // owned by: gpu; when the device was last lost in a frame of it, 0 = never
+};
+
 struct spl_catalog_entry {
     struct spl_dataset *dataset;
     const struct spl_dataset_info *info;
@@ -42,20 +61,18 @@ struct spl_catalog_entry {
     atomic_uint references;
     void (*release)(struct spl_catalog_entry *entry, void *context); // by the last unref; NULL: it is destroyed
     void *release_context;
-    _Atomic uint64_t resident_bytes; /* on the device */
     _Atomic uint32_t maps_at_once;   /* maps of stations that the memory limit has room for at a time */
     _Atomic uint64_t limit_bytes;    /* about the memory limit that holds all of it; 0 = not known, or it has no maps */
 
-    /* Owned by whoever it was passed to last: the loop, or the gpu thread between add or release and the change. */
-    STAILQ_ENTRY(spl_catalog_entry) link;
-    enum spl_entry_state state;
-    struct spl_error err;
-    TAILQ_ENTRY(spl_catalog_entry) resident; // owned by: gpu
-    uint32_t pages_wanted;                   // owned by: gpu; first page that is not there yet
-    bool loading;                            // owned by: gpu
-    bool aside;                              // owned by: gpu; no frame of it is begun any more
-    uint64_t lost_ns;                        // owned by: gpu; when the device was last lost in a frame of it, 0 = never
+    struct spl_replica replicas[SPL_DEVICES_MAX];
+    unsigned replicas_left;     // owned by: loop, until the last unref; which are still to be loaded, or to be let go of
+    unsigned home;              // owned by: loop; number of the device that draws it where none has less to do
+    enum spl_entry_state state; // owned by: loop
+    struct spl_error err;       // owned by: loop
 };
+
+/* Bytes of its pages on all devices. */
+uint64_t spl_catalog_entry_get_resident_bytes(const struct spl_catalog_entry *entry);
 
 /* Maps and checks the dataset at `path`, which lies at `place` or will: its profile is looked for there. Ends with
  * SPL_E_CANCELLED soon after *how->cancelled (borrowed for the entry's life; may be NULL) is set. Blocks on disk, any

@@ -91,7 +91,7 @@ static void after_opening(uv_work_t *work, int status)
     } else if (slot && opening->entry && !service->library->stopped) {
         slot->opened = opening->mark;
         slot->next = opening->entry;
-        spl_pipeline_add(service->views->pipeline, opening->entry);
+        spl_fleet_add(service->views->fleet, opening->entry);
         opening->entry = NULL;
     }
     spl_catalog_entry_unref(opening->entry);
@@ -218,7 +218,7 @@ static void put_aside(struct spl_service *service, struct spl_catalog_entry *ent
 
 void spl_library_take_changes(struct spl_service *service)
 {
-    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_change(service->views->pipeline));) {
+    for (struct spl_catalog_entry *entry; (entry = spl_fleet_take_change(service->views->fleet));) {
         if (entry->state == SPL_ENTRY_GONE) {
             close_entry(service, entry);
             continue;

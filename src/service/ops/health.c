@@ -22,8 +22,8 @@ enum { look_ms = 500 };
 
 static uint64_t get_still_ms(const struct spl_service *service)
 {
-    struct spl_pipeline *pipeline = service->views->pipeline;
-    return pipeline ? spl_pipeline_get_still_ns(pipeline) / SPL_NS_PER_MS : 0;
+    struct spl_fleet *fleet = service->views->fleet;
+    return fleet ? spl_fleet_get_still_ns(fleet) / SPL_NS_PER_MS : 0;
 }
 
 bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
@@ -39,21 +39,21 @@ bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
 
 bool spl_health_is_ready(struct spl_service *service, char why[SPL_HEALTH_TEXT])
 {
-    struct spl_pipeline *pipeline = service->views->pipeline;
+    struct spl_fleet *fleet = service->views->fleet;
     struct spl_pipeline_status status;
     if (service->leaving || service->draining) {
         snprintf(why, SPL_HEALTH_TEXT, "stopping");
         return false;
     }
-    if (!pipeline || !service->http->daemon || spl_library_has_nothing_yet(service)) {
+    if (!fleet || !service->http->daemon || spl_library_has_nothing_yet(service)) {
         snprintf(why, SPL_HEALTH_TEXT, "datasets are being loaded");
         return false;
     }
-    if (spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY) {
+    if (spl_fleet_get_state(fleet) != SPL_PIPELINE_READY) {
         snprintf(why, SPL_HEALTH_TEXT, "the device was lost and is being reopened");
         return false;
     }
-    spl_pipeline_get_status(pipeline, &status);
+    spl_fleet_get_status(fleet, &status);
     if (status.render_length >= status.render_capacity) {
         snprintf(why, SPL_HEALTH_TEXT, "the queue is full: %zu of %zu views", status.render_length,
                  status.render_capacity);
@@ -70,8 +70,8 @@ static void say_status(struct spl_service *service)
         [SPL_PIPELINE_REBUILDING] = "the device was lost and is being reopened",
         [SPL_PIPELINE_FAILED] = "the device is gone",
     };
-    struct spl_pipeline *pipeline = service->views->pipeline;
-    enum spl_pipeline_state state = pipeline ? spl_pipeline_get_state(pipeline) : SPL_PIPELINE_STARTING;
+    struct spl_fleet *fleet = service->views->fleet;
+    enum spl_pipeline_state state = fleet ? spl_fleet_get_state(fleet) : SPL_PIPELINE_STARTING;
     if (state != service->ops->said_state && !service->leaving)
         spl_supervisor_say_status(lines[state]);
     service->ops->said_state = state;

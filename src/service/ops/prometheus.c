@@ -35,10 +35,10 @@ static void print_counters(FILE *out, struct spl_counters *counters)
 #undef COUNTER
 }
 
-static void print_device(FILE *out, const struct spl_device_info *device)
+/* `number` tells the same device twice apart. */
+static void print_device(FILE *out, size_t number, const struct spl_device_info *device)
 {
-    fprintf(out,
-            "# HELP splatd_device_info What renders.\n# TYPE splatd_device_info gauge\nsplatd_device_info{backend=\"");
+    fprintf(out, "splatd_device_info{number=\"%zu\",backend=\"", number);
     spl_print_label(out, device->backend);
     fprintf(out, "\",index=\"%u\",name=\"", device->index);
     spl_print_label(out, device->name);
@@ -47,14 +47,30 @@ static void print_device(FILE *out, const struct spl_device_info *device)
     fprintf(out, "\",software=\"%s\"} 1\n", device->software ? "true" : "false");
 }
 
-static void print_pipeline(FILE *out, struct spl_service *service)
+static void print_devices(FILE *out, struct spl_fleet *fleet)
+{
+    static const char *const names[] = {"starting", "ready", "rebuilding", "failed"};
+    struct spl_pipeline_status status;
+    size_t of[sizeof names / sizeof *names] = {0};
+    fprintf(out, "# HELP splatd_device_info What renders.\n# TYPE splatd_device_info gauge\n");
+    for (size_t i = 0; i < spl_fleet_get_count(fleet); i++) {
+        spl_pipeline_get_status(spl_fleet_get(fleet, i), &status);
+        if (status.device.name[0])
+            print_device(out, i, &status.device);
+        of[spl_pipeline_get_state(spl_fleet_get(fleet, i))]++;
+    }
+    fprintf(out, "# HELP splatd_devices Devices that render, by their state.\n# TYPE splatd_devices gauge\n");
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        fprintf(out, "splatd_devices{state=\"%s\"} %zu\n", names[i], of[i]);
+}
+
+static void print_pipelines(FILE *out, struct spl_service *service)
 {
     struct spl_pipeline_status status;
-    if (!service->views->pipeline)
+    if (!service->views->fleet)
         return;
-    spl_pipeline_get_status(service->views->pipeline, &status);
-    if (status.device.name[0])
-        print_device(out, &status.device);
+    spl_fleet_get_status(service->views->fleet, &status);
+    print_devices(out, service->views->fleet);
     gauge(out, "splatd_queue_length", "Views that wait for the device, and large ones until they are encoded.",
           (double)(status.render_length + status.large_length));
     gauge(out, "splatd_queue_capacity", "Views that may wait.", (double)status.render_capacity);
@@ -67,7 +83,7 @@ static void print_pipeline(FILE *out, struct spl_service *service)
           (double)status.pages_pending);
     gauge(out, "splatd_frame_mean_seconds", "Moving mean of the time a frame takes.", status.frame_ms / 1000);
     gauge(out, "splatd_standstill_seconds", "For how long nothing has moved although there is work; 0 when idle.",
-          (double)spl_pipeline_get_still_ns(service->views->pipeline) / SPL_NS_PER_S);
+          (double)spl_fleet_get_still_ns(service->views->fleet) / SPL_NS_PER_S);
 }
 
 static double seconds(struct timeval t)
@@ -109,7 +125,7 @@ static void print_datasets(FILE *out, const struct spl_catalog *catalog)
         refused += slot->reason[0] != '\0';
         if (slot->current) // an id has no character that a label would have to escape
             fprintf(out, "splatd_dataset_resident_bytes{dataset=\"%s\"} %llu\n", slot->id,
-                    (unsigned long long)atomic_load(&slot->current->resident_bytes));
+                    (unsigned long long)spl_catalog_entry_get_resident_bytes(slot->current));
     }
     gauge(out, "splatd_datasets", "Datasets that are served.", served);
     gauge(out, "splatd_datasets_refused", "Datasets whose newest file is not served; /v1/datasets says why.", refused);
@@ -154,7 +170,7 @@ char *spl_prometheus_print(struct spl_service *service)
     gauge(out, "splatd_cache_entries", "How many they are.", (double)cache.entries);
     gauge(out, "splatd_reply_memory_bytes", "Images that clients have not read yet.", 
           (double)(service->views->reply_bytes + service->views->large_reply_bytes));
-    print_pipeline(out, service);
+    print_pipelines(out, service);
     print_process(out, service);
     print_counters(out, service->counters);
     spl_loop_turns_print(&service->ops->loop_turns, out);

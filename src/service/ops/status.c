@@ -38,6 +38,30 @@ static json_t *describe_device(const struct spl_device_info *device)
                      device->name, "driver", device->driver, "software", device->software);
 }
 
+static const char *const states[] = {"starting", "ready", "rebuilding", "failed"};
+
+/* One of several, with what it does at present. */
+static json_t *describe_pipeline(struct spl_pipeline *pipeline)
+{
+    struct spl_pipeline_status status;
+    spl_pipeline_get_status(pipeline, &status);
+    json_t *json = describe_device(&status.device);
+    set(json, "state", json_string(states[spl_pipeline_get_state(pipeline)]));
+    set(json, "device_bytes", count(status.device_bytes));
+    set(json, "device_limit_bytes", count(status.device_limit_bytes));
+    set(json, "queue_length", count(status.render_length + status.large_length));
+    set(json, "frame_ms", json_real(status.frame_ms));
+    return json;
+}
+
+static json_t *describe_devices(struct spl_fleet *fleet)
+{
+    json_t *json = json_array();
+    for (size_t i = 0; i < spl_fleet_get_count(fleet); i++)
+        json_array_append_new(json, describe_pipeline(spl_fleet_get(fleet, i)));
+    return json;
+}
+
 static json_t *describe_counters(struct spl_counters *counters)
 {
     json_t *json = json_object();
@@ -78,10 +102,9 @@ json_t *spl_describe_status(struct request *request)
     struct spl_service *service = request->service;
     const struct spl_views *views = service->views;
     const struct spl_catalog *catalog = &service->library->catalog;
-    static const char *const states[] = {"starting", "ready", "rebuilding", "failed"};
     struct spl_pipeline_status status;
-    spl_pipeline_get_status(views->pipeline, &status);
-    const char *state = service->draining ? "stopping" : states[spl_pipeline_get_state(views->pipeline)];
+    spl_fleet_get_status(views->fleet, &status);
+    const char *state = service->draining ? "stopping" : states[spl_fleet_get_state(views->fleet)];
     json_t *json = json_object(), *ids = json_array();
     for (size_t i = 0; i < catalog->count; i++)
         if (spl_access_may_see(request, catalog->slots[i].id))
@@ -90,6 +113,7 @@ json_t *spl_describe_status(struct request *request)
     set(json, "state", json_string(state));
     set(json, "uptime_s", json_real((double)(spl_now_ns() - service->ops->started_ns) / SPL_NS_PER_S));
     set(json, "device", describe_device(&status.device));
+    set(json, "devices", describe_devices(views->fleet));
     set(json, "limits", describe_limits(service->options));
     set(json, "parameters", spl_service_options_describe(service->options));
     set(json, "datasets", ids);

@@ -1,6 +1,6 @@
-/* The life of a tour: fed to the pipeline frame by frame, ended, removed.
+/* The life of a tour: fed to the devices frame by frame, ended, removed.
  *
- * Frames go to the pipeline's lane behind people's views, SPL_TOUR_IN_FLIGHT of them at a time, so that a view waits
+ * Frames go to the devices' ways behind people's views, a few of them for each device, so that a view waits
  * for one tour frame at most; the oldest tour that has frames to be made goes first. A frame that fails for a reason
  * that passes (a lost device, a deadline) is made again; anything else ends the tour and says why: a full disk, a
  * quota, a dataset that is no longer the same. Invariants: spl_tours.bytes is the sum of the tours' bytes; the frames
@@ -19,7 +19,7 @@
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
-enum { writing_max = 4, failures_max = 10 };
+enum { failures_max = 10 };
 
 bool spl_tour_has_ended(const struct spl_tour *tour)
 {
@@ -255,7 +255,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
     job->frame_number = frame;
     job->owner = tour;
     job->done = take_job;
-    if (spl_pipeline_submit(tours->service->views->pipeline, job, &err)) {
+    if (spl_fleet_submit(tours->service->views->fleet, job, &err)) {
         spl_job_destroy(job);
         return false;
     }
@@ -266,11 +266,18 @@ static bool submit(struct spl_tour *tour, size_t frame)
     return true;
 }
 
+/* Of each device one that is rendered and one that waits; and one that is encoded. */
+static size_t get_most_in_flight(const struct spl_tours *tours)
+{
+    return 2 * spl_fleet_get_count(tours->service->views->fleet) + 1;
+}
+
 void spl_tours_pump(struct spl_tours *tours)
 {
     if (!tours || tours->stopping || tours->service->draining ||
-        spl_pipeline_get_state(tours->service->views->pipeline) != SPL_PIPELINE_READY)
+        spl_fleet_get_state(tours->service->views->fleet) != SPL_PIPELINE_READY)
         return;
+    const size_t most = get_most_in_flight(tours);
     struct spl_tour *tour, *next;
     for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
         next = TAILQ_NEXT(tour, link);
@@ -278,7 +285,7 @@ void spl_tours_pump(struct spl_tours *tours)
             continue; // frames without a tour.json would be nobody's after a crash
         advance(tour);
         while (tour->state == SPL_TOUR_RENDERING && !tour->failure.code && tour->first_open < tour->spec.frames) {
-            if (tours->in_flight == SPL_TOUR_IN_FLIGHT || tours->in_flight + tours->writing >= writing_max)
+            if (tours->in_flight >= most || tours->in_flight + tours->writing > most)
                 return;
             if (tour->frames[tour->first_open] == SPL_FRAME_OPEN) {
                 if (!tour->began_ns) {

@@ -22,7 +22,7 @@ enum {
     SPL_TOUR_NAME = 16,        /* hex digits, random: a name cannot be guessed and is no path */
     SPL_TOURS_MAX = 1000,      /* kept at a time */
     SPL_TOURS_UNFINISHED = 32, /* of them; each holds its path in memory */
-    SPL_TOUR_IN_FLIGHT = 3     /* frames inside: one rendered, one waiting, one encoded; <= SPL_PIPELINE_BEHIND */
+    SPL_TOUR_IN_FLIGHT = 2 * SPL_DEVICES_MAX + 1 /* frames inside, at most: get_most_in_flight() */
 };
 
 enum spl_tour_state { SPL_TOUR_RENDERING, SPL_TOUR_VIDEO, SPL_TOUR_DONE, SPL_TOUR_FAILED };

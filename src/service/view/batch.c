@@ -174,7 +174,7 @@ static int begin(struct batch *batch, struct seat *seat, size_t i, struct spl_er
     const struct spl_view_request *view = &batch->views.views[i];
     struct spl_key key = {0};
     if (!view->planned) {
-        key = spl_key_make(view, batch->entry->info, spl_pipeline_get_renderer(service->views->pipeline));
+        key = spl_key_make(view, batch->entry->info, spl_fleet_get_renderer(service->views->fleet));
         struct spl_rendering *rendering = spl_cache_find(service->views->cache, &key);
         if (rendering) {
             spl_count(service->counters, cache_hits);
@@ -253,7 +253,7 @@ void spl_make_views(struct request *request, const struct spl_call *call)
     batch->request = request;
     batch->entry = spl_catalog_entry_ref(call->entry);
     struct spl_pipeline_status status;
-    spl_pipeline_get_status(service->views->pipeline, &status);
+    spl_fleet_get_status(service->views->fleet, &status);
     if (status.render_length >= status.render_capacity) {
         spl_count(service->counters, refused_full);
         spl_fail(&err, SPL_E_BUSY, "the queue of views is full; come back later");

@@ -45,7 +45,7 @@ static int launch(struct flight *flight, uint64_t deadline_ns, struct spl_error 
     job->deadline_ns = deadline_ns;
     job->owner = flight;
     job->done = land;
-    int rc = spl_pipeline_submit(flight->service->views->pipeline, job, err);
+    int rc = spl_fleet_submit(flight->service->views->fleet, job, err);
     if (rc)
         spl_job_destroy(job);
     else
@@ -98,7 +98,7 @@ int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct 
     flight->request = *request;
     spl_rays_ref(request->view.rays);
     flight->key = *key;
-    flight->renderer = spl_pipeline_get_renderer(service->views->pipeline);
+    flight->renderer = spl_fleet_get_renderer(service->views->fleet);
     int rc = launch(flight, ticket->deadline_ns, err);
     if (rc) {
         finish(flight);

@@ -1,5 +1,5 @@
-/* What the gpu thread has: turns (gpu_thread.c), the datasets on its device (gpu_datasets.c), losses of that
- * (gpu_loss.c). Only these include it; everything is owned by that thread. */
+/* What a gpu thread has, of which each device has one: turns (gpu_thread.c), the datasets on its device
+ * (gpu_datasets.c), losses of that (gpu_loss.c). Only these include it; everything is owned by that thread. */
 #ifndef SPL_SERVICE_GPU_H
 #define SPL_SERVICE_GPU_H
 
@@ -17,7 +17,7 @@ struct gpu {
     struct spl_turns turns;                  /* large views */
     const struct spl_job *drawn;             // whose turn it is; NULL between turns
     struct spl_job *behind;                  // may be NULL: the tour's frame that is being made, or is next
-    TAILQ_HEAD(, spl_catalog_entry) entries; /* that the renderer knows, or will after a rebuild */
+    TAILQ_HEAD(, spl_replica) replicas;      /* of entries that the renderer knows, or will after a rebuild */
     uint64_t pages_loaded, pages_evicted;    /* of this renderer, as published */
     uint64_t working_bytes;                  /* of the device's memory, whatever is drawn */
     bool loading_waits;                      /* for a page to be read */
@@ -32,18 +32,18 @@ void spl_gpu_tear_down(struct gpu *gpu); /* idempotent; the entries stay */
 /* Takes up what the loop wants added and lets go of what nobody refers to any more. Never blocks. */
 void spl_gpu_take_orders(struct gpu *gpu);
 
-/* Does the renderer know any that is drawn beside `entry`? */
-bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_catalog_entry *entry);
+/* Does the renderer know any that is drawn beside the one of `replica`? */
+bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_replica *replica);
 
-/* The entry whose pages are to be loaded next, or NULL. */
-struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu);
+/* The one whose pages are to be loaded next, or NULL. */
+struct spl_replica *spl_gpu_find_loading(struct gpu *gpu);
 
-/* Takes up those that have come, asks for the next and reports the entry with the last. SPL_E_DEVICE_LOST; everything
+/* Takes up those that have come, asks for the next and reports the replica with the last. SPL_E_DEVICE_LOST; everything
  * else is the entry's fault. */
-int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err);
+int spl_gpu_load_page(struct gpu *gpu, struct spl_replica *replica, struct spl_error *err);
 
 /* Gives back one that is being loaded, with the reason. */
-void spl_gpu_refuse(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why);
+void spl_gpu_refuse(struct gpu *gpu, struct spl_replica *replica, const struct spl_error *why);
 
 /* Gives back what is still to be loaded when the service stops. */
 void spl_gpu_refuse_loading(struct gpu *gpu);
@@ -64,7 +64,7 @@ void spl_gpu_set_state(struct spl_pipeline *pipeline, enum spl_pipeline_state st
 
 /* Finds who the device was lost for: the dataset of the page that was on its way to it, whoever's turn it was, else
  * that of the frame, `drawn`, which may be NULL. */
-void spl_gpu_blame(struct gpu *gpu, struct spl_catalog_entry *drawn);
+void spl_gpu_blame(struct gpu *gpu, struct spl_replica *drawn);
 
 /* Makes a new renderer after a loss; false when the process had better end. */
 bool spl_gpu_recover(struct gpu *gpu, const struct spl_error *why);

@@ -1,4 +1,4 @@
-/* Datasets on the gpu thread's device: which ones the renderer knows, their pages, and what has no room. Versions are
+/* Datasets on a gpu thread's device: which ones the renderer knows, their pages, and what has no room. Versions are
  * added a page at a time between frames, so that nobody waits for them. Owned by the gpu thread. */
 #include <inttypes.h>
 
@@ -14,11 +14,11 @@ void spl_gpu_publish_residency(struct gpu *gpu)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
     struct spl_residency_info info;
-    struct spl_catalog_entry *entry;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    struct spl_replica *replica;
+    TAILQ_FOREACH(replica, &gpu->replicas, resident)
     {
-        spl_renderer_get_residency(gpu->renderer, entry->dataset, &info);
-        atomic_store(&entry->resident_bytes, info.bytes);
+        spl_renderer_get_residency(gpu->renderer, replica->entry->dataset, &info);
+        atomic_store(&replica->resident_bytes, info.bytes);
     }
     spl_renderer_get_residency(gpu->renderer, NULL, &info);
     atomic_store(&pipeline->device_bytes, info.taken_bytes);
@@ -103,39 +103,38 @@ static int preload(struct gpu *gpu, const struct spl_catalog_entry *entry, struc
 }
 
 /* A page that is being read of it ends by itself: nobody waits for a disk here. */
-static void let_entry_go(struct gpu *gpu, struct spl_catalog_entry *entry)
+static void let_go(struct gpu *gpu, struct spl_replica *replica)
 {
-    spl_renderer_remove(gpu->renderer, entry->dataset);
-    TAILQ_REMOVE(&gpu->entries, entry, resident);
+    spl_renderer_remove(gpu->renderer, replica->entry->dataset);
+    TAILQ_REMOVE(&gpu->replicas, replica, resident);
+    atomic_store(&replica->resident_bytes, 0);
     spl_gpu_publish_residency(gpu);
 }
 
-/* Gives back an entry that was to be added; the last unref() need not come here any more. */
-static void refuse_entry(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+/* Gives back an entry that was to be added. */
+static void refuse(struct gpu *gpu, struct spl_replica *replica, const struct spl_error *why)
 {
-    entry->err = *why;
-    entry->loading = false;
-    entry->release = NULL;
-    spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_REFUSED);
+    replica->err = *why;
+    replica->loading = false;
+    spl_pipeline_report_change(gpu->pipeline, replica, SPL_ENTRY_REFUSED);
 }
 
-void spl_gpu_refuse(struct gpu *gpu, struct spl_catalog_entry *entry, const struct spl_error *why)
+void spl_gpu_refuse(struct gpu *gpu, struct spl_replica *replica, const struct spl_error *why)
 {
-    let_entry_go(gpu, entry);
-    refuse_entry(gpu, entry, why);
+    let_go(gpu, replica);
+    refuse(gpu, replica, why);
 }
 
 /* What the device has no room for is refused at start, when nobody has asked for it yet; not in a device that is
  * reopened, where requests refer to it: there its views fail, and say why. */
-static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int rc, struct spl_error *err)
+static int refuse_misfit(struct gpu *gpu, struct spl_replica *replica, int rc, struct spl_error *err)
 {
     if (rc != SPL_E_LIMIT && rc != SPL_E_NOMEM)
         return rc;
     if (spl_pipeline_get_state(gpu->pipeline) == SPL_PIPELINE_STARTING) {
-        let_entry_go(gpu, entry);
-        refuse_entry(gpu, entry, err);
+        spl_gpu_refuse(gpu, replica, err);
     } else {
-        spl_log_error("dataset %s cannot be loaded: %s", entry->info->id, err->message);
+        spl_log_error("dataset %s cannot be loaded: %s", replica->entry->info->id, err->message);
     }
     *err = (struct spl_error){0};
     return 0;
@@ -144,13 +143,14 @@ static int refuse_misfit(struct gpu *gpu, struct spl_catalog_entry *entry, int r
 int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
-    struct spl_catalog_entry *entry, *next;
+    struct spl_replica *replica, *next;
     struct spl_renderer_options options = pipeline->options.renderer;
     uint64_t maps = 0;
     options.wake = on_page_read;
     options.wake_context = pipeline;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    TAILQ_FOREACH(replica, &gpu->replicas, resident)
     {
+        const struct spl_catalog_entry *entry = replica->entry;
         size_t bytes = spl_dataset_get_page_bytes(entry->dataset, 0);
         if (options.first_page_bytes < bytes + 4) // and the word more that residency.c takes
             options.first_page_bytes = bytes + 4;
@@ -173,19 +173,19 @@ int spl_gpu_build(struct gpu *gpu, struct spl_error *err)
     pipeline->device = *spl_renderer_get_device(gpu->renderer);
     pthread_mutex_unlock(&pipeline->mutex);
     atomic_store(&pipeline->renderer, spl_renderer_hash(&pipeline->device));
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
+    TAILQ_FOREACH(replica, &gpu->replicas, resident)
     {
-        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
-        entry->pages_wanted = 0;
-        if ((rc = spl_renderer_add(gpu->renderer, entry->dataset, err)))
+        spl_plan_set_device(replica->entry->plan, spl_renderer_get_device(gpu->renderer));
+        replica->pages_wanted = 0;
+        if ((rc = spl_renderer_add(gpu->renderer, replica->entry->dataset, err)))
             return rc;
-        judge_maps(gpu, entry);
+        judge_maps(gpu, replica->entry);
     }
-    for (entry = TAILQ_FIRST(&gpu->entries); entry; entry = next) {
-        next = TAILQ_NEXT(entry, resident);
+    for (replica = TAILQ_FIRST(&gpu->replicas); replica; replica = next) {
+        next = TAILQ_NEXT(replica, resident);
         /* What is on a server comes when a view wants it: one that hangs would hold up all. */
-        bool here = !entry->loading && !entry->aside && !spl_dataset_is_remote(entry->dataset);
-        if (here && (rc = preload(gpu, entry, err)) && (rc = refuse_misfit(gpu, entry, rc, err)))
+        bool here = !replica->loading && !replica->aside && !spl_dataset_is_remote(replica->entry->dataset);
+        if (here && (rc = preload(gpu, replica->entry, err)) && (rc = refuse_misfit(gpu, replica, rc, err)))
             return rc;
     }
     spl_gpu_publish_residency(gpu);
@@ -204,60 +204,61 @@ void spl_gpu_tear_down(struct gpu *gpu)
 
 void spl_gpu_take_orders(struct gpu *gpu)
 {
-    for (struct spl_catalog_entry *entry; (entry = spl_pipeline_take_order(gpu->pipeline));) {
-        if (entry->state == SPL_ENTRY_LEAVING) {
-            let_entry_go(gpu, entry);
-            spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_GONE);
+    for (struct spl_replica *replica; (replica = spl_pipeline_take_order(gpu->pipeline));) {
+        if (replica->state == SPL_ENTRY_LEAVING) {
+            let_go(gpu, replica);
+            spl_pipeline_report_change(gpu->pipeline, replica, SPL_ENTRY_GONE);
             continue;
         }
-        spl_plan_set_device(entry->plan, spl_renderer_get_device(gpu->renderer));
-        TAILQ_INSERT_TAIL(&gpu->entries, entry, resident);
-        entry->pages_wanted = 0;
-        entry->loading = true;
+        spl_plan_set_device(replica->entry->plan, spl_renderer_get_device(gpu->renderer));
+        TAILQ_INSERT_TAIL(&gpu->replicas, replica, resident);
+        replica->pages_wanted = 0;
+        replica->loading = true;
         struct spl_error err = {0};
-        if (spl_renderer_add(gpu->renderer, entry->dataset, &err))
-            spl_gpu_refuse(gpu, entry, &err);
+        if (spl_renderer_add(gpu->renderer, replica->entry->dataset, &err))
+            spl_gpu_refuse(gpu, replica, &err);
     }
 }
 
-bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_catalog_entry *entry)
+bool spl_gpu_has_others(const struct gpu *gpu, const struct spl_replica *replica)
 {
-    struct spl_catalog_entry *other;
-    TAILQ_FOREACH(other, &gpu->entries, resident)
-    if (other != entry && !other->aside)
+    struct spl_replica *other;
+    TAILQ_FOREACH(other, &gpu->replicas, resident)
+    if (other != replica && !other->aside)
         return true;
     return false;
 }
 
-struct spl_catalog_entry *spl_gpu_find_loading(struct gpu *gpu)
+struct spl_replica *spl_gpu_find_loading(struct gpu *gpu)
 {
-    struct spl_catalog_entry *entry;
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    if (entry->loading)
-        return entry;
+    struct spl_replica *replica;
+    TAILQ_FOREACH(replica, &gpu->replicas, resident)
+    if (replica->loading)
+        return replica;
     return NULL;
 }
 
-int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct spl_error *err)
+int spl_gpu_load_page(struct gpu *gpu, struct spl_replica *replica, struct spl_error *err)
 {
     bool more;
     struct spl_error why = {0};
-    uint32_t before = entry->pages_wanted;
-    int rc = spl_renderer_preload_page(gpu->renderer, entry->dataset, &entry->pages_wanted, &more, &why);
-    if (!rc && spl_dataset_is_remote(entry->dataset)) // its first page comes as well: others do not wait for its server
+    const struct spl_dataset *dataset = replica->entry->dataset;
+    uint32_t before = replica->pages_wanted;
+    int rc = spl_renderer_preload_page(gpu->renderer, dataset, &replica->pages_wanted, &more, &why);
+    if (!rc && spl_dataset_is_remote(dataset)) // its first page comes as well: others do not wait for its server
         more = false;
-    gpu->loading_waits = !rc && more && entry->pages_wanted == before;
+    gpu->loading_waits = !rc && more && replica->pages_wanted == before;
     if (gpu->loading_waits)
         return 0;
     if (rc == SPL_E_DEVICE_LOST)
         return spl_fail(err, rc, "%s", why.message);
     spl_gpu_publish_residency(gpu);
     if (rc) {
-        spl_gpu_refuse(gpu, entry, &why);
+        spl_gpu_refuse(gpu, replica, &why);
     } else if (!more) {
-        entry->loading = false;
-        judge_maps(gpu, entry);
-        spl_pipeline_report_change(gpu->pipeline, entry, SPL_ENTRY_RESIDENT);
+        replica->loading = false;
+        judge_maps(gpu, replica->entry);
+        spl_pipeline_report_change(gpu->pipeline, replica, SPL_ENTRY_RESIDENT);
     }
     return 0;
 }
@@ -265,6 +266,8 @@ int spl_gpu_load_page(struct gpu *gpu, struct spl_catalog_entry *entry, struct s
 void spl_gpu_refuse_loading(struct gpu *gpu)
 {
     struct spl_error err = {.code = SPL_E_CANCELLED, .message = "the service is stopping"};
-    for (struct spl_catalog_entry *entry; (entry = spl_gpu_find_loading(gpu));)
-        refuse_entry(gpu, entry, &err);
+    for (struct spl_replica *replica; (replica = spl_gpu_find_loading(gpu));) {
+        TAILQ_REMOVE(&gpu->replicas, replica, resident);
+        refuse(gpu, replica, &err);
+    }
 }

@@ -6,7 +6,7 @@
  * `rebuild_window_ns` that are not explained by this end the process, for its supervisor to decide.
  *
  * Tests inject losses with the environment variable SPLATD_INJECT_LOSS_AFTER=N[xK]: after every N frames the device is
- * lost, K times in all (1 when left out). */
+ * lost, K times in all (1 when left out); of several devices the second for the first time after twice as many, … */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -61,13 +61,13 @@ static bool may_rebuild(struct gpu *gpu)
     return allowed;
 }
 
-/* The device was lost for `entry`, to which the caller has a reference, or which is loading. The second time the
- * dataset is the fault, and its losses do not count against the device. */
-static void blame_entry(struct gpu *gpu, struct spl_catalog_entry *entry)
+/* The device was lost for the entry of `replica`, to which the caller has a reference, or which is loading. The second
+ * time the dataset is the fault, and its losses do not count against the device. */
+static void blame(struct gpu *gpu, struct spl_replica *replica)
 {
-    uint64_t now = spl_now_ns(), before = entry->lost_ns;
-    entry->lost_ns = now;
-    if (entry->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, entry))
+    uint64_t now = spl_now_ns(), before = replica->lost_ns;
+    replica->lost_ns = now;
+    if (replica->aside || !before || now - before > aside_window_ns || !spl_gpu_has_others(gpu, replica))
         return;
     struct spl_error why = {0};
     spl_fail(&why, SPL_E_DEVICE_LOST,
@@ -75,37 +75,52 @@ static void blame_entry(struct gpu *gpu, struct spl_catalog_entry *entry)
              "tried again",
              (int)(aside_window_ns / (60 * SPL_NS_PER_S)));
     gpu->losses = 0;
-    if (entry->loading) {
-        spl_gpu_refuse(gpu, entry, &why);
+    if (replica->loading) {
+        spl_gpu_refuse(gpu, replica, &why);
         return;
     }
-    entry->aside = true;
-    entry->err = why;
-    spl_pipeline_report_change(gpu->pipeline, spl_catalog_entry_ref(entry), SPL_ENTRY_ASIDE);
+    replica->aside = true;
+    replica->err = why;
+    spl_catalog_entry_ref(replica->entry);
+    spl_pipeline_report_change(gpu->pipeline, replica, SPL_ENTRY_ASIDE);
 }
 
-void spl_gpu_blame(struct gpu *gpu, struct spl_catalog_entry *drawn)
+void spl_gpu_blame(struct gpu *gpu, struct spl_replica *drawn)
 {
     const struct spl_dataset *dataset = gpu->renderer ? spl_renderer_get_lost_dataset(gpu->renderer) : NULL;
-    struct spl_catalog_entry *entry, *held = NULL;
+    struct spl_catalog_entry *held = NULL;
+    struct spl_replica *replica;
     if (!dataset && drawn)
-        blame_entry(gpu, drawn);
-    TAILQ_FOREACH(entry, &gpu->entries, resident)
-    if (dataset && entry->dataset == dataset)
+        blame(gpu, drawn);
+    TAILQ_FOREACH(replica, &gpu->replicas, resident)
+    if (dataset && replica->entry->dataset == dataset)
         break;
-    if (!entry || (!entry->loading && !(held = spl_catalog_entry_try_ref(entry)))) // nobody's, or it is about to go
+    if (!replica)
         return;
-    blame_entry(gpu, entry);
+    if (!replica->loading && !(held = spl_catalog_entry_try_ref(replica->entry))) // it is about to go
+        return;
+    blame(gpu, replica);
     spl_catalog_entry_unref(held);
+}
+
+/* Of several, which. */
+static void describe(const struct gpu *gpu, char text[32])
+{
+    const struct spl_pipeline_options *options = &gpu->pipeline->options;
+    text[0] = '\0';
+    if (options->of > 1)
+        snprintf(text, 32, " %u of %u", options->number + 1, options->of);
 }
 
 bool spl_gpu_recover(struct gpu *gpu, const struct spl_error *why)
 {
     struct spl_error err = *why;
+    char which[32];
+    describe(gpu, which);
     spl_pipeline_touch(gpu->pipeline);
     spl_gpu_set_state(gpu->pipeline, SPL_PIPELINE_REBUILDING);
     for (;;) {
-        spl_log_warn("device lost: %s", err.message);
+        spl_log_warn("device%s lost: %s", which, err.message);
         refuse_waiting(gpu);
         spl_gpu_tear_down(gpu);
         if (!may_rebuild(gpu)) {
@@ -120,7 +135,7 @@ bool spl_gpu_recover(struct gpu *gpu, const struct spl_error *why)
             break;
         spl_gpu_blame(gpu, NULL);
     }
-    spl_log_info("device reopened: %s", spl_renderer_get_device(gpu->renderer)->name);
+    spl_log_info("device%s reopened: %s", which, spl_renderer_get_device(gpu->renderer)->name);
     spl_gpu_set_state(gpu->pipeline, SPL_PIPELINE_READY);
     return true;
 }
@@ -145,5 +160,5 @@ void spl_gpu_plan_losses(struct gpu *gpu)
     const char *losses = getenv("SPLATD_INJECT_LOSS_AFTER");
     if (losses && sscanf(losses, "%" SCNu64 "x%" SCNu64, &gpu->inject_every, &gpu->inject_left) == 1)
         gpu->inject_left = 1;
-    gpu->inject_at = gpu->inject_every;
+    gpu->inject_at = gpu->inject_every * (gpu->pipeline->options.number + 1);
 }

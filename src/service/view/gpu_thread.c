@@ -1,4 +1,4 @@
-/* The gpu thread: the only one that touches the renderer, for its whole life.
+/* The gpu thread of a device: the only one that touches its renderer, for its whole life.
  *
  * It renders a tile at a time, or a piece of one that is much work, and then asks again whose turn it is (turns.h), so
  * a view of many tiles is interrupted by others, ends between two of its tiles when nobody waits for it any more, and
@@ -79,8 +79,9 @@ static bool gives_way(void *context, uint64_t walked_ns, uint64_t prepared_ns)
 
 static int begin(struct gpu *gpu, struct spl_job *job)
 {
-    if (job->entry && job->entry->aside)
-        return spl_fail(&job->err, job->entry->err.code, "%s", job->entry->err.message);
+    const struct spl_replica *replica = spl_pipeline_get_replica(gpu->pipeline, job->entry);
+    if (replica && replica->aside)
+        return spl_fail(&job->err, replica->err.code, "%s", replica->err.message);
     spl_gpu_inject(gpu);
     int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
     if (!rc) {
@@ -194,9 +195,10 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     spl_pipeline_touch(pipeline);
     struct spl_error err = job->err;
     if (rc) {
-        bool lost = err.code == SPL_E_DEVICE_LOST && !(job->entry && job->entry->aside);
+        struct spl_replica *replica = spl_pipeline_get_replica(pipeline, job->entry);
+        bool lost = err.code == SPL_E_DEVICE_LOST && !(replica && replica->aside);
         if (lost)
-            spl_gpu_blame(gpu, job->entry);
+            spl_gpu_blame(gpu, replica);
         spl_gpu_leave(gpu, job);
         return !lost || spl_gpu_recover(gpu, &err);
     }
@@ -285,7 +287,7 @@ static void run(struct gpu *gpu)
         spl_gpu_take_orders(gpu);
         if (spl_gpu_upload(gpu, &err) && !spl_gpu_reopen(gpu, &err))
             break;
-        struct spl_catalog_entry *loading = spl_gpu_find_loading(gpu);
+        struct spl_replica *loading = spl_gpu_find_loading(gpu);
         bool closed = spl_queue_is_closed(gpu->pipeline->render); // asked first: nothing comes by any way from then on
         struct spl_job *job = choose(gpu, (!loading || gpu->loading_waits) && !gpu->uploads_left);
         if (!job && closed) {
@@ -306,10 +308,10 @@ void *spl_gpu_thread_run(void *argument)
     const struct spl_pipeline_options *options = &gpu.pipeline->options;
     struct spl_error err = {0};
     spl_gpu_plan_losses(&gpu);
-    TAILQ_INIT(&gpu.entries);
+    TAILQ_INIT(&gpu.replicas);
     spl_turns_init(&gpu.turns);
     for (size_t i = 0; i < options->entry_count; i++)
-        TAILQ_INSERT_TAIL(&gpu.entries, options->entries[i], resident);
+        TAILQ_INSERT_TAIL(&gpu.replicas, spl_pipeline_get_replica(gpu.pipeline, options->entries[i]), resident);
     if (spl_gpu_build(&gpu, &err)) {
         spl_gpu_give_up(&gpu, &err);
     } else {
@@ -318,5 +320,7 @@ void *spl_gpu_thread_run(void *argument)
     }
     spl_gpu_tear_down(&gpu);
     spl_gpu_refuse_loading(&gpu);
+    atomic_store(&gpu.pipeline->ended, true);
+    options->wake(options->wake_context);
     return NULL;
 }

@@ -73,55 +73,58 @@ void spl_pipeline_hand_back(struct spl_pipeline *pipeline, struct spl_job *job)
     pipeline->options.wake(pipeline->options.wake_context);
 }
 
+struct spl_replica *spl_pipeline_get_replica(const struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
+{
+    return entry ? &entry->replicas[pipeline->options.number] : NULL;
+}
+
 static void order(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry, enum spl_entry_state state)
 {
+    struct spl_replica *replica = spl_pipeline_get_replica(pipeline, entry);
     pthread_mutex_lock(&pipeline->mutex);
-    entry->state = state;
-    STAILQ_INSERT_TAIL(&pipeline->orders, entry, link);
+    replica->state = state;
+    STAILQ_INSERT_TAIL(&pipeline->orders, replica, link);
     pthread_mutex_unlock(&pipeline->mutex);
     spl_queue_interrupt(pipeline->render);
 }
 
-static void on_released(struct spl_catalog_entry *entry, void *context)
-{
-    order(context, entry, SPL_ENTRY_LEAVING);
-}
-
 void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
 {
-    entry->release = on_released;
-    entry->release_context = pipeline;
     order(pipeline, entry, SPL_ENTRY_LOADING);
 }
 
-struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline)
+void spl_pipeline_drop(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
 {
-    pthread_mutex_lock(&pipeline->mutex);
-    struct spl_catalog_entry *entry = STAILQ_FIRST(&pipeline->orders);
-    if (entry)
-        STAILQ_REMOVE_HEAD(&pipeline->orders, link);
-    pthread_mutex_unlock(&pipeline->mutex);
-    return entry;
+    order(pipeline, entry, SPL_ENTRY_LEAVING);
 }
 
-void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry,
-                                enum spl_entry_state state)
+struct spl_replica *spl_pipeline_take_order(struct spl_pipeline *pipeline)
 {
     pthread_mutex_lock(&pipeline->mutex);
-    entry->state = state;
-    STAILQ_INSERT_TAIL(&pipeline->changes, entry, link);
+    struct spl_replica *replica = STAILQ_FIRST(&pipeline->orders);
+    if (replica)
+        STAILQ_REMOVE_HEAD(&pipeline->orders, link);
+    pthread_mutex_unlock(&pipeline->mutex);
+    return replica;
+}
+
+void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_replica *replica, enum spl_entry_state state)
+{
+    pthread_mutex_lock(&pipeline->mutex);
+    replica->state = state;
+    STAILQ_INSERT_TAIL(&pipeline->changes, replica, link);
     pthread_mutex_unlock(&pipeline->mutex);
     pipeline->options.wake(pipeline->options.wake_context);
 }
 
-struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline)
+struct spl_replica *spl_pipeline_take_change(struct spl_pipeline *pipeline)
 {
     pthread_mutex_lock(&pipeline->mutex);
-    struct spl_catalog_entry *entry = STAILQ_FIRST(&pipeline->changes);
-    if (entry)
+    struct spl_replica *replica = STAILQ_FIRST(&pipeline->changes);
+    if (replica)
         STAILQ_REMOVE_HEAD(&pipeline->changes, link);
     pthread_mutex_unlock(&pipeline->mutex);
-    return entry;
+    return replica;
 }
 
 /* The queue to the large encoder has room for every job that can be inside, as `done` has, so nothing waits for it. */
@@ -170,10 +173,6 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
         rc = start_encoders(pipeline, err);
     if (rc)
         goto fail;
-    for (size_t i = 0; i < options->entry_count; i++) {
-        options->entries[i]->release = on_released;
-        options->entries[i]->release_context = pipeline;
-    }
     if ((rc = pthread_create(&pipeline->gpu_thread, NULL, spl_gpu_thread_run, pipeline))) {
         rc = spl_fail_errno(err, rc, "cannot start the gpu thread");
         goto fail;
@@ -182,22 +181,8 @@ int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_p
     *out = pipeline;
     return 0;
 fail:
-    for (size_t i = 0; i < options->entry_count; i++)
-        options->entries[i]->release = NULL;
     spl_pipeline_destroy(pipeline);
     return rc;
-}
-
-/* Once the gpu thread has gone. The last unref() of one that was on its way adds it to the orders. */
-static void destroy_entries(struct spl_pipeline *pipeline)
-{
-    for (struct spl_catalog_entry *entry;
-         (entry = spl_pipeline_take_order(pipeline)) || (entry = spl_pipeline_take_change(pipeline));) {
-        if (entry->state == SPL_ENTRY_LEAVING || entry->state == SPL_ENTRY_GONE)
-            spl_catalog_entry_destroy(entry);
-        else
-            spl_catalog_entry_unref(entry);
-    }
 }
 
 static void close_queue(struct spl_queue *queue)
@@ -213,24 +198,31 @@ void spl_pipeline_close_render(struct spl_pipeline *pipeline)
     close_queue(pipeline->render); // last: the gpu thread ends when it finds it closed and empty
 }
 
-void spl_pipeline_destroy(struct spl_pipeline *pipeline)
+void spl_pipeline_stop(struct spl_pipeline *pipeline)
 {
-    if (!pipeline)
-        return;
     spl_pipeline_close_render(pipeline);
     if (pipeline->gpu_started)
         pthread_join(pipeline->gpu_thread, NULL);
+    pipeline->gpu_started = false;
     close_queue(pipeline->encode);
     close_queue(pipeline->encode_large);
     for (size_t i = 0; i < pipeline->encode_started; i++)
         pthread_join(pipeline->encode_threads[i], NULL);
+    pipeline->encode_started = 0;
     if (pipeline->large_started)
         pthread_join(pipeline->large_thread, NULL);
+    pipeline->large_started = false;
     spl_far_picks_finish(&pipeline->far);
     if (pipeline->done)
         for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
             spl_job_destroy(job);
-    destroy_entries(pipeline);
+}
+
+void spl_pipeline_destroy(struct spl_pipeline *pipeline)
+{
+    if (!pipeline)
+        return;
+    spl_pipeline_stop(pipeline);
     spl_queue_destroy(pipeline->done);
     spl_queue_destroy(pipeline->encode_large);
     spl_queue_destroy(pipeline->encode);
@@ -252,6 +244,8 @@ int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, stru
         spl_fail(err, rc, "%zu views are on their way; come back later", spl_queue_get_capacity(pipeline->done));
     if (rc)
         atomic_fetch_sub(&pipeline->in_flight, 1);
+    else if (!job->behind)
+        pipeline->samples_inside += job->samples; // which nobody changes
     return rc;
 }
 
@@ -260,6 +254,7 @@ struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline)
     struct spl_job *job = spl_queue_pop(pipeline->done, 0);
     if (job) {
         atomic_fetch_sub(&pipeline->in_flight, 1);
+        pipeline->samples_inside -= job->behind ? 0 : job->samples;
         spl_pipeline_let_out(pipeline, job);
     }
     return job;
@@ -268,6 +263,11 @@ struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline)
 enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline)
 {
     return (enum spl_pipeline_state)atomic_load(&pipeline->state);
+}
+
+bool spl_pipeline_has_ended(struct spl_pipeline *pipeline)
+{
+    return !pipeline->gpu_started || atomic_load(&pipeline->ended);
 }
 
 uint64_t spl_pipeline_get_renderer(struct spl_pipeline *pipeline)
@@ -287,6 +287,8 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
         .device_bytes = atomic_load(&pipeline->device_bytes),
         .device_limit_bytes = atomic_load(&pipeline->device_limit_bytes),
         .pages_pending = atomic_load(&pipeline->pages_pending),
+        .samples_inside = pipeline->samples_inside,
+        .behind_length = pipeline->behind_load.jobs,
         .render_length = spl_queue_get_length(pipeline->render),
         .render_capacity = spl_queue_get_capacity(pipeline->render),
         .encode_length = spl_queue_get_length(pipeline->encode),

@@ -1,4 +1,4 @@
-/* From a checked view to encoded bytes: the gpu thread and the encode threads, tied by bounded queues.
+/* From a checked view to encoded bytes on one device: its gpu thread and encode threads, tied by bounded queues.
  *
  *     submit → [render queue] → gpu → [encode queue] → encode → [done queue] → take
  *
@@ -7,8 +7,8 @@
  * they fill nothing that small ones need. Frames of tours stand behind both.
  *
  * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
- * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and the
- * last unref() of one send it to the gpu thread, take_change() brings it back. */
+ * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and
+ * drop() send their replicas to the gpu thread, take_change() brings them back. Devices are a fleet of these (fleet.h). */
 #ifndef SPL_SERVICE_PIPELINE_H
 #define SPL_SERVICE_PIPELINE_H
 
@@ -65,6 +65,8 @@ struct spl_job {
 void spl_job_destroy(struct spl_job *job);
 
 struct spl_pipeline_options {
+    unsigned number; /* of the device, below SPL_DEVICES_MAX: which replica of an entry is its own */
+    unsigned of;     /* how many there are; 0 = 1 */
     struct spl_renderer_options renderer;
     struct spl_catalog_entry *const *entries; /* resident before the state becomes READY; the caller's references */
     size_t entry_count;
@@ -95,9 +97,10 @@ bool spl_request_is_large(const struct spl_view_request *request);
 /* Starts the threads; the gpu thread makes renderer and residency and reports through `wake`. */
 int spl_pipeline_create(const struct spl_pipeline_options *options, struct spl_pipeline **out, struct spl_error *err);
 
-/* Stops taking jobs, finishes those inside, joins the threads, destroys what was not taken: jobs, and entries that
- * nobody refers to. References that others hold must be gone before. NULL-safe. */
-void spl_pipeline_destroy(struct spl_pipeline *pipeline);
+/* Stops taking jobs, finishes those inside, joins the threads, destroys the jobs that were not taken. Idempotent. What
+ * of entries is to be taken still can be. */
+void spl_pipeline_stop(struct spl_pipeline *pipeline);
+void spl_pipeline_destroy(struct spl_pipeline *pipeline); /* stops it first; NULL-safe */
 
 /* Loop thread, as take(); never blocks. SPL_E_BUSY when what waits on the job's way is as much as may; jobs that wait
  * for the device and are over, dropped or past their deadline, do not count then: they are finished with that error. */
@@ -106,14 +109,25 @@ int spl_pipeline_submit(struct spl_pipeline *pipeline, struct spl_job *job, stru
 /* A finished job or NULL; never blocks. */
 struct spl_job *spl_pipeline_take(struct spl_pipeline *pipeline);
 
-/* Makes `entry` resident, page by page between frames. Takes the caller's reference; take_change() gives it back with
- * the entry, which then is SPL_ENTRY_RESIDENT or SPL_ENTRY_REFUSED; later, with a reference of its own, maybe as
- * SPL_ENTRY_ASIDE. From now on the last unref() of the entry, on any
- * thread, sends it here, and take_change() gives it back as SPL_ENTRY_GONE, for the caller to destroy. */
-void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
+/* The entry's own on this device; NULL of NULL. */
+struct spl_replica *spl_pipeline_get_replica(const struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
 
-/* An entry whose state has changed, or NULL; never blocks. */
-struct spl_catalog_entry *spl_pipeline_take_change(struct spl_pipeline *pipeline);
+/* Makes `entry` resident, page by page between frames; it must stay until take_change() gives back its replica, which
+ * then is SPL_ENTRY_RESIDENT, or SPL_ENTRY_REFUSED with an error; later, with a reference of its own, maybe
+ * SPL_ENTRY_ASIDE. drop() lets go of one that is resident and that nobody refers to any more: its replica comes back as
+ * SPL_ENTRY_GONE. Those of the options are resident without a word, or refused before the pipeline is ready. Any
+ * thread. */
+void spl_pipeline_add(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
+void spl_pipeline_drop(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry);
+
+/* A replica whose state has changed, or NULL; never blocks. Loop thread. */
+struct spl_replica *spl_pipeline_take_change(struct spl_pipeline *pipeline);
+
+/* The oldest that is to be added or let go of, or NULL: for the gpu thread, and once that has ended for the loop. */
+struct spl_replica *spl_pipeline_take_order(struct spl_pipeline *pipeline);
+
+/* Does the device look at no entry any more? So it is after stop(), and soon after it has failed. */
+bool spl_pipeline_has_ended(struct spl_pipeline *pipeline);
 
 enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline);
 
@@ -126,6 +140,8 @@ const struct spl_error *spl_pipeline_get_failure(struct spl_pipeline *pipeline);
 struct spl_pipeline_status {
     struct spl_device_info device; /* of the last renderer that worked; zero before the first */
     uint64_t device_bytes, device_limit_bytes, pages_pending;
+    uint64_t samples_inside; /* of views, from submit() to take() */
+    size_t behind_length;    /* frames of tours, the same */
     size_t render_length, render_capacity, encode_length, encode_capacity;
     size_t large_length;                                    /* views, from submit() to take() */
     uint64_t large_samples, large_samples_max, large_bytes; /* theirs */

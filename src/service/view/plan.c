@@ -30,9 +30,10 @@ static const double encoding_first[SPL_FORMAT_COUNT] = {[SPL_FORMAT_JPEG] = 6,
 struct spl_plan {
     char *path; /* of the profile */
     const struct spl_dataset_info *info;
-    struct spl_device_info device; // owned by: gpu
-    struct spl_planner planner;    // owned by: gpu
-    struct stat seen;              // owned by: gpu; of the file that was read last, zero when there was none
+    pthread_mutex_t planning;      // gpu threads only, which wait for each other while one reads the profile
+    struct spl_device_info device; // guarded by: planning
+    struct spl_planner planner;    // guarded by: planning
+    struct stat seen;              // guarded by: planning; of the file that was read last, zero when there was none
     pthread_mutex_t mutex;
     struct spl_profile profile;                         // guarded by: mutex; count 0 = none
     struct spl_error refused;                           // guarded by: mutex; why not
@@ -50,6 +51,7 @@ int spl_plan_create(const char *dataset_path, const struct spl_dataset_info *inf
         memcpy(plan->encoding[layer], encoding_first, sizeof encoding_first);
     spl_fail(&plan->refused, SPL_E_NOT_FOUND, "the profile of '%s' has not been read yet", info->id);
     pthread_mutex_init(&plan->mutex, NULL);
+    pthread_mutex_init(&plan->planning, NULL);
     if (!(plan->path = spl_profile_path(dataset_path, err)) || spl_planner_init(&plan->planner, NULL, NULL, err)) {
         spl_plan_destroy(plan);
         return SPL_E_NOMEM;
@@ -64,6 +66,7 @@ void spl_plan_destroy(struct spl_plan *plan)
         return;
     spl_planner_finish(&plan->planner);
     spl_profile_finish(&plan->profile);
+    pthread_mutex_destroy(&plan->planning);
     pthread_mutex_destroy(&plan->mutex);
     free(plan->path);
     free(plan);
@@ -122,9 +125,11 @@ static bool has_changed(struct spl_plan *plan)
 
 void spl_plan_set_device(struct spl_plan *plan, const struct spl_device_info *device)
 {
+    pthread_mutex_lock(&plan->planning);
     plan->device = *device;
     has_changed(plan);
     read_profile(plan);
+    pthread_mutex_unlock(&plan->planning);
 }
 
 static double *encoding_of(struct spl_plan *plan, const struct spl_view_request *request)
@@ -140,8 +145,6 @@ static double megapixels(const struct spl_view_request *request)
 int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, double left_ms, struct spl_choice *choice,
                    double *promised_ms, struct spl_error *err)
 {
-    if (has_changed(plan))
-        read_profile(plan);
     struct spl_demand demand = request->demand;
     demand.soft = &request->view.soft;
     demand.soft_splats = (double)plan->info->leaf_splats;
@@ -157,7 +160,11 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     pthread_mutex_unlock(&plan->mutex);
     if (!isnan(demand.budget_ms))
         demand.budget_ms = fmin(demand.budget_ms, left_ms);
+    pthread_mutex_lock(&plan->planning);
+    if (has_changed(plan))
+        read_profile(plan);
     int rc = spl_planner_choose(&plan->planner, &demand, choice, err);
+    pthread_mutex_unlock(&plan->planning);
     if (rc)
         return rc;
     spl_setting_apply(&choice->setting, &request->view);
@@ -181,12 +188,14 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
                                   !plan->info->maps           ? SPL_SETTING_NO_MAPS
                                   : view->maps == SPL_MAPS_ON ? SPL_SETTING_MAPS_ON
                                                               : SPL_SETTING_MAPS_OFF};
+    pthread_mutex_lock(&plan->planning);
     ptrdiff_t index = spl_planner_find(&plan->planner, &setting);
     if (index >= 0 && view->soft.what.count)
         spl_planner_learn_soft(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer,
                                &view->soft, ms, soft_ms);
     else if (index >= 0)
         spl_planner_learn(&plan->planner, (size_t)index, view->camera.width, view->camera.height, request->layer, ms);
+    pthread_mutex_unlock(&plan->planning);
 }
 
 void spl_plan_learn_reply(struct spl_plan *plan, const struct spl_view_request *request, double ms)

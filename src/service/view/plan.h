@@ -1,7 +1,7 @@
 /* Planning of one dataset's views: its profile, the planner over it, and what encoding costs.
  *
- * Threads: the gpu thread owns the planner; the profile is copied out and the times of replies are reported under a
- * mutex. */
+ * Threads: the devices' gpu threads share the planner, which learns from all of them, as they are of one kind; the
+ * profile is copied out and the times of replies are reported under a mutex of their own. */
 #ifndef SPL_SERVICE_PLAN_H
 #define SPL_SERVICE_PLAN_H
 

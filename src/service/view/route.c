@@ -71,7 +71,7 @@ void spl_view_answer(struct request *request, const struct spl_call *call, struc
     if (err->code || spl_view_check_dataset(view, entry->info, err))
         goto refuse;
     if (!view->planned) {
-        key = spl_key_make(view, entry->info, spl_pipeline_get_renderer(service->views->pipeline));
+        key = spl_key_make(view, entry->info, spl_fleet_get_renderer(service->views->fleet));
         request->validated = call->method == SPL_GET;
         request->versioned = view->versioned && !view->named;
         if (answer_at_once(request, view, &key))

@@ -44,10 +44,12 @@ struct spl_pipeline {
     _Atomic uint64_t moved_ns;          /* when a thread last began or ended a step of its work */
     atomic_int state;                   /* enum spl_pipeline_state */
     struct spl_error failure;           /* written by the gpu thread before state becomes FAILED */
+    atomic_bool ended;                  /* the gpu thread has done its last, and looks at no entry any more */
+    uint64_t samples_inside;            // owned by: loop; of all jobs from submit() to take(), but for those behind
     pthread_mutex_t mutex;
-    struct spl_device_info device;            // guarded by: mutex
-    STAILQ_HEAD(, spl_catalog_entry) orders;  // guarded by: mutex; for the gpu thread: LOADING or LEAVING
-    STAILQ_HEAD(, spl_catalog_entry) changes; // guarded by: mutex; for the loop
+    struct spl_device_info device;      // guarded by: mutex
+    STAILQ_HEAD(, spl_replica) orders;  // guarded by: mutex; for the gpu thread: LOADING or LEAVING
+    STAILQ_HEAD(, spl_replica) changes; // guarded by: mutex; for the loop
 };
 
 /* Thread bodies; `argument` is the pipeline. */
@@ -79,12 +81,8 @@ void spl_pipeline_close_render(struct spl_pipeline *pipeline);
  * never wait for a server. */
 int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job);
 
-/* The oldest entry that the gpu thread is to add or to let go of, or NULL. */
-struct spl_catalog_entry *spl_pipeline_take_order(struct spl_pipeline *pipeline);
-
-/* Hands an entry back to the loop. */
-void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry,
-                                enum spl_entry_state state);
+/* Hands an entry's replica back to the loop. */
+void spl_pipeline_report_change(struct spl_pipeline *pipeline, struct spl_replica *replica, enum spl_entry_state state);
 
 /* Says that work goes on; called at every step that could hang. */
 void spl_pipeline_touch(struct spl_pipeline *pipeline);

@@ -17,14 +17,14 @@
 /* Of replies with small views, and with large ones; beyond, they are refused until clients have read. */
 enum { reply_bytes_max = 1 << 30 };
 
-/* Any thread: a job is done, or the pipeline's state has changed. */
+/* Any thread: a job is done, or a pipeline's state has changed. */
 static void wake(void *context)
 {
     struct spl_service *service = context;
     uv_async_send(&service->wake);
 }
 
-static int start_pipeline(struct spl_service *service, struct spl_error *err)
+static int start_fleet(struct spl_service *service, struct spl_error *err)
 {
     const struct spl_catalog *catalog = &service->library->catalog;
     struct spl_catalog_entry **entries = service->views->entries = spl_alloc(catalog->count, sizeof *entries, err);
@@ -34,32 +34,32 @@ static int start_pipeline(struct spl_service *service, struct spl_error *err)
     for (size_t i = 0; i < catalog->count; i++)
         if (catalog->slots[i].current)
             entries[count++] = catalog->slots[i].current;
-    struct spl_pipeline_options options = {
-        .renderer = SPL_SIZED(spl_renderer_options, .device = service->options->device,
-                              .require_gpu = service->options->require_gpu,
-                              .memory_limit = service->options->memory_limit),
-        .entries = entries,
-        .entry_count = count,
-        .queue = service->options->queue,
-        .encoders = service->options->encoders,
-        .samples_max = 4 * service->options->samples_max,
-        .counters = service->counters,
-        .wake = wake,
-        .wake_context = service,
+    struct spl_fleet_options options = {
+        .devices = service->options->device,
+        .pipeline = {.renderer = SPL_SIZED(spl_renderer_options, .require_gpu = service->options->require_gpu,
+                                           .memory_limit = service->options->memory_limit),
+                     .entries = entries,
+                     .entry_count = count,
+                     .queue = service->options->queue,
+                     .encoders = service->options->encoders,
+                     .samples_max = 4 * service->options->samples_max,
+                     .counters = service->counters,
+                     .wake = wake,
+                     .wake_context = service},
     };
-    return spl_pipeline_create(&options, &service->views->pipeline, err);
+    return spl_fleet_create(&options, &service->views->fleet, err);
 }
 
 int spl_views_start(struct spl_service *service, struct spl_error *err)
 {
     int rc = spl_cache_create(service->options->cache_bytes, &service->views->cache, err);
-    return rc ? rc : start_pipeline(service, err);
+    return rc ? rc : start_fleet(service, err);
 }
 
 void spl_views_finish(struct spl_service *service)
 {
     struct spl_views *views = service->views;
-    spl_pipeline_destroy(views->pipeline);
+    spl_fleet_destroy(views->fleet);
     spl_cache_destroy(views->cache);
     free(views->entries);
     *views = (struct spl_views){0};
@@ -81,7 +81,7 @@ static void observe(struct spl_service *service, const struct spl_job *job)
 
 void spl_views_complete(struct spl_service *service)
 {
-    for (struct spl_job *job; (job = spl_pipeline_take(service->views->pipeline));) {
+    for (struct spl_job *job; (job = spl_fleet_take(service->views->fleet));) {
         observe(service, job);
         if (job->done)
             job->done(job);
@@ -150,7 +150,7 @@ bool spl_view_has_no_room(const struct spl_service *service, const struct spl_vi
     size_t bytes = views->reply_bytes;
     if (large) {
         struct spl_pipeline_status status;
-        spl_pipeline_get_status(views->pipeline, &status);
+        spl_fleet_get_status(views->fleet, &status);
         bytes = views->large_reply_bytes + status.large_bytes;
     }
     uint64_t own = large ? spl_view_get_frame_bytes(&view->view) : 0;

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "service/request/request.h"
 #include "service/view/cache.h"
-#include "service/view/pipeline.h"
+#include "service/view/fleet.h"
 
 struct spl_service;
 struct request;
@@ -18,8 +18,8 @@ struct spl_call;
 struct batch;
 
 struct spl_views {
-    struct spl_pipeline *pipeline;      // NULL until the datasets at start are open, as is the cache
-    struct spl_catalog_entry **entries; /* of the catalog at start, for the pipeline */
+    struct spl_fleet *fleet;            // NULL until the datasets at start are open, as is the cache
+    struct spl_catalog_entry **entries; /* of the catalog at start, for the fleet */
     struct spl_cache *cache;
     LIST_HEAD(, flight) flights;
     size_t reply_bytes;       /* of views that clients have not read yet and that are not in the cache */
@@ -27,7 +27,7 @@ struct spl_views {
     size_t lists;             /* of rays that the pool reads */
 };
 
-/* views.c: cache and pipeline, over the datasets that are served now. finish() takes what a start that failed has left,
+/* views.c: cache and devices, over the datasets that are served now. finish() takes what a start that failed has left,
  * and comes once nobody else refers to an entry. */
 int spl_views_start(struct spl_service *service, struct spl_error *err);
 void spl_views_finish(struct spl_service *service);

@@ -30,17 +30,18 @@ static void start(const char *frame_ms)
     setenv("FAKE_FRAME_MS", frame_ms, 1);
     counters = (struct spl_counters){0};
     views = (struct spl_views){0};
-    struct spl_pipeline_options options = {.queue = 8, .encoders = 1, .counters = &counters, .wake = wake};
+    struct spl_fleet_options options = {
+        .devices = "fake", .pipeline = {.queue = 8, .encoders = 1, .counters = &counters, .wake = wake}};
     assert_int_equal(spl_cache_create(1 << 20, &views.cache, NULL), 0);
-    assert_int_equal(spl_pipeline_create(&options, &views.pipeline, NULL), 0);
-    for (int ms = 0; ms < 20000 && spl_pipeline_get_state(views.pipeline) != SPL_PIPELINE_READY; ms++)
+    assert_int_equal(spl_fleet_create(&options, &views.fleet, NULL), 0);
+    for (int ms = 0; ms < 20000 && spl_fleet_get_state(views.fleet) != SPL_PIPELINE_READY; ms++)
         usleep(1000);
 }
 
 static void stop(void)
 {
     assert_true(LIST_EMPTY(&views.flights));
-    spl_pipeline_destroy(views.pipeline);
+    spl_fleet_destroy(views.fleet);
     spl_cache_destroy(views.cache);
     assert_int_equal(views.reply_bytes, 0);
     unsetenv("FAKE_FRAME_MS");
@@ -75,7 +76,7 @@ static int ask(struct passenger *passenger, uint64_t n, uint64_t deadline_ms)
 static void land(const struct passenger *until)
 {
     for (int ms = 0; ms < 60000 && !until->answers; ms++) {
-        for (struct spl_job *job; (job = spl_pipeline_take(views.pipeline));)
+        for (struct spl_job *job; (job = spl_fleet_take(views.fleet));)
             job->done(job);
         usleep(1000);
     }

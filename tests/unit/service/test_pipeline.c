@@ -444,164 +444,6 @@ static void a_device_that_does_not_open_is_a_failure(void **state)
     spl_pipeline_destroy(pipeline);
 }
 
-/* A version of a small dataset; the caller owns its reference. */
-static struct spl_catalog_entry *open_entry(void)
-{
-    char path[256] = "";
-    struct spl_catalog_entry *entry = NULL;
-    const struct make_splat splat = {.normal = {1, 0, 0}, .radius = 1};
-    make_folder(path);
-    strcat(path, "/one.spld");
-    make_dataset_file(path, &splat, 1, 1);
-    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
-    unlink(path);
-    *strrchr(path, '/') = '\0';
-    rmdir(path);
-    return entry;
-}
-
-static struct spl_catalog_entry *take_change(struct spl_pipeline *pipeline)
-{
-    struct spl_catalog_entry *entry;
-    while (!(entry = spl_pipeline_take_change(pipeline)))
-        usleep(500);
-    return entry;
-}
-
-static void wait_until_ready(struct spl_pipeline *pipeline, uint64_t losses)
-{
-    while (counters.device_losses < losses || spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY)
-        usleep(500);
-}
-
-/* A view of the entry, or of none. */
-static int view_of(struct spl_pipeline *pipeline, struct spl_catalog_entry *entry)
-{
-    struct spl_job *job = make_job(10000);
-    job->entry = entry ? spl_catalog_entry_ref(entry) : NULL;
-    job->dataset = entry ? entry->dataset : NULL;
-    assert_int_equal(spl_pipeline_submit(pipeline, job, NULL), 0);
-    assert_ptr_equal(take(pipeline), job);
-    int code = job->err.code;
-    spl_job_destroy(job);
-    return code;
-}
-
-/* The second time, where there are others; its frames cost no device any more, and it goes like any other. */
-static void what_costs_the_device_twice_is_put_aside(void **state)
-{
-    (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x4", 1);
-    struct spl_pipeline *pipeline = start(8);
-    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
-    spl_pipeline_add(pipeline, entry);
-    assert_ptr_equal(take_change(pipeline), entry);
-    uint64_t losses = 0;
-    for (int i = 0; i < 3; i++) { // alone it stays, however often
-        assert_int_equal(view_of(pipeline, NULL), 0);
-        assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST);
-        wait_until_ready(pipeline, ++losses);
-        assert_null(spl_pipeline_take_change(pipeline));
-    }
-    spl_pipeline_add(pipeline, other);
-    assert_ptr_equal(take_change(pipeline), other);
-    assert_int_equal(view_of(pipeline, other), 0);
-    assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST);
-    assert_ptr_equal(take_change(pipeline), entry);
-    assert_int_equal(entry->state, SPL_ENTRY_ASIDE);
-    assert_non_null(strstr(entry->err.message, "lost twice"));
-    wait_until_ready(pipeline, ++losses); // the fourth: it is no longer the device's
-    assert_int_equal(view_of(pipeline, other), 0);
-    assert_int_equal(view_of(pipeline, entry), SPL_E_DEVICE_LOST); // is refused
-    assert_int_equal(counters.device_losses, losses);
-    assert_int_equal(spl_pipeline_get_state(pipeline), SPL_PIPELINE_READY);
-    spl_catalog_entry_unref(entry);
-    assert_null(spl_pipeline_take_change(pipeline));
-    spl_catalog_entry_unref(entry); // that of the change
-    assert_ptr_equal(take_change(pipeline), entry);
-    assert_int_equal(entry->state, SPL_ENTRY_GONE);
-    spl_catalog_entry_destroy(entry);
-    spl_catalog_entry_unref(other);
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
-    spl_pipeline_destroy(pipeline);
-}
-
-/* The second time in its pages; the others are served, and the device is not given up. */
-static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
-{
-    (void)state;
-    struct spl_pipeline *pipeline = start(8);
-    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
-    spl_pipeline_add(pipeline, other);
-    assert_ptr_equal(take_change(pipeline), other);
-    const uint64_t losses = counters.device_losses;
-    setenv("FAKE_LOSE_LOADING", "10", 1);
-    spl_pipeline_add(pipeline, entry);
-    assert_ptr_equal(take_change(pipeline), entry);
-    assert_int_equal(entry->state, SPL_ENTRY_REFUSED);
-    assert_non_null(strstr(entry->err.message, "lost twice"));
-    wait_until_ready(pipeline, losses + 2);
-    assert_int_equal(view_of(pipeline, other), 0);
-    assert_int_equal(counters.device_losses - losses, 2);
-    unsetenv("FAKE_LOSE_LOADING");
-    spl_catalog_entry_unref(entry);
-    spl_catalog_entry_unref(other);
-    spl_pipeline_destroy(pipeline);
-}
-
-static void versions_come_and_go_while_the_device_is_lost(void **state)
-{
-    (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x3", 1);
-    struct spl_pipeline *pipeline = start(8);
-    for (int i = 0; i < 20; i++) {
-        struct spl_catalog_entry *entry = open_entry();
-        spl_pipeline_add(pipeline, entry);
-        struct spl_job *job = make_job(10000), *back;
-        if (i % 4 == 0 && !spl_pipeline_submit(pipeline, job, NULL))
-            job = NULL;
-        assert_ptr_equal(take_change(pipeline), entry);
-        assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
-        if (!job)
-            spl_job_destroy(take(pipeline));
-        spl_job_destroy(job);
-        job = make_job(10000);
-        job->entry = spl_catalog_entry_ref(entry);
-        job->dataset = entry->dataset;
-        spl_catalog_entry_unref(entry); // the job's reference is the last
-        assert_null(spl_pipeline_take_change(pipeline));
-        if (!spl_pipeline_submit(pipeline, job, NULL)) {
-            back = take(pipeline);
-            assert_ptr_equal(back, job);
-        }
-        spl_job_destroy(job);
-        assert_ptr_equal(take_change(pipeline), entry);
-        assert_int_equal(entry->state, SPL_ENTRY_GONE);
-        spl_catalog_entry_destroy(entry);
-    }
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
-    spl_pipeline_destroy(pipeline);
-}
-
-static void a_pipeline_ends_with_versions_in_every_state(void **state)
-{
-    (void)state;
-    for (int taken = 0; taken < 4; taken++) {
-        struct spl_pipeline *pipeline = start(8);
-        for (int i = 0; i < 4; i++)
-            spl_pipeline_add(pipeline, open_entry());
-        for (int i = 0; i < taken; i++)
-            spl_catalog_entry_unref(take_change(pipeline));
-        spl_pipeline_destroy(pipeline); // leak checkers see what is left
-    }
-    struct spl_catalog_entry *entry = open_entry();
-    setenv("FAKE_OPEN_LIMIT", "0", 1);
-    struct spl_pipeline *pipeline = start(8);
-    spl_pipeline_add(pipeline, entry); // nobody will ever take it up
-    unsetenv("FAKE_OPEN_LIMIT");
-    spl_pipeline_destroy(pipeline);
-}
-
 /* A small dataset on a server that stops answering. */
 static struct server {
     char *bytes;
@@ -744,14 +586,10 @@ int main(void)
         cmocka_unit_test(what_was_read_is_uploaded_without_rests),
         cmocka_unit_test(a_full_queue_refuses),
         cmocka_unit_test(picks_of_a_server_that_hangs_hold_up_nobody),
-        cmocka_unit_test(what_costs_the_device_twice_is_put_aside),
-        cmocka_unit_test(what_costs_the_device_while_it_is_loaded_is_refused),
         cmocka_unit_test(a_view_ends_within_its_tile_when_nobody_waits),
         cmocka_unit_test(a_tile_behind_is_given_up),
         cmocka_unit_test(dropped_and_late_jobs_are_not_rendered),
         cmocka_unit_test(a_lost_device_is_reopened),
-        cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
-        cmocka_unit_test(a_pipeline_ends_with_versions_in_every_state),
         cmocka_unit_test(losses_are_bounded),
         cmocka_unit_test(a_device_that_does_not_open_is_a_failure),
     };

@@ -1,0 +1,108 @@
+"""Several devices in one daemon: the same bytes whichever draws, each dataset on all of them, and a device that is lost
+leaves the others serving."""
+import pathlib
+import shutil
+import tempfile
+import time
+
+from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, fresh, run, together
+
+SMALL = VIEW + "?width=16&height=16"
+
+
+def states(d):
+    return [device["state"] for device in d.status()["devices"]]
+
+
+def test_the_bytes_are_those_of_one_device():
+    views = [f"?width=96&height=64&eye=3,{y},1&target=0,0,1&method={method}&format=png"
+             for y in range(-3, 3) for method in ("splat", "points", "fill")]
+    views += ["?width=2500&height=2000&format=png", "?width=64&height=48&layer=depth&format=npy"]
+    with Daemon(REAL, "--cache", "0") as d:
+        [device] = d.status()["devices"]
+        one = [d.ask(VIEW + view) for view in views]
+    twice = ",".join([f'{device["backend"]}:{device["index"]}'] * 2)
+    with Daemon(REAL, "--cache", "0", "--device", twice) as d:
+        devices = d.status()["devices"]
+        assert [device["state"] for device in devices] == ["ready", "ready"]
+        assert all(d.status()["device"].items() <= device.items() for device in devices), devices
+        assert 0 < sum(device["device_limit_bytes"] for device in devices) <= device["device_limit_bytes"] + 1, devices
+        for _ in range(2):
+            two = together(len(views), lambda i: d.ask(VIEW + views[i]))
+            for view, a, b in zip(views, one, two):
+                assert (b.status, b.body == a.body, b.headers["ETag"] == a.headers["ETag"]) == (200, True, True), view
+        assert all(device["frame_ms"] > 0 for device in d.status()["devices"]), "one drew everything"
+
+
+def test_views_are_drawn_side_by_side():
+    with Daemon(FAKE, "--device", "fake:0,fake:1,fake:2", FAKE_FRAME_MS=600) as d:
+        began = time.monotonic()
+        assert [reply.status for reply in together(3, lambda i: d.ask(fresh(SMALL)))] == [200] * 3
+        assert time.monotonic() - began < 1.6, "they waited for each other"
+
+
+def test_datasets_come_and_go_on_all_devices():
+    with tempfile.TemporaryDirectory() as home:
+        shutil.copy(WALL, pathlib.Path(home, "a.spld"))
+        with Daemon(FAKE, "--device", "fake:0,fake:1", "--watch", "50", datasets=[home]) as d:
+            for round in range(6):
+                eventually(lambda: d.ask("/v1/datasets/a").status == 200)
+                assert d.ask("/v1/datasets/a").json()["resident_bytes"] == 2 << 16
+                replies = together(8, lambda i: d.ask(fresh("/v1/datasets/a/view?width=16&height=16")))
+                assert [reply.status for reply in replies] == [200] * 8
+                pathlib.Path(home, "a.spld").unlink()
+                eventually(lambda: d.ask("/v1/datasets/a").status == 404)
+                shutil.copy(WALL, pathlib.Path(home, "new"))
+                pathlib.Path(home, "new").rename(pathlib.Path(home, "a.spld"))
+            assert d.status()["memory"]["device_bytes"] < 1 << 30
+
+
+def test_a_lost_device_leaves_the_others_and_comes_back():
+    with Daemon(FAKE, "--device", "fake:0,fake:1", FAKE_FRAME_MS=10, FAKE_OPEN_MS=150,
+                SPLATD_INJECT_LOSS_AFTER="40x1") as d:  # the second after 80
+        seen, codes = set(), []
+        while d.status()["counters"]["device_losses"] < 2:
+            codes += [reply.status for reply in together(2, lambda i: d.ask(fresh(SMALL)))]
+            seen.add(tuple(states(d)))
+            assert d.ops("/readyz").status == 200
+            assert len(codes) < 1000
+        assert codes.count(503) <= 4 and set(codes) == {200, 503}, codes
+        assert ("rebuilding", "ready") in seen, seen
+        eventually(lambda: states(d) == ["ready", "ready"])
+        assert any("device 2 of 2 lost" in line for line in d.lines)
+
+
+def test_a_device_that_stays_away_is_given_up():
+    d = Daemon(FAKE, "--device", "fake:0,fake:1", FAKE_FRAME_MS=5, FAKE_OPEN_LIMIT=2, SPLATD_INJECT_LOSS_AFTER="5x9")
+    codes = []
+    while "failed" not in states(d):
+        codes.append(d.ask(fresh(SMALL)).status)
+        assert len(codes) < 50
+    assert d.ops("/readyz").status == 200 and d.status()["state"] == "ready"
+    gauges = d.ops("/metrics").body.decode()
+    assert 'splatd_devices{state="failed"} 1\n' in gauges and 'splatd_devices{state="ready"} 1\n' in gauges
+    assert d.ask(fresh(SMALL)).status == 200, "the other serves"
+    try:
+        for _ in range(20):
+            d.ask(fresh(SMALL))
+    except OSError:
+        pass  # it ends with its last device
+    assert d.wait_exit() == 1
+    assert any("is given up, the others go on" in line for line in d.lines), d.lines
+
+
+def test_lists_of_devices_are_checked():
+    for devices, text in {"fake,other": "two kinds", "fake,": "empty", ",".join(["fake"] * 17): "more than 16"}.items():
+        try:
+            with Daemon(FAKE, "--device", devices):
+                raise SystemExit(f"{devices} was taken")
+        except AssertionError as ended:
+            assert text in str(ended) and "device" in str(ended), ended
+    try:
+        with Daemon(REAL, "--device", "vulkan:97,vulkan:98"):
+            raise SystemExit("devices that are not there were taken")
+    except AssertionError as ended:
+        assert "vulkan:97" in str(ended) or "vulkan:98" in str(ended), ended
+
+
+run(globals())

@@ -1,0 +1,481 @@
+/* Devices side by side, on fake renderers: versions of datasets come and go on all of them, each view goes to one, and
+ * those that are lost leave the others serving. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "dataset/dataset.h"
+#include "service/view/device_list.h"
+#include "service/view/fleet.h"
+#include "support/make_dataset.h"
+
+static struct spl_counters counters;
+
+static void no_wake(void *context)
+{
+    (void)context;
+}
+
+static struct spl_fleet *start_on(const char *devices, size_t queue)
+{
+    struct spl_fleet_options options = {
+        .devices = devices, .pipeline = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake}};
+    struct spl_fleet *fleet = NULL;
+    memset(&counters, 0, sizeof counters);
+    assert_int_equal(spl_fleet_create(&options, &fleet, NULL), 0);
+    while (spl_fleet_get_state(fleet) == SPL_PIPELINE_STARTING)
+        usleep(1000);
+    return fleet;
+}
+
+static struct spl_fleet *start(size_t queue)
+{
+    return start_on("fake", queue);
+}
+
+static struct spl_job *make_job(unsigned deadline_ms)
+{
+    static const struct spl_camera_defaults defaults = {
+        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
+    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
+    static const char query[] = "width=8&height=4&format=raw";
+    struct spl_job *job = calloc(1, sizeof *job);
+    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
+    job->accepted_ns = spl_now_ns();
+    job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
+    return job;
+}
+
+static struct spl_job *take(struct spl_fleet *fleet)
+{
+    struct spl_job *job;
+    while (!(job = spl_fleet_take(fleet)))
+        usleep(500);
+    return job;
+}
+
+/* A version of a small dataset; the caller owns its reference. */
+static struct spl_catalog_entry *open_entry(void)
+{
+    char path[256] = "";
+    struct spl_catalog_entry *entry = NULL;
+    const struct make_splat splat = {.normal = {1, 0, 0}, .radius = 1};
+    make_folder(path);
+    strcat(path, "/one.spld");
+    make_dataset_file(path, &splat, 1, 1);
+    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
+    unlink(path);
+    *strrchr(path, '/') = '\0';
+    rmdir(path);
+    return entry;
+}
+
+static struct spl_catalog_entry *take_change(struct spl_fleet *fleet)
+{
+    struct spl_catalog_entry *entry;
+    while (!(entry = spl_fleet_take_change(fleet)))
+        usleep(500);
+    return entry;
+}
+
+static void wait_until_ready(struct spl_fleet *fleet, uint64_t losses)
+{
+    while (counters.device_losses < losses || spl_fleet_get_state(fleet) != SPL_PIPELINE_READY)
+        usleep(500);
+}
+
+/* A view of the entry, or of none. */
+static int view_of(struct spl_fleet *fleet, struct spl_catalog_entry *entry)
+{
+    struct spl_job *job = make_job(10000);
+    job->entry = entry ? spl_catalog_entry_ref(entry) : NULL;
+    job->dataset = entry ? entry->dataset : NULL;
+    assert_int_equal(spl_fleet_submit(fleet, job, NULL), 0);
+    assert_ptr_equal(take(fleet), job);
+    int code = job->err.code;
+    spl_job_destroy(job);
+    return code;
+}
+
+/* The second time, where there are others; its frames cost no device any more, and it goes like any other. */
+static void what_costs_the_device_twice_is_put_aside(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x4", 1);
+    struct spl_fleet *fleet = start(8);
+    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    uint64_t losses = 0;
+    for (int i = 0; i < 3; i++) { // alone it stays, however often
+        assert_int_equal(view_of(fleet, NULL), 0);
+        assert_int_equal(view_of(fleet, entry), SPL_E_DEVICE_LOST);
+        wait_until_ready(fleet, ++losses);
+        assert_null(spl_fleet_take_change(fleet));
+    }
+    spl_fleet_add(fleet, other);
+    assert_ptr_equal(take_change(fleet), other);
+    assert_int_equal(view_of(fleet, other), 0);
+    assert_int_equal(view_of(fleet, entry), SPL_E_DEVICE_LOST);
+    assert_ptr_equal(take_change(fleet), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_ASIDE);
+    assert_non_null(strstr(entry->err.message, "lost twice"));
+    wait_until_ready(fleet, ++losses); // the fourth: it is no longer the device's
+    assert_int_equal(view_of(fleet, other), 0);
+    assert_int_equal(view_of(fleet, entry), SPL_E_DEVICE_LOST); // is refused
+    assert_int_equal(counters.device_losses, losses);
+    assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_READY);
+    spl_catalog_entry_unref(entry);
+    assert_null(spl_fleet_take_change(fleet));
+    spl_catalog_entry_unref(entry); // that of the change
+    assert_ptr_equal(take_change(fleet), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_GONE);
+    spl_catalog_entry_destroy(entry);
+    spl_catalog_entry_unref(other);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_fleet_destroy(fleet);
+}
+
+/* The second time in its pages; the others are served, and the device is not given up. */
+static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
+{
+    (void)state;
+    struct spl_fleet *fleet = start(8);
+    struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
+    spl_fleet_add(fleet, other);
+    assert_ptr_equal(take_change(fleet), other);
+    const uint64_t losses = counters.device_losses;
+    setenv("FAKE_LOSE_LOADING", "10", 1);
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_REFUSED);
+    assert_non_null(strstr(entry->err.message, "lost twice"));
+    wait_until_ready(fleet, losses + 2);
+    assert_int_equal(view_of(fleet, other), 0);
+    assert_int_equal(counters.device_losses - losses, 2);
+    unsetenv("FAKE_LOSE_LOADING");
+    spl_catalog_entry_unref(entry);
+    spl_catalog_entry_unref(other);
+    spl_fleet_destroy(fleet);
+}
+
+static void versions_come_and_go_while_the_device_is_lost(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "1x3", 1);
+    struct spl_fleet *fleet = start(8);
+    for (int i = 0; i < 20; i++) {
+        struct spl_catalog_entry *entry = open_entry();
+        spl_fleet_add(fleet, entry);
+        struct spl_job *job = make_job(10000), *back;
+        if (i % 4 == 0 && !spl_fleet_submit(fleet, job, NULL))
+            job = NULL;
+        assert_ptr_equal(take_change(fleet), entry);
+        assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
+        if (!job)
+            spl_job_destroy(take(fleet));
+        spl_job_destroy(job);
+        job = make_job(10000);
+        job->entry = spl_catalog_entry_ref(entry);
+        job->dataset = entry->dataset;
+        spl_catalog_entry_unref(entry); // the job's reference is the last
+        assert_null(spl_fleet_take_change(fleet));
+        if (!spl_fleet_submit(fleet, job, NULL)) {
+            back = take(fleet);
+            assert_ptr_equal(back, job);
+        }
+        spl_job_destroy(job);
+        assert_ptr_equal(take_change(fleet), entry);
+        assert_int_equal(entry->state, SPL_ENTRY_GONE);
+        spl_catalog_entry_destroy(entry);
+    }
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_fleet_destroy(fleet);
+}
+
+static void a_fleet_ends_with_versions_in_every_state(void **state)
+{
+    (void)state;
+    for (int taken = 0; taken < 4; taken++) {
+        struct spl_fleet *fleet = start(8);
+        for (int i = 0; i < 4; i++)
+            spl_fleet_add(fleet, open_entry());
+        for (int i = 0; i < taken; i++)
+            spl_catalog_entry_unref(take_change(fleet));
+        spl_fleet_destroy(fleet); // leak checkers see what is left
+    }
+    struct spl_catalog_entry *entry = open_entry();
+    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    struct spl_fleet *fleet = start(8);
+    spl_fleet_add(fleet, entry); // nobody will ever take it up
+    unsetenv("FAKE_OPEN_LIMIT");
+    spl_fleet_destroy(fleet);
+}
+
+static struct spl_job *make_job_of(struct spl_catalog_entry *entry)
+{
+    struct spl_job *job = make_job(60000);
+    job->entry = spl_catalog_entry_ref(entry);
+    job->dataset = entry->dataset;
+    return job;
+}
+
+static struct spl_pipeline_status look(struct spl_fleet *fleet, size_t device)
+{
+    struct spl_pipeline_status status;
+    spl_pipeline_get_status(spl_fleet_get(fleet, device), &status);
+    return status;
+}
+
+static void finish_all(struct spl_fleet *fleet, int jobs)
+{
+    for (int i = 0; i < jobs; i++) {
+        struct spl_job *job = take(fleet);
+        assert_int_equal(job->err.code, 0);
+        spl_job_destroy(job);
+    }
+}
+
+/* The device with the least to do; of those alike, the dataset's home. */
+static void views_go_where_the_least_waits(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "300", 1);
+    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_catalog_entry *entries[2] = {open_entry(), open_entry()};
+    for (int i = 0; i < 2; i++) {
+        spl_fleet_add(fleet, entries[i]);
+        assert_ptr_equal(take_change(fleet), entries[i]);
+        assert_int_equal(entries[i]->state, SPL_ENTRY_RESIDENT);
+        assert_int_equal(entries[i]->home, i);
+        assert_int_equal(spl_catalog_entry_get_resident_bytes(entries[i]), 2 << 16);
+    }
+    for (int i = 1; i >= 0; i--) {
+        assert_int_equal(spl_fleet_submit(fleet, make_job_of(entries[i]), NULL), 0);
+        assert_true(look(fleet, (size_t)i).samples_inside > 0);
+        assert_int_equal(look(fleet, (size_t)!i).samples_inside, 0);
+        finish_all(fleet, 1);
+    }
+    for (int i = 0; i < 6; i++)
+        assert_int_equal(spl_fleet_submit(fleet, make_job_of(entries[0]), NULL), 0);
+    assert_int_equal(look(fleet, 0).samples_inside, look(fleet, 1).samples_inside);
+    struct spl_pipeline_status all;
+    spl_fleet_get_status(fleet, &all);
+    assert_int_equal(all.samples_inside, 2 * look(fleet, 0).samples_inside);
+    assert_int_equal(all.render_capacity, 8);
+    finish_all(fleet, 6);
+    assert_int_equal(counters.frames, 8);
+    for (int i = 0; i < 2; i++)
+        spl_catalog_entry_unref(entries[i]);
+    unsetenv("FAKE_FRAME_MS");
+    spl_fleet_destroy(fleet);
+}
+
+static void all_queues_are_full_before_a_view_is_refused(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "500", 1);
+    struct spl_fleet *fleet = start_on("fake,fake,fake", 6);
+    struct spl_job *job;
+    struct spl_error err = {0};
+    int accepted = 0, rc;
+    while (!(rc = spl_fleet_submit(fleet, job = make_job(60000), &err)))
+        accepted++;
+    assert_int_equal(rc, SPL_E_BUSY);
+    assert_in_range(accepted, 6, 9); // two in each queue, and one that is drawn
+    assert_in_range(spl_fleet_get_retry_after(fleet, false), 1, 60);
+    spl_job_destroy(job);
+    unsetenv("FAKE_FRAME_MS");
+    spl_fleet_destroy(fleet);
+    assert_int_equal(counters.frames, accepted);
+}
+
+/* While one is reopened, which takes a minute, the other serves; and the fleet is ready. */
+static void a_lost_device_leaves_the_others(void **state)
+{
+    (void)state;
+    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_catalog_entry *entry = open_entry();
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    spl_catalog_entry_ref(entry);
+    spl_catalog_entry_unref(entry);
+    setenv("FAKE_OPEN_MS", "1500", 1);
+    setenv("FAKE_LOSE_FRAME", "1", 1);
+    assert_int_equal(view_of(fleet, entry), SPL_E_DEVICE_LOST);
+    unsetenv("FAKE_LOSE_FRAME");
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_READY);
+        assert_int_equal(view_of(fleet, entry), 0);
+    }
+    assert_int_equal(spl_pipeline_get_state(spl_fleet_get(fleet, 0)), SPL_PIPELINE_REBUILDING);
+    while (spl_pipeline_get_state(spl_fleet_get(fleet, 0)) != SPL_PIPELINE_READY)
+        usleep(1000);
+    unsetenv("FAKE_OPEN_MS");
+    assert_int_equal(view_of(fleet, entry), 0);
+    spl_catalog_entry_unref(entry);
+    spl_fleet_destroy(fleet);
+}
+
+/* For good: datasets come and go on those that are left, and with the last the fleet has failed. */
+static void a_device_that_is_gone_is_given_up(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "10x100", 1); // the second after twenty
+    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_catalog_entry *entry = open_entry(), *later = open_entry();
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    while (spl_pipeline_get_state(spl_fleet_get(fleet, 0)) != SPL_PIPELINE_FAILED)
+        view_of(fleet, entry);
+    assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_READY);
+    spl_fleet_add(fleet, later);
+    assert_ptr_equal(take_change(fleet), later);
+    assert_int_equal(later->state, SPL_ENTRY_RESIDENT);
+    assert_false(later->replicas[0].there);
+    assert_int_equal(view_of(fleet, later), 0);
+    spl_catalog_entry_unref(entry); // also on the device that is gone
+    assert_ptr_equal(take_change(fleet), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_GONE);
+    spl_catalog_entry_destroy(entry);
+    for (struct spl_job *job; spl_fleet_get_state(fleet) != SPL_PIPELINE_FAILED; spl_job_destroy(job)) {
+        job = make_job_of(later);
+        if (!spl_fleet_submit(fleet, job, NULL))
+            assert_ptr_equal(take(fleet), job);
+    }
+    assert_int_equal(spl_fleet_get_failure(fleet)->code, SPL_E_DEVICE_LOST);
+    spl_catalog_entry_unref(later);
+    unsetenv("FAKE_OPEN_LIMIT");
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_fleet_destroy(fleet);
+}
+
+/* It is drawn where it is; what no device has room for is refused. */
+static void a_dataset_has_room_on_some_devices(void **state)
+{
+    (void)state;
+    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_catalog_entry *entry = open_entry(), *large = open_entry();
+    setenv("FAKE_REFUSE", "1", 1);
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
+    assert_int_equal(entry->replicas[0].there + entry->replicas[1].there, 1);
+    assert_int_equal(entry->err.code, 0);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(view_of(fleet, entry), 0);
+    setenv("FAKE_REFUSE", "3", 1);
+    spl_fleet_add(fleet, large);
+    assert_ptr_equal(take_change(fleet), large);
+    assert_int_equal(large->state, SPL_ENTRY_REFUSED);
+    assert_int_equal(large->err.code, SPL_E_LIMIT);
+    unsetenv("FAKE_REFUSE");
+    spl_catalog_entry_unref(large);
+    spl_catalog_entry_unref(entry);
+    assert_ptr_equal(take_change(fleet), entry); // of the one device that had it
+    assert_int_equal(entry->state, SPL_ENTRY_GONE);
+    spl_catalog_entry_destroy(entry);
+    spl_fleet_destroy(fleet);
+}
+
+static void devices_are_of_one_kind(void **state)
+{
+    (void)state;
+    struct spl_fleet *fleet = start_on("fake,other", 8);
+    assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_FAILED);
+    assert_non_null(strstr(spl_fleet_get_failure(fleet)->message, "two kinds"));
+    assert_string_equal(spl_fleet_get_failure(fleet)->field, "device");
+    spl_fleet_destroy(fleet);
+}
+
+static void lists_of_devices_are_checked(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *message;
+        int code;
+    } bad[] = {{"vulkan,", "empty", SPL_E_USAGE},
+               {",", "empty", SPL_E_USAGE},
+               {"vulkan:0, ,vulkan:1", "empty", SPL_E_USAGE},
+               {"a,b,c,d,e,f,g,h,i,j,k,l,m,n,o,p,q", "more than 16", SPL_E_USAGE}};
+    struct spl_device_list list;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct spl_error err = {0};
+        assert_int_equal(spl_device_list_init(&list, bad[i].text, &err), bad[i].code);
+        assert_string_equal(err.field, "device");
+        assert_non_null(strstr(err.message, bad[i].message));
+        assert_int_equal(list.count, 0);
+    }
+    assert_int_equal(spl_device_list_init(&list, "fake:0, fake:1,fake:0", NULL), 0);
+    assert_int_equal(list.count, 3);
+    assert_string_equal(list.names[1], "fake:1");
+    assert_int_equal(list.sharers[0], 2); // unknown ones, by their names
+    assert_int_equal(list.sharers[1], 1);
+    spl_device_list_finish(&list);
+    assert_int_equal(spl_device_list_init(&list, "", NULL), 0);
+    assert_string_equal(list.names[0], "auto");
+    assert_int_equal(list.sharers[0], 1);
+    spl_device_list_finish(&list);
+}
+
+/* Both together: views while versions come and go and devices are lost. Whoever sees races runs it (suite crowd). */
+static void devices_are_lost_while_all_goes_on(void **state)
+{
+    (void)state;
+    setenv("SPLATD_INJECT_LOSS_AFTER", "7x2", 1);
+    struct spl_fleet *fleet = start_on("fake:0,fake:1,fake:2", 32);
+    int back = 0, sent = 0;
+    for (int i = 0; i < 12; i++) {
+        struct spl_catalog_entry *entry = open_entry();
+        spl_fleet_add(fleet, entry);
+        assert_ptr_equal(take_change(fleet), entry);
+        assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
+        for (int v = 0; v < 6; v++) {
+            struct spl_job *job = make_job_of(entry);
+            if (spl_fleet_submit(fleet, job, NULL))
+                spl_job_destroy(job);
+            else
+                sent++;
+        }
+        spl_catalog_entry_unref(entry);
+        struct spl_catalog_entry *changed = NULL;
+        while (!changed || changed->state != SPL_ENTRY_GONE) {
+            for (struct spl_job *job; (job = spl_fleet_take(fleet)); back++)
+                spl_job_destroy(job);
+            if ((changed = spl_fleet_take_change(fleet)) && changed->state == SPL_ENTRY_ASIDE)
+                spl_catalog_entry_unref(changed);
+            usleep(200);
+        }
+        assert_ptr_equal(changed, entry);
+        spl_catalog_entry_destroy(entry);
+    }
+    assert_int_equal(back, sent);
+    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    spl_fleet_destroy(fleet);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_costs_the_device_twice_is_put_aside),
+        cmocka_unit_test(what_costs_the_device_while_it_is_loaded_is_refused),
+        cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
+        cmocka_unit_test(a_fleet_ends_with_versions_in_every_state),
+        cmocka_unit_test(views_go_where_the_least_waits),
+        cmocka_unit_test(all_queues_are_full_before_a_view_is_refused),
+        cmocka_unit_test(a_lost_device_leaves_the_others),
+        cmocka_unit_test(a_device_that_is_gone_is_given_up),
+        cmocka_unit_test(a_dataset_has_room_on_some_devices),
+        cmocka_unit_test(devices_are_of_one_kind),
+        cmocka_unit_test(lists_of_devices_are_checked),
+        cmocka_unit_test(devices_are_lost_while_all_goes_on),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
