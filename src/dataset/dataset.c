@@ -175,6 +175,8 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     if (!rc)
         rc = set_id(dataset, err);
 done:
+    if (how->kind)
+        *how->kind = dataset->kind;
     if (rc) {
         dataset->source = (struct spl_dataset_source){0}; /* stays the caller's */
         spl_dataset_close(dataset);

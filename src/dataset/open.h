@@ -34,6 +34,7 @@ struct spl_dataset {
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
+    enum spl_file_kind kind; /* as far as it has been read */
     const char *beside; // while it is opened: the path that its tiles lie beside; NULL = they cannot be read
     struct spl_tiles *tiles; // of a collection (tiles.h); NULL = it is none
     bool verified;                /* every page had its checksum when it was opened, or has it when it is read */

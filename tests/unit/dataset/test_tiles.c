@@ -21,6 +21,7 @@
 #include "dataset/tables.h"
 #include "dataset/tiles.h"
 #include "support/make_dataset.h"
+#include "support/spoil.h"
 
 enum { tile_count = 8, own_splats = 64 };
 
@@ -272,6 +273,47 @@ static void test_only_beside_a_file(void **state)
     assert_non_null(strstr(err.message, "collection of 8"));
 }
 
+static void expect_kind(const char *name, enum spl_file_kind expected, int code)
+{
+    enum spl_file_kind kind = SPL_FILE_OTHER;
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    int rc = spl_dataset_open_as(path_of(name), &(struct spl_dataset_opening){.kind = &kind}, &dataset, &err);
+    if (rc != code || kind != expected)
+        fail_msg("%s: kind %d, %d %s", name, (int)kind, rc, err.message);
+    spl_dataset_close(dataset);
+}
+
+/* It is told of sound and of broken ones alike. */
+static void test_what_a_file_is(void **state)
+{
+    (void)state;
+    static const char scan[] = "ply\nformat ascii 1.0\nend_header\n";
+    json_t *former = json_deep_copy(tiles);
+    struct spoil tile = spoil_load(path_of("tile-0.spld"));
+    FILE *file = fopen(path_of("scan.spld"), "wb");
+    json_object_del(json_array_get(former, 0), "splat_radius");
+    make_city("former.spld", former);
+    assert_int_equal(fwrite(scan, 1, sizeof scan - 1, file), sizeof scan - 1);
+    assert_int_equal(fclose(file), 0);
+    expect_kind("city.spld", SPL_FILE_COLLECTION, SPL_OK);
+    expect_kind("former.spld", SPL_FILE_COLLECTION, SPL_E_CORRUPT);
+    expect_kind("tile-0.spld", SPL_FILE_DATASET, SPL_OK);
+    tile.size -= 100;
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    tile.size = 50;
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    memcpy(tile.bytes, "SPLD\n", 5); // what text mode makes of it
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    expect_kind("scan.spld", SPL_FILE_OTHER, SPL_E_INPUT);
+    expect_kind("nosuch.spld", SPL_FILE_OTHER, SPL_E_NOT_FOUND);
+    json_decref(former);
+    free(tile.bytes);
+}
+
 /* What META may not say; each of tile 3 or of the whole list. */
 static void test_forged(void **state)
 {
@@ -384,7 +426,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_one_dataset),           cmocka_unit_test(test_a_tile_that_is_another),
-        cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_forged),
+        cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_what_a_file_is),
+        cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit), cmocka_unit_test(test_few_are_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
