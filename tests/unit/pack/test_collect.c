@@ -23,6 +23,7 @@
 #include "support/make_maps.h"
 #include "support/make_textures.h"
 #include "support/sanitised.h"
+#include "support/spoil.h"
 
 enum { tiles = 11, points = 9000, on_wire = 1000, side = 10 }; /* 11 of them are two levels above the tiles' own */
 
@@ -451,6 +452,50 @@ static void test_what_is_no_city_is_refused(void **state)
     assert_string_equal(err.field, "title");
 }
 
+static void note(void *context, const struct spl_error *why)
+{
+    char *names = context, *name = strrchr(why->message, '/');
+    assert_int_equal(why->code, SPL_E_INPUT);
+    assert_non_null(strstr(why->message, ".spld: it is a collection itself"));
+    snprintf(names + strlen(names), 100 - strlen(names), "%.*s", (int)strcspn(name, ":"), name);
+}
+
+/* What lies in a folder beside its tiles: the collection that is made anew, others, and one that opens no more. */
+static void test_collections_in_a_folder_are_no_tiles(void **state)
+{
+    (void)state;
+    char left_out[100] = "";
+    const char *inputs[] = {test_folder, NULL};
+    struct spl_error err = {0};
+    collect_all("city.spld");
+    collect_all("older.spld");
+    struct spoil file = spoil_load(in_folder("city.spld"));
+    memcpy(strstr(spoil_at(&file, SPL_SECTION_META), "\"mesh_points\""), "\"mesh_poinds\"", 13);
+    spoil_store(&file, in_folder("former.spld"), true);
+    free(file.bytes);
+    struct spl_collect_options options = SPL_SIZED(spl_collect_options, .inputs = inputs, .input_count = 1,
+                                                   .output = in_folder("anew.spld"), .title = "A city",
+                                                   .left_out = note, .progress_context = left_out);
+    for (int again = 0; again < 2; again++) {
+        left_out[0] = 0;
+        if (spl_collect(&options, &err))
+            fail_msg("%s", err.message);
+        assert_string_equal(left_out, "/city.spld/former.spld/older.spld");
+        assert_same("city.spld", "anew.spld");
+    }
+    refuse(SPL_E_INPUT, "former.spld", tile_name(1), "former.spld: it is a collection itself (\"tiles\"); name its tiles");
+    assert_int_equal(mkdir(in_folder("none"), 0777), 0);
+    assert_int_equal(rename(in_folder("older.spld"), in_folder("none/older.spld")), 0);
+    inputs[0] = in_folder("none");
+    options.output = in_folder("none/all.spld");
+    assert_int_equal(spl_collect(&options, &err), SPL_E_NOT_FOUND);
+    assert_non_null(strstr(err.message, "collections alone"));
+    unlink(in_folder("none/older.spld"));
+    assert_int_equal(rmdir(in_folder("none")), 0);
+    unlink(in_folder("former.spld"));
+    unlink(in_folder("anew.spld"));
+}
+
 static void test_more_tiles_than_there_may_be(void **state)
 {
     (void)state;
@@ -501,6 +546,7 @@ int main(void)
         cmocka_unit_test(test_order_and_threads_change_nothing),
         cmocka_unit_test(test_other_kinds_of_tiles),
         cmocka_unit_test(test_what_is_no_city_is_refused),
+        cmocka_unit_test(test_collections_in_a_folder_are_no_tiles),
         cmocka_unit_test(test_more_tiles_than_there_may_be),
         cmocka_unit_test(test_nothing_is_left_of_what_fails),
     };
