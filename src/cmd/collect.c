@@ -84,10 +84,8 @@ int spl_cmd_collect(int argc, char **argv)
     if (!rc && !o.input_count)
         rc = spl_fail(&err, SPL_E_USAGE,
                       "collect takes at least one dataset: splatd collect city -o city/city.spld");
-    if (!rc && !o.output)
-        rc = spl_fail(&err, SPL_E_USAGE, "collect needs a file to write to: -o NAME.spld");
     if (!rc)
-        rc = spl_cmd_check_ending("-o", o.output, "spld", &err);
+        rc = spl_cmd_check_dataset("collect", o.output, &err);
     if (rc)
         return spl_cmd_fail(&err);
     clean_up_on_signals(o.output);

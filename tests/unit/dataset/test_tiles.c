@@ -109,6 +109,18 @@ static void make_city(const char *name, const json_t *said)
     json_decref(meta);
 }
 
+/* "forged.spld", which says this of a tile; `value` NULL: nothing. */
+static void forge(size_t tile, const char *key, const char *value)
+{
+    json_t *forged = json_deep_copy(tiles), *entry = json_array_get(forged, tile);
+    if (value)
+        json_object_set_new(entry, key, json_loads(value, JSON_DECODE_ANY, NULL));
+    else
+        json_object_del(entry, key);
+    make_city("forged.spld", forged);
+    json_decref(forged);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -289,15 +301,13 @@ static void test_what_a_file_is(void **state)
 {
     (void)state;
     static const char scan[] = "ply\nformat ascii 1.0\nend_header\n";
-    json_t *former = json_deep_copy(tiles);
     struct spoil tile = spoil_load(path_of("tile-0.spld"));
     FILE *file = fopen(path_of("scan.spld"), "wb");
-    json_object_del(json_array_get(former, 0), "splat_radius");
-    make_city("former.spld", former);
+    forge(0, "splat_radius", NULL); // as a former version made it
     assert_int_equal(fwrite(scan, 1, sizeof scan - 1, file), sizeof scan - 1);
     assert_int_equal(fclose(file), 0);
     expect_kind("city.spld", SPL_FILE_COLLECTION, SPL_OK);
-    expect_kind("former.spld", SPL_FILE_COLLECTION, SPL_E_CORRUPT);
+    expect_kind("forged.spld", SPL_FILE_COLLECTION, SPL_E_CORRUPT);
     expect_kind("tile-0.spld", SPL_FILE_DATASET, SPL_OK);
     tile.size -= 100;
     spoil_store(&tile, path_of("spoilt.spld"), false);
@@ -310,7 +320,6 @@ static void test_what_a_file_is(void **state)
     expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
     expect_kind("scan.spld", SPL_FILE_OTHER, SPL_E_INPUT);
     expect_kind("nosuch.spld", SPL_FILE_OTHER, SPL_E_NOT_FOUND);
-    json_decref(former);
     free(tile.bytes);
 }
 
@@ -333,10 +342,7 @@ static void test_forged(void **state)
                 {"pages", "7", "tiles[3].pages"},                {"splat_radius", "0", "tiles[3].splat_radius"},
                 {"splat_radius", "\"1\"", "tiles[3].splat_radius"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        json_t *forged = json_deep_copy(tiles);
-        json_object_set_new(json_array_get(forged, 3), rows[i].key, json_loads(rows[i].value, JSON_DECODE_ANY, NULL));
-        make_city("forged.spld", forged);
-        json_decref(forged);
+        forge(3, rows[i].key, rows[i].value);
         struct spl_dataset *city;
         struct spl_error err = {0};
         if (spl_dataset_open(path_of("forged.spld"), true, &city, &err) != SPL_E_CORRUPT || strcmp(err.field, rows[i].field))
@@ -365,10 +371,7 @@ static void test_tiles_that_do_not_fit(void **state)
                 {"pages", "[[1,3,300,4096],[1,1,1,4096]]", "another number of pages or levels"},
                 {"version", "\"0123456789abcdef\"", "is another one now"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        json_t *forged = json_deep_copy(tiles);
-        json_object_set_new(json_array_get(forged, 0), rows[i].key, json_loads(rows[i].value, JSON_DECODE_ANY, NULL));
-        make_city("forged.spld", forged);
-        json_decref(forged);
+        forge(0, rows[i].key, rows[i].value);
         struct spl_dataset *city = open_city("forged.spld");
         refuse_page(city, rows[i].said);
         spl_dataset_close(city);
