@@ -173,6 +173,33 @@ int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *
     return rc;
 }
 
+uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
+{
+    return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
+}
+
+size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
+{
+    spl_assert(index < dataset->info.pages);
+    const struct spl_tiles *tiles = dataset->tiles;
+    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages] : dataset->pages[index]->bytes;
+}
+
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own = dataset;
+    int rc = tile ? spl_tiles_borrow(dataset, tile, &own, err) : SPL_OK;
+    if (rc)
+        return rc;
+    const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
+    rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, err);
+    if (tile)
+        spl_tiles_give_back(dataset, tile);
+    return rc;
+}
+
 /* Numbers of a tile's own become those of the collection. */
 static void renumber(struct spl_tables *tables, const struct spl_tile *tile)
 {
