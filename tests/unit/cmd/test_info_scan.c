@@ -98,6 +98,22 @@ static void test_json(void **state)
     json_decref(json);
 }
 
+static void test_columns_by_their_values(void **state)
+{
+    char output[16384];
+    (void)state;
+    write_text("floor.xyz", "1 2 0 0 0 1\n3 4 0 0 0 1\n");
+    json_t *json = json_of("floor.xyz");
+    assert_true(is(json, "columns_by_values", "\"x,y,z,nx,ny,nz\"") && is(json, "attributes", "[\"normal\"]"));
+    json_decref(json);
+    assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "\n  columns       x,y,z,nx,ny,nz by the values\n"));
+    write_text("floor.xyz", "x y z r g b\n1 2 0 0 0 1\n3 4 0 0 0 1\n");
+    json = json_of("floor.xyz");
+    assert_true(is(json, "columns_by_values", "null") && is(json, "attributes", "[\"color\"]"));
+    json_decref(json);
+}
+
 static void test_headers_that_lie(void **state)
 {
     char output[16384];
@@ -284,6 +300,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_json),    cmocka_unit_test(test_headers_that_lie), cmocka_unit_test(test_several),
         cmocka_unit_test(test_options), cmocka_unit_test(test_images),
+        cmocka_unit_test(test_columns_by_their_values),
         cmocka_unit_test(test_metres_beside_feet), cmocka_unit_test(test_panoramas),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
