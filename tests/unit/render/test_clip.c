@@ -159,6 +159,8 @@ static void test_what_is_degenerate_is_refused(void **state)
         {"box:0,0,0,1,0,1", "empty box"},
         {"box:0,0,0,1,-1,1", "before it begins"},
         {"box:0,0,0,1,1,1,400", "400 degrees"},
+        {"box:-1e308,0,0,1e308,1,1", "from -1e+308 to 1e+308, wider than numbers go"},
+        {"polygon:-1e160,-1e160,1e160,-1e160,0,1e160", "a corner at -1e+160, beyond 1e+150"},
         {"box:0,0,0,1,1,1,10,20", "by three"},
         {"plane:0,0,0,0,0,0>0", "without length"},
         {"z", "no <, >"},

@@ -1,5 +1,6 @@
 /* What colours show and how they are shaded: what each form means, that what is printed reads as the same, what is
  * refused with which field, and what a palette says of values. */
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -226,6 +227,13 @@ static void test_values_find_their_place(void **state)
     const double place = -3.0 * (double)float_at(words, SPL_PALETTE_AXIS + 1) * (double)float_at(words, SPL_PALETTE_SCALE) +
                          (double)float_at(words, SPL_PALETTE_OFFSET);
     assert_true(fabs(place - 128) < 1e-3);
+    static const double wide[2][2] = {{-1e308, 1e308}, {DBL_MAX, DBL_MAX}}; /* of a width beyond numbers */
+    for (int i = 0; i < 2; i++) {
+        struct spl_error err = {0};
+        color = (struct spl_color_params){.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {wide[i][0], wide[i][1]}};
+        assert_int_equal(spl_paint_init(&paint, &color, &info, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "range");
+    }
     color = (struct spl_color_params){.by = SPL_COLOR_BY_ATTRIBUTE, .name = "class"};
     assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
     assert_true(paint.classes && paint.colors[2] == 0x0055aa && paint.colors[5] == 0x00aa00);
