@@ -19,6 +19,7 @@ struct spl_tile {
     struct spl_dataset *open; // guarded by: mutex, as all below; may be NULL
     unsigned users;
     uint64_t used; /* when, in borrowings */
+    bool spoilt;   /* something of the open one did not hold: it is closed by its last user */
 };
 
 struct spl_tiles {

@@ -268,6 +268,37 @@ static void test_a_tile_that_is_another(void **state)
     spl_dataset_close(later);
 }
 
+/* In place, while it is open and while it is not: its page fails, and is there again with the tile. */
+static void test_a_tile_that_is_damaged(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    const size_t bytes = spl_dataset_get_page_bytes(city, 1);
+    char *page = malloc(bytes), *again = malloc(bytes);
+    assert_int_equal(spl_dataset_read_page(city, 1, page, NULL), SPL_OK);
+    for (int i = 0; i < 2; i++) {
+        struct spoil file = spoil_load(path_of("tile-0.spld"));
+        struct spl_error err = {0};
+        ((uint8_t *)spoil_at(&file, SPL_SECTION_PAGE))[40] ^= 1;
+        spoil_store(&file, path_of("tile-0.spld"), false);
+        free(file.bytes);
+        assert_int_equal(spl_dataset_read_page(city, 1, again, &err), SPL_E_CORRUPT);
+        if (!strstr(err.message, "city: its tile tile-0.spld cannot be read: page 0 fails its checksum; put it back"))
+            fail_msg("%s", err.message);
+        unlink(path_of("tile-0.spld"));
+        make_tile(0, 0);
+        assert_int_equal(spl_dataset_read_page(city, 1, again, NULL), SPL_OK);
+        assert_memory_equal(again, page, bytes);
+        if (!i) {
+            spl_dataset_close(city);
+            city = open_city("city.spld");
+        }
+    }
+    free(page);
+    free(again);
+    spl_dataset_close(city);
+}
+
 static void test_only_beside_a_file(void **state)
 {
     (void)state;
@@ -429,7 +460,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_one_dataset),           cmocka_unit_test(test_a_tile_that_is_another),
-        cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_what_a_file_is),
+        cmocka_unit_test(test_a_tile_that_is_damaged), cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit), cmocka_unit_test(test_few_are_open),
     };
