@@ -15,7 +15,7 @@ enum { SPL_COLLECT_TILES_MAX = 10000 };
 
 struct spl_collect_options {
     size_t size;               /* spl_collect_options_init() */
-    const char *const *inputs; /* datasets; folders, for all in them but collections; @NAME, a list with a path a line */
+    const char *const *inputs; /* datasets; folders, for all in them but collections; @NAME, a list of paths */
     size_t input_count;
     const char *output;      /* NAME.spld, in the folder of the datasets */
     const char *title;       /* as of struct spl_pack_options */

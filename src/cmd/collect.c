@@ -48,8 +48,9 @@ static const struct spl_cmd_table table = {
         "  splatd collect city/north.spld city/south.spld -o city/both.spld && splatd info city/both.spld\n"
         "From a list of their names:\n"
         "  splatd collect @city/tiles.txt -o city/city.spld\n\n",
-    .after = "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
-             "where all points have the same value too. Progress and the summary go to stderr.\n",
+    .after =
+        "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
+        "where all points have the same value too. Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };

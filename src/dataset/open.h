@@ -1,5 +1,6 @@
 /* An open dataset from the inside, and the stages of opening one. Only the files that open one, lookup.c, attributes.c,
- * maps.c, read.c, tables.c, textures.c and tiles.c include this. Each stage trusts what the ones before it have checked. */
+ * maps.c, read.c, tables.c, textures.c and tiles.c include this. Each stage trusts what the ones before it have
+ * checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
 

@@ -1,7 +1,7 @@
-/* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to be
- * opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the collection was
- * made of, which its version and the sizes of all its pages say: a tile that is replaced fails what needs it, until the
- * collection is made anew. Any thread. */
+/* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to
+ * be opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the
+ * collection was made of, which its version and the sizes of all its pages say: a tile that is replaced fails what
+ * needs it, until the collection is made anew. Any thread. */
 #include "dataset/tiles.h"
 
 #include <stdio.h>
@@ -39,8 +39,8 @@ static char *path_of(const struct spl_tiles *tiles, const struct spl_tile *tile,
 
 static bool is_same_stream(const struct spl_stream *a, const struct spl_stream *b)
 {
-    return !strcmp(a->name, b->name) && !strcmp(a->type, b->type) && !strcmp(a->unit, b->unit) && a->first == b->first &&
-           a->steps_a_unit == b->steps_a_unit;
+    return !strcmp(a->name, b->name) && !strcmp(a->type, b->type) && !strcmp(a->unit, b->unit) &&
+           a->first == b->first && a->steps_a_unit == b->steps_a_unit;
 }
 
 /* What of the tile is not as the collection says, or NULL. */
@@ -164,8 +164,8 @@ void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *til
     pthread_mutex_unlock(&tiles->mutex);
 }
 
-/* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have been
- * put back meanwhile. */
+/* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
+ * been put back meanwhile. */
 static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset *own, int rc,
                        const struct spl_error *why, struct spl_error *err)
 {
@@ -204,7 +204,8 @@ size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t in
 {
     spl_assert(index < dataset->info.pages);
     const struct spl_tiles *tiles = dataset->tiles;
-    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages] : dataset->pages[index]->bytes;
+    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages]
+                                              : dataset->pages[index]->bytes;
 }
 
 int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,

@@ -1,5 +1,5 @@
-/* Arrays of a pack: which of them are large, which of those lie on the heap and which in files (spill_disk.c), and small
- * ones out of pools. What keeps the process within its bound is spill_bound.c.
+/* Arrays of a pack: which of them are large, which of those lie on the heap and which in files (spill_disk.c), and
+ * small ones out of pools. What keeps the process within its bound is spill_bound.c.
  *
  * Invariant: under the lock `pieces` are all arrays that are large, in files and on the heap, and none is mapped or
  * unmapped without it. */
@@ -205,7 +205,8 @@ void *spl_spill_take(struct spl_spill *s, size_t count, size_t size, struct spl_
     bytes += bytes ? 0 : 64; /* never none */
     pthread_mutex_lock(&s->lock);
     if (bytes > s->pool_left) { // of a file each: the larger the more there are
-        size_t pool_bytes = s->on_disk / pools_a_spill > pool_least ? s->on_disk / pools_a_spill & ~(size_t)4095 : pool_least;
+        size_t pool_bytes =
+            s->on_disk / pools_a_spill > pool_least ? s->on_disk / pools_a_spill & ~(size_t)4095 : pool_least;
         char *pool = add_piece(s, pool_bytes, false, err);
         s->pool = pool ? pool : s->pool;
         s->pool_left = pool ? pool_bytes : s->pool_left;

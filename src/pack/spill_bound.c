@@ -1,7 +1,7 @@
-/* The bound of a pack's memory. Near it pages are taken away from the arrays in files in turn, whoever uses them: those in
- * use come back at once, from the kernel's cache, those that are not stay away. Who fills arrays looks after it himself
- * every half a millisecond, so that on a busy machine too nothing is filled before room is made; a thread of its own does
- * where nobody says so. It looks the oftener the less is left. */
+/* The bound of a pack's memory. Near it pages are taken away from the arrays in files in turn, whoever uses them: those
+ * in use come back at once, from the kernel's cache, those that are not stay away. Who fills arrays looks after it
+ * himself every half a millisecond, so that on a busy machine too nothing is filled before room is made; a thread of
+ * its own does where nobody says so. It looks the oftener the less is left. */
 #include <malloc.h>
 #include <stdio.h>
 #include <sys/mman.h>
@@ -77,7 +77,8 @@ static void let_go(struct spl_spill *s)
             break;
     }
     uint64_t now = spl_now_ns();
-    if (now - s->trimmed_ns > trim_ns && spl_spill_get_resident(s) > wanted) { /* what the heap keeps of what was freed */
+    /* what the heap keeps of what was freed */
+    if (now - s->trimmed_ns > trim_ns && spl_spill_get_resident(s) > wanted) {
         malloc_trim(0);
         s->trimmed_ns = now;
     }
@@ -99,7 +100,8 @@ void spl_spill_keep_bound(struct spl_spill *s)
     if (spl_spill_get_resident(s) <= get_most(s))
         return;
     let_go(s);
-    if (spl_spill_get_resident(s) > get_most(s)) // what cannot be let go of is too much already: no sooner than that again
+    // what cannot be let go of is too much already: no sooner than that again
+    if (spl_spill_get_resident(s) > get_most(s))
         atomic_store(&s->checked_ns, spl_now_ns() + (uint64_t)longest_ns);
 }
 

@@ -1,5 +1,6 @@
 /* Files without a name, one an array, all of their blocks reserved before they are mapped, so that a full disk is an
- * error and no signal. Mapped shared: a page that is let go of is in the file, and comes back when it is next touched. */
+ * error and no signal. Mapped shared: a page that is let go of is in the file, and comes back when it is next
+ * touched. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/magic.h>
@@ -39,11 +40,12 @@ int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t writte
     if (folder && !statvfs(folder, &status)) {
         uint64_t free_bytes = (uint64_t)status.f_bavail * status.f_frsize;
         if (free_bytes < meanwhile + written)
-            rc = spl_fail_field(err, SPL_E_IO, "memory",
-                                "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
-                                "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
-                                "or write the dataset to another disk",
-                                (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
+            rc = spl_fail_field(
+                err, SPL_E_IO, "memory",
+                "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
+                "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
+                "or write the dataset to another disk",
+                (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
     }
     free(folder);
     return rc;
@@ -68,10 +70,11 @@ static int reserve_blocks(struct spl_spill *s, int fd, size_t before, size_t byt
             continue;
     if (!why)
         return SPL_OK;
-    return spl_fail_field(&s->why, SPL_E_IO, "memory",
-                          "within this memory the pack needs %.0f MB in '%.200s' beside the %.0f MB that it keeps there: "
-                          "%s; make room there, give it more memory, or write the dataset to another disk",
-                          (double)(bytes - before) / 1e6, s->folder, (double)s->on_disk / 1e6, strerror(why));
+    return spl_fail_field(
+        &s->why, SPL_E_IO, "memory",
+        "within this memory the pack needs %.0f MB in '%.200s' beside the %.0f MB that it keeps there: "
+        "%s; make room there, give it more memory, or write the dataset to another disk",
+        (double)(bytes - before) / 1e6, s->folder, (double)s->on_disk / 1e6, strerror(why));
 }
 
 /* Where the file system knows no files without a name, one that loses it at once. */
@@ -92,7 +95,8 @@ static void *map_nameless(struct spl_spill *s, size_t bytes)
 {
     int fd = open_nameless(s->folder);
     if (fd < 0) {
-        spl_fail_errno(&s->why, errno, "'%.300s': no file for what is beyond the bound of memory can be made", s->folder);
+        spl_fail_errno(&s->why, errno, "'%.300s': no file for what is beyond the bound of memory can be made",
+                       s->folder);
         return NULL;
     }
     if (reserve_blocks(s, fd, 0, bytes)) {

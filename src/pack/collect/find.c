@@ -1,5 +1,6 @@
 /* Which tiles are meant: files, folders with all datasets in them, lists with a path a line. A collection names its
- * tiles by their file names, so all of them lie in one folder with it. The caller's thread; one descriptor at a time. */
+ * tiles by their file names, so all of them lie in one folder with it. The caller's thread; one descriptor at a
+ * time. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -68,7 +69,8 @@ static int add_folder(struct spl_collect *c, const char *path, struct spl_error 
 static int add_path(struct spl_collect *c, const char *path, struct spl_error *err)
 {
     struct stat status;
-    return !stat(path, &status) && S_ISDIR(status.st_mode) ? add_folder(c, path, err) : add(c, strdup(path), false, err);
+    return !stat(path, &status) && S_ISDIR(status.st_mode) ? add_folder(c, path, err)
+                                                           : add(c, strdup(path), false, err);
 }
 
 static int add_list(struct spl_collect *c, const char *name, struct spl_error *err)

@@ -161,8 +161,8 @@ int spl_incoming_check(struct spl_incoming *incoming, const char *target, const 
         spl_catalog_entry_destroy(*entry);
         *entry = NULL;
         rc = spl_fail(&why, SPL_E_INPUT,
-                      "a collection is made of files beside it, which no upload brings along: upload its tiles, and let "
-                      "splatd collect make it where they lie");
+                      "a collection is made of files beside it, which no upload brings along: upload its tiles, and "
+                      "let splatd collect make it where they lie");
     }
     if (!rc)
         return 0;
