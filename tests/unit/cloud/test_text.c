@@ -142,9 +142,12 @@ static void surveyors_names_are_coordinates(void **state)
     load_text("# easting northing elevation\n1 2 3\n", NULL, &l);
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
-    static const char *const german[] = {"Punkt;Rechtswert;Hochwert;H\xc3\xb6he\nP1;1;2;3\n", "RECHTSWERT,HOCHWERT,H\xc3\x96HE\n1,2,3\n",
-                                         "Hoehe Rechtswert Hochwert\n3 1 2\n", "Ostwert,Nordwert,h\xf6he\n1,2,3\n",
-                                         "X_,Y_,Z_\n1,2,3\n", "z_coord,y_coord,x_coord\n3,2,1\n"};
+    static const char *const german[] = {"Punkt;Rechtswert;Hochwert;H\xc3\xb6he\nP1;1;2;3\n",
+                                         "RECHTSWERT,HOCHWERT,H\xc3\x96HE\n1,2,3\n",
+                                         "Hoehe Rechtswert Hochwert\n3 1 2\n",
+                                         "Ostwert,Nordwert,h\xf6he\n1,2,3\n",
+                                         "X_,Y_,Z_\n1,2,3\n",
+                                         "z_coord,y_coord,x_coord\n3,2,1\n"};
     for (size_t i = 0; i < sizeof german / sizeof *german; i++) {
         load_text(german[i], NULL, &l);
         assert_point(&l, 0, 1, 2, 3);

@@ -244,10 +244,13 @@ static void test_panoramas(void **state)
 {
     char output[16384];
     (void)state;
-    assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
-                     0);
+    assert_int_equal(
+        run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
+        0);
     json_t *json = json_of("yard/courtyard.ply"), *pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0,\"places\":0,\"map_bytes\":86688}]"));
+    assert_true(
+        is(pack, "panoramas",
+           "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0,\"places\":0,\"map_bytes\":86688}]"));
     assert_true(is(pack, "warnings", "[]"));
     assert_true(json_integer_value(json_object_get(pack, "dataset_bytes")) ==
                 86688 + 10 * json_integer_value(json_object_get(json, "points")));
@@ -263,7 +266,8 @@ static void test_panoramas(void **state)
     write_text("yard/panoramas/panoramas.json", "{\"panoramas\": 7}");
     json = json_of("yard/second.ply");
     pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0,\"places\":0,\"map_bytes\":0}]"));
+    assert_true(is(pack, "panoramas",
+                   "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0,\"places\":0,\"map_bytes\":0}]"));
     assert_int_equal(json_array_size(json_object_get(pack, "warnings")), 1);
     json_decref(json);
     assert_int_equal(run("info yard/second.ply", output, sizeof output), 0);
@@ -278,7 +282,8 @@ static void test_panoramas(void **state)
                      86688 / 4); /* of a place nobody knows it */
     json_decref(json);
     assert_int_equal(run("info yard/second.ply", output, sizeof output), 0);
-    assert_non_null(strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
+    assert_non_null(
+        strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
 }
 
 static int make_folder(void **state)

@@ -1,6 +1,6 @@
-/* A collection is one dataset from outside: its tiles' pages, nodes, chunks, ids and values are found as those of the tiles
- * themselves are; few tiles are open at a time; one that is not what the collection was made of is refused by name, and so is a
- * META that cannot be. */
+/* A collection is one dataset from outside: its tiles' pages, nodes, chunks, ids and values are found as those of the
+ * tiles themselves are; few tiles are open at a time; one that is not what the collection was made of is refused by
+ * name, and so is a META that cannot be. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -51,7 +51,8 @@ static void make_tile(unsigned t, uint8_t red)
     struct make_splat *splats = calloc(4000, sizeof *splats);
     splats_of[t] = 300 + 400 * t;
     for (unsigned i = 0; i < splats_of[t]; i++) {
-        splats[i] = (struct make_splat){.normal = {0, 0, 1}, .radius = 0.1f, .color = {red, (uint8_t)i}, .classification = (uint8_t)(t + i % 3)};
+        splats[i] = (struct make_splat){
+            .normal = {0, 0, 1}, .radius = 0.1f, .color = {red, (uint8_t)i}, .classification = (uint8_t)(t + i % 3)};
         for (int a = 0; a < 3; a++)
             splats[i].position[a] = 32.0 * (t >> a & 1) + 4 + 8.0 * (double)((i * (a + 1)) % 97) / 97;
     }
@@ -78,14 +79,14 @@ static json_t *describe(unsigned t)
         uint64_t ids = 0;
         for (uint32_t c = 0; c < tables->chunk_count; c++)
             ids += tables->chunks[c].count;
-        json_array_append_new(pages, json_pack("[iiIi]", (int)tables->node_count, (int)tables->chunk_count, (json_int_t)ids,
-                                               (int)spl_dataset_get_page_bytes(tile, p)));
+        json_array_append_new(pages, json_pack("[iiIi]", (int)tables->node_count, (int)tables->chunk_count,
+                                               (json_int_t)ids, (int)spl_dataset_get_page_bytes(tile, p)));
     }
     json = json_pack("{s:s, s:o, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:i, s:i, s:o}", "file", name_of(t), "version",
-                     json_sprintf("%016llx", (unsigned long long)info->version), "node", (int)t + 1, "levels", (int)info->levels,
-                     "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats, "splats",
-                     (json_int_t)info->splats, "pieces", 0, "panels", 0, "panel_points", 0, "meshes", 0, "mesh_points", 0,
-                     "pages", pages);
+                     json_sprintf("%016llx", (unsigned long long)info->version), "node", (int)t + 1, "levels",
+                     (int)info->levels, "points", (json_int_t)info->points, "leaf_splats",
+                     (json_int_t)info->leaf_splats, "splats", (json_int_t)info->splats, "pieces", 0, "panels", 0,
+                     "panel_points", 0, "meshes", 0, "mesh_points", 0, "pages", pages);
     json_object_set_new(json, "splat_radius", json_real(info->splat_radius));
     spl_dataset_close(tile);
     assert_non_null(json);
@@ -176,7 +177,8 @@ static void check_tile(const struct spl_dataset *city, unsigned t, uint32_t *pag
             assert_int_equal(there->nodes[n].depth, own->nodes[n].depth + leaf->depth + 1);
             assert_int_equal(there->nodes[n].page, *page);
             assert_true(there->nodes[n].first_child == own->nodes[n].first_child + first_node);
-            assert_true(there->nodes[n].first_chunk - there->first_chunk == own->nodes[n].first_chunk - own->first_chunk);
+            assert_true(there->nodes[n].first_chunk - there->first_chunk ==
+                        own->nodes[n].first_chunk - own->first_chunk);
         }
         if (!p)
             assert_null(spl_node_judge_child(leaf, &there->nodes[0]));
@@ -202,7 +204,8 @@ static void check_tile(const struct spl_dataset *city, unsigned t, uint32_t *pag
         double origin[2][3], value[2];
         assert_true(spl_dataset_find_splat(tile, i, &a) && spl_dataset_find_splat(city, first_id + i, &b));
         assert_memory_equal(&a, &b, sizeof a);
-        assert_true(spl_dataset_find_value(tile, 0, i, &value[0]) && spl_dataset_find_value(city, 0, first_id + i, &value[1]));
+        assert_true(spl_dataset_find_value(tile, 0, i, &value[0]) &&
+                    spl_dataset_find_value(city, 0, first_id + i, &value[1]));
         assert_true(value[0] == value[1]);
         assert_true(spl_dataset_find_chunk(tile, i, &chunk, origin[0]) &&
                     spl_dataset_find_chunk(city, first_id + i, &chunk, origin[1]));
@@ -376,7 +379,8 @@ static void test_forged(void **state)
         forge(3, rows[i].key, rows[i].value);
         struct spl_dataset *city;
         struct spl_error err = {0};
-        if (spl_dataset_open(path_of("forged.spld"), true, &city, &err) != SPL_E_CORRUPT || strcmp(err.field, rows[i].field))
+        if (spl_dataset_open(path_of("forged.spld"), true, &city, &err) != SPL_E_CORRUPT ||
+            strcmp(err.field, rows[i].field))
             fail_msg("%s %s: %s %s", rows[i].key, rows[i].value, err.field, err.message);
     }
     json_t *fewer = json_deep_copy(tiles), *others[] = {fewer, json_array(), json_string("tiles")};
@@ -459,10 +463,14 @@ static void test_few_are_open(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one_dataset),           cmocka_unit_test(test_a_tile_that_is_another),
-        cmocka_unit_test(test_a_tile_that_is_damaged), cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_what_a_file_is),
+        cmocka_unit_test(test_one_dataset),
+        cmocka_unit_test(test_a_tile_that_is_another),
+        cmocka_unit_test(test_a_tile_that_is_damaged),
+        cmocka_unit_test(test_only_beside_a_file),
+        cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
-        cmocka_unit_test(test_tiles_that_do_not_fit), cmocka_unit_test(test_few_are_open),
+        cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_few_are_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

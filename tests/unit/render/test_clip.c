@@ -197,8 +197,8 @@ static void test_corners_that_are_shared_count_for_each(void **state)
     struct spl_error err = {0};
     enum { corners = SPL_TERMS_CORNERS_MAX / 2 };
     for (int i = 0; i < corners; i++)
-        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%.6f,%.6f", i ? "," : "", cos(i * 2 * M_PI / corners),
-                 sin(i * 2 * M_PI / corners));
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%.6f,%.6f", i ? "," : "",
+                 cos(i * 2 * M_PI / corners), sin(i * 2 * M_PI / corners));
     memset(&terms, 0, sizeof terms);
     assert_int_equal(spl_terms_parse(text, "clip", &terms, &err), SPL_OK);
     for (uint32_t i = 1; i < 3; i++) {

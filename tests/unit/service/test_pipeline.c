@@ -135,7 +135,8 @@ static void a_large_view_ends_between_tiles_when_nobody_waits(void **state)
     setenv("FAKE_MPX_MS", "20", 1);
     struct spl_pipeline *pipeline = start(8);
     struct spl_job *left = make_large(64), *late = make_large(64), *job;
-    late->deadline_ns = spl_now_ns() + 600 * SPL_NS_PER_MS; /* half of what it takes; the small one is long done by then */
+    /* half of what it takes; the small one is long done by then */
+    late->deadline_ns = spl_now_ns() + 600 * SPL_NS_PER_MS;
     assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
     assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
     struct spl_job *small = make_job(60000);
@@ -283,7 +284,8 @@ static void views_that_wait_for_pages_end(void **state)
     assert_int_equal(counters.frames, 1);
 }
 
-/* Many pages have been read and no more will wake anybody: they are put on the device one after the other, without rests. */
+/* Many pages have been read and no more will wake anybody: they are put on the device one after the other, without
+ * rests. */
 static void what_was_read_is_uploaded_without_rests(void **state)
 {
     (void)state;
@@ -407,7 +409,8 @@ static struct spl_catalog_entry *open_entry(void)
     make_folder(path);
     strcat(path, "/one.spld");
     make_dataset_file(path, &splat, 1, 1);
-    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
+    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL),
+                     0);
     unlink(path);
     *strrchr(path, '/') = '\0';
     rmdir(path);
@@ -596,7 +599,8 @@ static bool has_changed(void *context)
 static struct spl_dataset *open_far(void)
 {
     static const struct spl_source_far far = {fetch, expect_or_forget, expect_or_forget, get_moved_ns, has_changed};
-    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1, .classification = 6}, {.position = {1, 0, 0}, .normal = {1, 0, 0}, .radius = 1}};
+    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1, .classification = 6},
+                                         {.position = {1, 0, 0}, .normal = {1, 0, 0}, .radius = 1}};
     char path[256] = "";
     struct spl_dataset *dataset = NULL;
     struct spl_dataset_opening how = {.verify = true, .tables_bytes = SPL_TABLES_BYTES};
@@ -648,7 +652,8 @@ static void picks_of_a_server_that_hangs_hold_up_nobody(void **state)
     atomic_store(&server.hangs, true);
     server.asked = 0;
     for (int i = 0; i < picks; i++)
-        assert_int_equal(spl_pipeline_submit(pipeline, make_pick(far, i + 1, i >= 2 && i < 2 + late ? 100 : 60000), NULL), 0);
+        assert_int_equal(
+            spl_pipeline_submit(pipeline, make_pick(far, i + 1, i >= 2 && i < 2 + late ? 100 : 60000), NULL), 0);
     while (server.asked < 2)
         usleep(500);
     for (int i = 0, ended[3] = {0}; i < picks - 16 + late + 4; i++) { // what is refused, late, or of other datasets
