@@ -47,5 +47,6 @@ void main()
     precise float average = sum / max(weight, 1.0);
     uint mean = (floatBitsToUint(average) & ~SPACING_MASK) | (nearest & SPACING_MASK);
     planes[frame.fill_to + gl_GlobalInvocationID.x] = weight > 0.0 ? mean : 0u;
-    planes[frame.fill_to + frame.fill_stride + gl_GlobalInvocationID.x] = payload_of(vector, max(weight, 1.0), nearest_payload);
+    planes[frame.fill_to + frame.fill_stride + gl_GlobalInvocationID.x] =
+        payload_of(vector, max(weight, 1.0), nearest_payload);
 }

@@ -1,7 +1,7 @@
 /* Normals of the filled depth, for datasets without any: of a plane through the sample that fits those around it, 5 x 5
  * of the same surface, by least squares. Along a plane's image inverse depth is linear, w = w0 + b x + c y, and the
- * plane's normal is (b fx, c fy, w0 - b (x0 - cx) - c (y0 - cy)). Along that of parallel rays depth is, z = z0 + b x + c y,
- * and the normal is (-b fx, -c fy, 1). Towards the eye. */
+ * plane's normal is (b fx, c fy, w0 - b (x0 - cx) - c (y0 - cy)). Along that of parallel rays depth is, z = z0 + b x +
+ * c y, and the normal is (-b fx, -c fy, 1). Towards the eye. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/fill.glsl"
@@ -31,7 +31,8 @@ void main()
         uint word = depth_word(inside ? sample_index(c) : i, WIDE);
         float there = uintBitsToFloat(word), difference = (PARALLEL != 0u ? there : 1.0 / there) - w0;
         vec2 d = vec2(step);
-        bool same = inside && word != SPL_NOTHING && abs(difference) <= (PARALLEL != 0u ? 1.0 : w0) * SPL_FILL_SLOPE * frame.inverse_fx * length(d);
+        bool same = inside && word != SPL_NOTHING &&
+                    abs(difference) <= (PARALLEL != 0u ? 1.0 : w0) * SPL_FILL_SLOPE * frame.inverse_fx * length(d);
         slope += same ? d * difference : vec2(0.0);
         squares += same ? vec3(d * d, d.x * d.y) : vec3(0.0);
         step = step.x == 2 ? ivec2(-2, step.y + 1) : ivec2(step.x + 1, step.y);

@@ -35,7 +35,8 @@ void main()
         uint word = FIRST != 0u ? first_word(depth_word(from, WIDE)) : plane_word(frame.fill_from + from);
         uint x = ((word >> SPL_FILL_SPACING_BITS) & low) | (i & 1u) << side_bits;
         uint y = ((word >> (SPL_FILL_SPACING_BITS + side_bits)) & low) | (i >> 1) << side_bits;
-        uint coded = (word & keep) | (word & SPACING_MASK) | x << SPL_FILL_SPACING_BITS | y << (SPL_FILL_SPACING_BITS + level);
+        uint coded =
+            (word & keep) | (word & SPACING_MASK) | x << SPL_FILL_SPACING_BITS | y << (SPL_FILL_SPACING_BITS + level);
         best = max(best, inside && word != 0u ? coded : 0u);
         if (FIRST != 0u && inside)
             planes[frame.fill_from + from] = word;

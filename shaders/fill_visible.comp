@@ -1,8 +1,8 @@
 /* Visibility, the operator of Pintus et al. 2011 ("Real-time Rendering of Massive Unstructured Raw Point Clouds using
  * Screen-space Operators"): eight sectors around a sample, in each the widest cone towards the eye that no nearer
  * sample enters; a sample is visible where the cones' solid angles add up to the threshold. A sample that holds
- * nothing lies infinitely far away. What is not visible is a hole, to be filled. Along parallel rays distances on the image
- * are the same at all depths.
+ * nothing lies infinitely far away. What is not visible is a hole, to be filled. Along parallel rays distances on the
+ * image are the same at all depths.
  *
  * Constant 0 = 1, adaptive: a sample stands in the way of others as far as frame.fill_reach times its spacing on the
  * image, which is proportional to its inverse depth, and frame.fill_kernel at most. Of the rings around a sample, each

@@ -1,5 +1,5 @@
-/* Method nearest: chunks of lines, beside nearest.comp, an invocation for each piece. Its depth is bent over its width as
- * a disc's is; what a sample shows is of the nearer of the piece's two vertices. */
+/* Method nearest: chunks of lines, beside nearest.comp, an invocation for each piece. Its depth is bent over its width
+ * as a disc's is; what a sample shows is of the nearer of the piece's two vertices. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"

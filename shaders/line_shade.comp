@@ -1,5 +1,5 @@
-/* Shade pass of method splat: chunks of lines, beside splat_shade.comp, with the same sums. What a sample shows is of the
- * nearer of the piece's two vertices; its weight falls with the distance from the axis as a disc's does. */
+/* Shade pass of method splat: chunks of lines, beside splat_shade.comp, with the same sums. What a sample shows is of
+ * the nearer of the piece's two vertices; its weight falls with the distance from the axis as a disc's does. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/capsule.glsl"

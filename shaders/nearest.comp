@@ -1,7 +1,8 @@
 /* Method nearest: each sample keeps the disc whose depth, bent into a cone by as much of the blend margin as the sample
  * lies off the disc's centre, is the least; the least payload among equals. So discs of one surface meet where their
  * cones do, in the middle between their centres, without sums. The payload (constant 0) is what the requested layer
- * needs: colour, octahedral normal, id, what it is, the depth that was not bent, or for maps colour and how far it was. */
+ * needs: colour, octahedral normal, id, what it is, the depth that was not bent, or for maps colour and how far it
+ * was. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"

@@ -1,7 +1,7 @@
 /* Method points: each splat's centre covers the one sample that it falls on; the nearest wins, the least payload among
  * equals. With 64 bit atomics one pass keeps depth << 32 | payload; without, pass 0 finds the depth and pass 1 the
- * payload. The payload (constant 0) is what the requested layer needs: colour, octahedral normal, id or what it is. For method fill
- * (constant 2) the depth's low bits hold the splat's spacing and whether it is linear. */
+ * payload. The payload (constant 0) is what the requested layer needs: colour, octahedral normal, id or what it is. For
+ * method fill (constant 2) the depth's low bits hold the splat's spacing and whether it is linear. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
@@ -34,7 +34,8 @@ void draw(spl_draw_chunk chunk, splat s)
         return;
     uint bits = floatBitsToUint(p.z);
     if (FILL != 0u)
-        bits = fill_word(bits, min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min), is_linear(chunk, s.index));
+        bits = fill_word(bits, min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min),
+                         is_linear(chunk, s.index));
     uint at = image_sample_index(ivec2(center));
     if (wins(at, bits))
         put(at, bits, payload(chunk, s));

@@ -7,9 +7,9 @@
  *   id        that of the nearest sample, the least among equals
  *   primitive the same; 0 = none
  *   coverage  float, share of the samples that hold something
- * With constant 2 = 1 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both; = 2: the other
- * layers are of the sphere that was found on a sample, where there is one. With constant 3 what is solid keeps the share of
- * its colour that shade.comp says. */
+ * With constant 2 = 1 soft spheres lie over it, which cover a sample in part: colour, and coverage, of both; = 2: the
+ * other layers are of the sphere that was found on a sample, where there is one. With constant 3 what is solid keeps
+ * the share of its colour that shade.comp says. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -35,8 +35,8 @@ uint found_word(uint at, int word)
     return imageLoad(found_texels, int(SPL_SOFT_FOUND_WORDS * at) + word).x;
 }
 
-/* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. Both are
- * scaled: what lies behind is hidden by soft_cover (map_near) at most. */
+/* The colour that soft spheres add to sample `at`, times their share, which is the last of it; 0..255 and 0..1. Both
+ * are scaled: what lies behind is hidden by soft_cover (map_near) at most. */
 vec4 soft_over(uint at)
 {
     int word = int(SPL_SOFT_STATE_WORDS * at);
@@ -216,9 +216,10 @@ void main()
         }
     } else if (LAYER == SPL_RESOLVE_NORMAL) {
         if (covered != 0u) {
-            vec3 world = vec3(frame.rotation[0] * normal.x + frame.rotation[4] * normal.y + frame.rotation[8] * normal.z,
-                              frame.rotation[1] * normal.x + frame.rotation[5] * normal.y + frame.rotation[9] * normal.z,
-                              frame.rotation[2] * normal.x + frame.rotation[6] * normal.y + frame.rotation[10] * normal.z);
+            vec3 world =
+                vec3(frame.rotation[0] * normal.x + frame.rotation[4] * normal.y + frame.rotation[8] * normal.z,
+                     frame.rotation[1] * normal.x + frame.rotation[5] * normal.y + frame.rotation[9] * normal.z,
+                     frame.rotation[2] * normal.x + frame.rotation[6] * normal.y + frame.rotation[10] * normal.z);
             float length_squared = dot(world, world);
             value = pack_normal(length_squared > 0.0 ? world : vec3(0.0, 0.0, 1.0));
         }

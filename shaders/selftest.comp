@@ -3,9 +3,9 @@
  * checks every word.
  *
  * OUTPUT: constants 0..7, then each field of frame, then each field of chunks[1], in the order of shared.h.
- * ENTRIES[i] -> SUMS[i] = bits of float(ENTRIES[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of ENTRIES, [3] or of ~PAGE;
- * with 64-bit atomics DEPTH[0] = min over (ENTRIES[i] << 32 | i), as uint64_t. IDS[i] = i, plus by how much texels differ
- * from PAGE, which lies SPL_SELFTEST_PAGE times its size into its buffer. */
+ * ENTRIES[i] -> SUMS[i] = bits of float(ENTRIES[i]) * 0.5 + 0.25; DEPTH[0] min, [1] max, [2] sum of ENTRIES, [3] or of
+ * ~PAGE; with 64-bit atomics DEPTH[0] = min over (ENTRIES[i] << 32 | i), as uint64_t. IDS[i] = i, plus by how much
+ * texels differ from PAGE, which lies SPL_SELFTEST_PAGE times its size into its buffer. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #ifdef SPL_ATOMICS_64
@@ -119,7 +119,8 @@ void main()
     precise float f = float(draw[i]) * 0.5 + 0.25;
     sums[i] = floatBitsToUint(f);
     int texel = SPL_SELFTEST_PAGE * page.length() + int(i);
-    uint page_differs = imageLoad(page_texels, texel).x - page[i], chunks_differ = imageLoad(chunk_texels, texel).x - page[i];
+    uint page_differs = imageLoad(page_texels, texel).x - page[i],
+         chunks_differ = imageLoad(chunk_texels, texel).x - page[i];
     ids[i] = i + page_differs + chunks_differ;
 #ifdef SPL_ATOMICS_64
     atomicMin(depth[0], uint64_t(draw[i]) << 32 | uint64_t(i));

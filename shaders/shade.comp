@@ -1,13 +1,13 @@
-/* What of its light each sample keeps, of SPL_SHADE_WHOLE: a factor of its colour when it is resolved. KINDS (constant 1)
- * are of SPL_SHADES_*: light from the normals that the group of normals left (RESOLVED, constant 0: how); or eye-dome
- * lighting from depths, which multiplies what light has left where LIT (constant 2).
+/* What of its light each sample keeps, of SPL_SHADE_WHOLE: a factor of its colour when it is resolved. KINDS (constant
+ * 1) are of SPL_SHADES_*: light from the normals that the group of normals left (RESOLVED, constant 0: how); or
+ * eye-dome lighting from depths, which multiplies what light has left where LIT (constant 2).
  *
  * Eye-dome lighting looks at four pairs of samples, map_sides away on either side. Inverse depth is linear along a
  * plane, so the mean of a pair's is the sample's own on any plane, however slanted; where it is more, the sample lies
- * deeper than what is around it. Along parallel rays depth itself is linear, and differences of depth are a share of how
- * far off a pinhole would see pixels as large. What a surface's own splats may differ by, seen as slanted as the pair is, is
- * no depth: they overlap in steps. Products, sums and quotients alone, continuous in depth: drivers differ by a rounding.
- * A sample outside the image, or one that holds nothing, says nothing, and its pair neither. */
+ * deeper than what is around it. Along parallel rays depth itself is linear, and differences of depth are a share of
+ * how far off a pinhole would see pixels as large. What a surface's own splats may differ by, seen as slanted as the
+ * pair is, is no depth: they overlap in steps. Products, sums and quotients alone, continuous in depth: drivers differ
+ * by a rounding. A sample outside the image, or one that holds nothing, says nothing, and its pair neither. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -51,9 +51,9 @@ float light_of(ivec2 at, uint index)
     return kept;
 }
 
-/* By how much a sample at depth z lies deeper than the mean of a pair, `apart` words before and behind it; less `rough`,
- * and more of that as the pair is slanted. Of inverses of a and b only (a + b) / ab and |a - b| / ab are asked: one
- * quotient. */
+/* By how much a sample at depth z lies deeper than the mean of a pair, `apart` words before and behind it; less
+ * `rough`, and more of that as the pair is slanted. Of inverses of a and b only (a + b) / ab and |a - b| / ab are
+ * asked: one quotient. */
 float deeper_than(int index, int apart, float z, float rough, float across)
 {
     float one = uintBitsToFloat(depth_word(uint(index - apart)));

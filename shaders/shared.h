@@ -59,7 +59,8 @@
 /* What the resolve pass finds in a sample. */
 #define SPL_RESOLVED_SUMS 0    /* sums over fragments, as the shade pass leaves them */
 #define SPL_RESOLVED_NEAREST 1 /* the nearest one's depth and payload */
-#define SPL_RESOLVED_BENT 2    /* the same, but the depth only orders: that of layers is the payload; colours are smoothed */
+/* the same, but the depth only orders; layers have the payload's; colours are smoothed */
+#define SPL_RESOLVED_BENT 2
 #define SPL_RESOLVED_MAPPED 3      /* as SUMS, but colours are sums of floats that maps added to */
 #define SPL_RESOLVED_MAPPED_BENT 4 /* as NEAREST, but the same */
 /* Samples of one surface that are smoothed differ in depth by this share at most. */
@@ -142,8 +143,8 @@
 /* Samples that are looked at for a piece (see SPL_WINDOW); pieces of which there may be more are drawn by windows. */
 #define SPL_LINE_ROUNDS 60000
 
-/* Maps of stations: polar-capped atlases (src/geom/polar.h), as words on the device, of a station's own frame. First the
- * ranges, an atlas of SPL_MAP_RANGE_APRON with two texels a word, the first in its low half:
+/* Maps of stations: polar-capped atlases (src/geom/polar.h), as words on the device, of a station's own frame. First
+ * the ranges, an atlas of SPL_MAP_RANGE_APRON with two texels a word, the first in its low half:
  *   0 not scanned   1..65534 near / range = 1 - (code - 1) / 65533   65535 nothing came back
  * so that a larger code is farther. Then the colours, an atlas of SPL_MAP_APRON for each level, each half the one
  * before: blocks of 4 x 4 texels, row by row, two words each as in BC1: two colours of 5, 6 and 5 bits (red in the high
@@ -162,8 +163,8 @@
 #define SPL_MAP_SIDES_LEVELS 8
 #define SPL_MAP_SIDES_RANGE 12
 
-/* Ranges of a surface differ by this share of a disc's radius, since discs stand for what is not flat; and no surface is
- * taken to slant by more than 80 degrees. */
+/* Ranges of a surface differ by this share of a disc's radius, since discs stand for what is not flat; and no surface
+ * is taken to slant by more than 80 degrees. */
 #define SPL_MAP_TOLERANCE 0.35f
 #define SPL_MAP_FACING_MIN 0.17364818f
 /* Maps give their colours to the image in cells of this many samples a side. */
@@ -206,14 +207,15 @@ struct spl_draw_chunk {
     SPL_U32 color_base;                   /* int16 base of u (low half) and v (high half) */
     SPL_F32 normal_u, normal_v, normal_step; /* octahedral coordinates of code 0, and the step, in [-1, 1] units */
     SPL_U32 first_id;                     /* dataset-wide index of the chunk's first splat */
-    SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the tile */
+    SPL_U32 count;                        /* SPL_COUNT_*: splats (vertices, of lines) that are drawn, window of the
+                                             tile */
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
                                              width, metres; of soft splats that are linear: the square of the radius
                                              that one of radius 1 has */
     SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
-    SPL_U32 paint_word, paint_bits, paint_base; /* of the attribute that colours show: where its codes begin, their width
-                                             and SPL_PAINT_LAST_NONE, and what they are added to */
+    SPL_U32 paint_word, paint_bits, paint_base; /* of the attribute that colours show: where its codes begin, their
+                                             width and SPL_PAINT_LAST_NONE, and what they are added to */
 };
 
 /* geometry_bits: x 0..4, y 5..9, z 10..14 (0..24 bits each), u 15..18, v 19..22 (0..12), radius 23..26 (0..12),
@@ -261,8 +263,8 @@ struct spl_draw_chunk {
  *   bit 16 on: block b has all of its cells
  * Its own words: for each block that has cells but not all of them, in their order, a mask of 16 bits (bit 4 row +
  * column), two a word from the low end; then its colours, blocks of two words as maps have them: level 0 one for each
- * block that has cells, in their order; 1 four, a texel of 2 x 2 cells; 2 one, 4 x 4 cells; SPL_PANEL_EVEN and above one
- * colour, r | g << 8 | b << 16. */
+ * block that has cells, in their order; 1 four, a texel of 2 x 2 cells; 2 one, 4 x 4 cells; SPL_PANEL_EVEN and above
+ * one colour, r | g << 8 | b << 16. */
 #define SPL_PANEL_SIDE 16
 #define SPL_PANELS_MAX 32 /* of a chunk */
 #define SPL_RUN_PANELS 8  /* of a draw-list entry: chunk index << 2 | run, as of splats */
@@ -273,9 +275,9 @@ struct spl_draw_chunk {
 #define SPL_PANEL_COLUMNS 0
 #define SPL_PANEL_ROWS 8
 
-/* Meshes: panels with relief, whose surface is a lattice of triangles over the plane. A panel's own words begin with the
- * heights of its lattice of level k, (2^k + 1)^2 bytes row by row from the low ends of words, the last word filled with
- * zeros: a byte b is b - SPL_RELIEF_ZERO steps along the plane's normal. A drawn chunk has the step, metres, as
+/* Meshes: panels with relief, whose surface is a lattice of triangles over the plane. A panel's own words begin with
+ * the heights of its lattice of level k, (2^k + 1)^2 bytes row by row from the low ends of words, the last word filled
+ * with zeros: a byte b is b - SPL_RELIEF_ZERO steps along the plane's normal. A drawn chunk has the step, metres, as
  * radius_step and k as color_bits. Masks and colours follow as of panels. */
 #define SPL_RELIEF_LEVEL_MAX 3
 #define SPL_RELIEF_ZERO 128
@@ -292,7 +294,8 @@ struct spl_draw_chunk {
 #define SPL_WINDOW 80
 /* Chunks of panels are, where a panel may be wider than this: SPL_LANES invocations draw one. */
 #define SPL_PANEL_WINDOW 320
-/* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of them. */
+/* And of meshes: SPL_MESH_LANES invocations draw a panel's triangles, of which each may cover as much as all of
+ * them. */
 #define SPL_MESH_LANES 32
 #define SPL_MESH_WINDOW 112
 
@@ -307,9 +310,9 @@ struct spl_draw_chunk {
 /* Of a splat's radius: steps of depth where splats of one surface overlap, across it. */
 #define SPL_SHADE_ROUGH 0.25f
 
-/* What colours show (src/render/paint.h): where a value comes from, and that it is multiplied with a splat's own colour.
- * The palette is words: SPL_PALETTE_COLORS colours, r | g << 8 | b << 16, that of splats without a value, and what finds
- * the place of a value among the colours, see src/render/paint.c. */
+/* What colours show (src/render/paint.h): where a value comes from, and that it is multiplied with a splat's own
+ * colour. The palette is words: SPL_PALETTE_COLORS colours, r | g << 8 | b << 16, that of splats without a value, and
+ * what finds the place of a value among the colours, see src/render/paint.c. */
 #define SPL_PAINT_NONE 0u
 #define SPL_PAINT_NUMBERS 1u  /* base + code of a stream */
 #define SPL_PAINT_OCTAVES 2u  /* half octaves of one */
@@ -342,14 +345,16 @@ struct spl_draw_chunk {
  * drawn, else a bit, from the low end, for each of the view's conditions that have attributes and shapes, set where the
  * splat's attributes make it hold. */
 
-/* Tests that marks are made of: words, see src/render/marks.c. A chunk's begin with a word: how many there are of what is
- * soft; from bit SPL_TESTS_CLIP on how many of what is drawn; from SPL_TESTS_MODE on what the marks are of. Of each
+/* Tests that marks are made of: words, see src/render/marks.c. A chunk's begin with a word: how many there are of what
+ * is soft; from bit SPL_TESTS_CLIP on how many of what is drawn; from SPL_TESTS_MODE on what the marks are of. Of each
  * SPL_TEST_WORDS, whose first has one of these in its low byte and SPL_TEST_AND ... above:
- *   SPL_TEST_NUMBERS  word of the page where its codes begin; their width, and SPL_TEST_LAST_NONE where the last code is
- *                     no value; start; span; shift; floats: W at the lower end and of a number more, at the upper one
+ *   SPL_TEST_NUMBERS  word of the page where its codes begin; their width, and SPL_TEST_LAST_NONE where the last code
+ *                     is no value; start; span; shift; floats: W at the lower end and of a number more, at the
+ *                     upper one
  *   SPL_TEST_TABLE    the same two; from SPL_TEST_TABLE_WORD on a mark for each of up to 32 codes, four a word
- *   SPL_TEST_SHAPE    word of the tests where it lies: three rows of view space -> shape (x, y, z, 1); half a box; least;
- *                     most; one over what W rises in behind each, 0 = at once; SPL_SHAPE_*, at the words below */
+ *   SPL_TEST_SHAPE    word of the tests where it lies: three rows of view space -> shape (x, y, z, 1); half a box;
+ *                     least; most; one over what W rises in behind each, 0 = at once; SPL_SHAPE_*, at the words
+ *                     below */
 #define SPL_TEST_WORDS 12
 #define SPL_TEST_NUMBERS 0u
 #define SPL_TEST_TABLE 1u
@@ -357,7 +362,7 @@ struct spl_draw_chunk {
 #define SPL_TEST_OR 0x100u      /* not of the list of the test before, but of its condition */
 #define SPL_TEST_AND 0x200u     /* of another condition */
 #define SPL_TEST_OUTSIDE 0x400u /* what is in none of its list's tests */
-#define SPL_TEST_BIT 12         /* 4 bits: the condition's bit in the mark, plus 1; 0 = what does not hold is not drawn */
+#define SPL_TEST_BIT 12         /* 4 bits: the condition's bit in the mark, plus 1; 0 = else it is not drawn */
 #define SPL_TESTS_CLIP 8
 #define SPL_TESTS_MODE 16
 #define SPL_TESTS_SOFT 0u       /* marks are of what is soft */
@@ -385,8 +390,8 @@ struct spl_draw_chunk {
 #define SPL_SHAPE_FLAGS 19u
 #define SPL_SHAPE_WORDS 20u /* behind which a polygon's corners are */
 
-/* Shapes that samples are asked of: words of the tests, from frame.fill_from on: how many, and of each where it lies and
- * the flags of a test. Kernels are made for planes and coordinates alone, and for all. */
+/* Shapes that samples are asked of: words of the tests, from frame.fill_from on: how many, and of each where it lies
+ * and the flags of a test. Kernels are made for planes and coordinates alone, and for all. */
 #define SPL_CUT_PLANES 1u
 #define SPL_CUT_BODIES 2u /* these too */
 /* Where it is one plane, axis or inside of a box, as of nearly all chunks that are cut, kernels are made for what it is
@@ -411,7 +416,7 @@ struct spl_chunk_bounds {
 /* Per tile and frame. A tile is the part of the image that one set of scratch buffers holds. */
 struct spl_frame_params {
     SPL_F32 rotation[12];                 /* world -> camera, three rows of (x, y, z, 0) */
-    SPL_F32 fx, fy, cx, cy;               /* samples; the same in every tile of an image; of parallel rays samples a unit */
+    SPL_F32 fx, fy, cx, cy;               /* samples; the same in every tile; of parallel rays samples a unit */
     SPL_F32 near, far;
     SPL_F32 low_pass;                     /* radius in samples within which a splat always covers */
     SPL_F32 margin;                       /* blend margin as a multiple of the splat's radius */
@@ -434,26 +439,26 @@ struct spl_frame_params {
     SPL_F32 fill_threshold;               /* open sectors, of 8, from which on a sample is visible */
     SPL_U32 fill_levels;                  /* of the rings that are looked at; the coarse level */
     SPL_U32 fill_level;                   /* that this pass makes */
-    SPL_U32 fill_from, fill_to;           /* words of its planes; of discs fill_from is where what cuts them is (SPL_CUT_*) */
+    SPL_U32 fill_from, fill_to;           /* words of its planes; fill_from of discs: what cuts them (SPL_CUT_*) */
     SPL_U32 fill_stride;                  /* words from a plane of depths to its payloads */
     SPL_U32 flags;                        /* SPL_FRAME_* */
     SPL_F32 map_pose[12];                 /* view space -> the frame of the map's station: three rows of (x, y, z, 1) */
-    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide; shade:
-                                             strength; map_sides: samples that are looked away; map_pose: the sun, steps that
-                                             surfaces have: in units, and of a sample's size */
+    SPL_F32 map_near;                     /* range of code 1; resolve: soft_cover, the share of what soft spheres hide;
+                                             shade: strength; map_sides: samples that are looked away; map_pose: the
+                                             sun, steps that surfaces have: in units, and of a sample's size */
     SPL_F32 map_slack;                    /* ranges of one surface differ by so much anyhow, its unit */
     SPL_U32 map_sides;                    /* SPL_MAP_SIDES_* */
-    SPL_F32 cut_rows[12];                 /* of the one shape that cuts what is drawn (SPL_CUT_ONE), as its words have it */
+    SPL_F32 cut_rows[12];                 /* of the one shape that cuts what is drawn (SPL_CUT_ONE), as its words are */
     SPL_F32 cut_half[3];
     SPL_F32 cut_least, cut_most;
     SPL_U32 cut_flags;                    /* SPL_SHAPE_*, and what joins its test: SPL_TEST_* */
 };
 
 /* Soft transparency: spheres as items in the order of their ids, which are sorted by depth and listed by the tiles of
- * SPL_SOFT_TILE x SPL_SOFT_TILE_ROWS samples that they reach; see src/render/soft/order.h. An item is SPL_SOFT_ITEM_WORDS
- * words: x y z of the centre in view space, the radius (which may be less than a sample: soft_radius()), colour | mark << 24,
- * id. Behind all items lie their rectangles, a word each: the first tile (row * columns + column) in 22 bits, columns less 1
- * and rows less 1 in 5 bits each. */
+ * SPL_SOFT_TILE x SPL_SOFT_TILE_ROWS samples that they reach; see src/render/soft/order.h. An item is
+ * SPL_SOFT_ITEM_WORDS words: x y z of the centre in view space, the radius (which may be less than a sample:
+ * soft_radius()), colour | mark << 24, id. Behind all items lie their rectangles, a word each: the first tile (row *
+ * columns + column) in 22 bits, columns less 1 and rows less 1 in 5 bits each. */
 #define SPL_SOFT_TILE 8 /* samples of a row of a tile */
 #define SPL_SOFT_TILE_ROWS 4
 #define SPL_SOFT_SAMPLES 4 /* of a column of a tile that an invocation blends */
@@ -480,10 +485,10 @@ struct spl_frame_params {
 #define SPL_SOFT_SLACK 1e-6f
 #define SPL_SOFT_ROUNDS 60000u /* of an invocation at most: see SPL_WINDOW */
 
-/* What of soft spheres is found on a sample for layers but color and coverage (soft_of.comp; constant 0). Of models with
- * a density optical depth is counted in units of 2^-SPL_SOFT_DEPTH_BITS. */
-#define SPL_SOFT_FOUND_WORDS 4  /* a sample: view depth (SPL_NOTHING: no sphere), id, normal, what as (SPL_DRAWN_*); while
-                                 * there is no sphere, the last is what was hidden so far, inverted */
+/* What of soft spheres is found on a sample for layers but color and coverage (soft_of.comp; constant 0). Of models
+ * with a density optical depth is counted in units of 2^-SPL_SOFT_DEPTH_BITS. */
+#define SPL_SOFT_FOUND_WORDS 4  /* a sample: view depth (SPL_NOTHING: no sphere), id, normal, what as (SPL_DRAWN_*);
+                                 * without a sphere the last is what was hidden so far, inverted */
 #define SPL_SOFT_DETAIL_WORDS 2 /* of each item, where it is looked for: normal, what as */
 #define SPL_SOFT_FIND_FIRST 0
 #define SPL_SOFT_FIND_MEDIAN 1  /* of model express; the next, of SPL_SOFT_BASE and so on */
@@ -499,7 +504,7 @@ struct spl_soft_step {
     SPL_U32 count;         /* items to sort or to list; tiles to blend */
     SPL_U32 block, blocks; /* items an invocation walks; invocations */
     SPL_U32 digits;        /* counters of an invocation: values of a digit, or tiles */
-    SPL_U32 low, shift;    /* a digit is (key - low) >> shift & (digits - 1); soft_of: optical depth that is looked for */
+    SPL_U32 low, shift;    /* a digit is (key - low) >> shift & (digits - 1); soft_of: optical depth to find */
     SPL_U32 columns;       /* tiles of a row */
     SPL_U32 rects;         /* word of the items' rectangles */
     SPL_U32 progress;      /* word of the counters where blocks keep how far they came */
@@ -508,7 +513,8 @@ struct spl_soft_step {
     SPL_F32 reach;         /* no sphere of the lists has a larger radius */
     SPL_F32 thin;          /* optical depth of the thinnest over their share of the opacity and `depth`; models.h */
     SPL_F32 until;         /* view depth up to which these lists have all that begins before it */
-    SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - (d / r)^2, of 65536 */
+    SPL_F32 fall_0, fall_1, fall_2, fall_3, fall_4; /* of a sphere: sum of fall_i m^(i + 1), m = 1 - d^2 / r^2, of
+                                                       65536 */
     SPL_U32 low_slot;      /* of a window: from (low, low_slot) */
     SPL_U32 ends;          /* of layer: this is its last window */
     SPL_U32 high, high_slot; /* to (high, high_slot), exclusive; a slot is what an invocation gathers, by rising ids */

@@ -1,7 +1,8 @@
-/* Marks of splats, or with SPL_CELL_LANES of the cells of panels: which of them are soft, and which are drawn at all, by
- * the tests that the host made of a chunk (src/render/marks.c), which begin where its `texture` says. An invocation makes a word of four, so
- * that none is written twice: SPL_LANES make those of a run of splats, SPL_CELL_LANES two words each of a panel. Whole
- * numbers, and floats by rounded products and sums alone, so that every driver marks the same. */
+/* Marks of splats, or with SPL_CELL_LANES of the cells of panels: which of them are soft, and which are drawn at all,
+ * by the tests that the host made of a chunk (src/render/marks.c), which begin where its `texture` says. An invocation
+ * makes a word of four, so that none is written twice: SPL_LANES make those of a run of splats, SPL_CELL_LANES two
+ * words each of a panel. Whole numbers, and floats by rounded products and sums alone, so that every driver marks the
+ * same. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/splat.glsl"

@@ -1,4 +1,5 @@
-/* Lists of tiles from entries that are sorted by tile: their items, one after the other, and where each tile's begin. */
+/* Lists of tiles from entries that are sorted by tile: their items, one after the other, and where each tile's
+ * begin. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/soft_step.glsl"

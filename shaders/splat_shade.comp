@@ -8,8 +8,8 @@
  *   primitive  the same of SPL_DRAWN_*
  * With SPL_TEXTURED, for chunks with atoms: group colour, whose fragments have the colour of the splat's texture
  * there; with SPL_SUMMED too, interpolated in the sums that splat_sum.comp made.
- * With SPL_TRIMS, for chunks that a map trims: what was trimmed is what would have been nearer than the depth pass says;
- * beside the surface itself nothing is. */
+ * With SPL_TRIMS, for chunks that a map trims: what was trimmed is what would have been nearer than the depth pass
+ * says; beside the surface itself nothing is. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/sums.glsl"

@@ -44,7 +44,8 @@ static int print_pick(struct spl_renderer *renderer, const struct spl_dataset *d
                       struct spl_error *err)
 {
     struct spl_pick pick;
-    int rc = spl_renderer_pick(renderer, dataset, view, view->camera.width / 2.0, view->camera.height / 2.0, &pick, err);
+    int rc =
+        spl_renderer_pick(renderer, dataset, view, view->camera.width / 2.0, view->camera.height / 2.0, &pick, err);
     if (rc)
         return rc;
     if (pick.hit)
@@ -95,7 +96,7 @@ int main(int argc, char **argv)
         goto done;
     printf("drawn by %s\n", spl_renderer_get_device(renderer)->name);
 
-    /* What to show. The default view is a camera like any other: spl_camera_look_at() and its neighbours make others. */
+    /* What to show. The default view is a camera like any other: spl_camera_look_at() and its kin make others. */
     struct spl_view view;
     spl_view_init(&view);
     if ((rc = spl_dataset_get_default_camera(dataset, 640, 360, &view.camera, &err)))

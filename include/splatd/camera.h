@@ -25,12 +25,12 @@ SPL_BEGIN_DECLARATIONS
 enum spl_projection {
     SPL_PERSPECTIVE,
     SPL_ORTHOGRAPHIC,
-    SPL_EQUIRECTANGULAR, /* all directions: 2 pi fx = width, pi fy = height, where nothing is cut off; below 0: from the right,
-                            from below */
+    SPL_EQUIRECTANGULAR, /* all directions: 2 pi fx = width, pi fy = height, where nothing is cut off; below 0: from the
+                            right, from below */
     SPL_CUBE,            /* right, left, up, down, front and back, in this order; each height x height pixels */
     SPL_FISHEYE,         /* equidistant, or as `lens` bends it */
-    SPL_RAYS,            /* a list of directions, of spl_view.rays: an image of one column; fx = fy, pixels a radian of what
-                            they are looked up in */
+    SPL_RAYS,            /* a list of directions, of spl_view.rays: an image of one column; fx = fy, pixels a radian of
+                            what they are looked up in */
     SPL_PROJECTION_COUNT
 };
 SPL_API const char *spl_projection_name(enum spl_projection projection);
@@ -53,16 +53,16 @@ struct spl_camera {
     double rotation[9];      /* R, world -> camera, row-major, orthonormal, determinant +1 */
     double fx, fy, cx, cy;   /* pixels; of orthographic ones fx, fy pixels a unit */
     uint32_t width, height;  /* pixels */
-    double near, far;        /* view depths that are drawn, 0 < near < far (near 0 in orthographic views); far may be INFINITY.
-                                Of cameras that see around: along the axis of the cube's face that shows it */
+    double near, far;        /* view depths that are drawn, 0 < near < far (near 0 in orthographic views); far may be
+                                INFINITY. Of cameras that see around: along the axis of the cube's face that shows it */
     enum spl_projection projection; /* 0 = of a pinhole */
     struct spl_distortion lens;     /* RADIAL of perspective cameras, FISHEYE of fisheyes; zero = none */
 };
 
 /* Full pinhole from a vertical field of view: fx = fy, principal point in the middle.
- * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height, projection and lens only:
- * near and far are those of spl_view_init(), 0.01 and INFINITY, or of spl_dataset_get_default_camera(), which fit the
- * dataset. */
+ * fov_degrees in (0, 179]; fields at fault are named "fov", "width", "height". Fills fx fy cx cy width height,
+ * projection and lens only: near and far are those of spl_view_init(), 0.01 and INFINITY, or of
+ * spl_dataset_get_default_camera(), which fit the dataset. */
 SPL_API int spl_camera_set_fov(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                                struct spl_error *err);
 
@@ -76,8 +76,8 @@ SPL_API int spl_camera_set_orthographic(struct spl_camera *camera, double view_h
 SPL_API int spl_camera_set_around(struct spl_camera *camera, enum spl_projection projection, uint32_t width,
                                   uint32_t height, struct spl_error *err);
 
-/* An equidistant fisheye whose circle, of fov_degrees in (0, 360] across, is as high as the image; nothing is outside of
- * it. Fields as of spl_camera_set_fov(). The same are filled. */
+/* An equidistant fisheye whose circle, of fov_degrees in (0, 360] across, is as high as the image; nothing is outside
+ * of it. Fields as of spl_camera_set_fov(). The same are filled. */
 SPL_API int spl_camera_set_fisheye(struct spl_camera *camera, double fov_degrees, uint32_t width, uint32_t height,
                                    struct spl_error *err);
 
@@ -90,8 +90,8 @@ SPL_API int spl_rays_create(const double *directions, size_t count, struct spl_r
 SPL_API void spl_rays_destroy(struct spl_rays *rays);
 
 /* RAYS of the list: as many rows as it has directions. `resolution`, pixels a radian, is how finely what they hit is
- * sampled; 0 = as densely as most of them lie, 256 to 1024. Field "resolution". The same are filled; the list itself goes
- * into spl_view.rays. */
+ * sampled; 0 = as densely as most of them lie, 256 to 1024. Field "resolution". The same are filled; the list itself
+ * goes into spl_view.rays. */
 SPL_API int spl_camera_set_rays(struct spl_camera *camera, const struct spl_rays *rays, double resolution,
                                 struct spl_error *err);
 
@@ -120,8 +120,8 @@ SPL_API int spl_camera_set_matrix(struct spl_camera *camera, const double camera
 SPL_API int spl_camera_set_colmap(struct spl_camera *camera, const double q[4], const double t[3],
                                   struct spl_error *err);
 
-/* Where the pixels of an orthographic view straight down lie, all but their epsg. SPL_E_INPUT, field "format", of a view
- * that is none. */
+/* Where the pixels of an orthographic view straight down lie, all but their epsg. SPL_E_INPUT, field "format", of a
+ * view that is none. */
 struct spl_ground;
 SPL_API int spl_camera_get_ground(const struct spl_camera *camera, struct spl_ground *ground, struct spl_error *err);
 

@@ -15,15 +15,17 @@ enum { SPL_COLLECT_TILES_MAX = 10000 };
 
 struct spl_collect_options {
     size_t size;               /* spl_collect_options_init() */
-    const char *const *inputs; /* datasets; folders, for all NAME.spld in them; @NAME, a list with a path a line */
+    const char *const *inputs; /* datasets; folders, for all in them but collections; @NAME, a list of paths */
     size_t input_count;
     const char *output;      /* NAME.spld, in the folder of the datasets */
     const char *title;       /* as of struct spl_pack_options */
     const char *description; /* likewise */
     unsigned threads;        /* 0 = all cores */
     void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
-    void *progress_context;
+    void *progress_context;  /* of both */
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
+    /* Each collection in a folder, which is no tile: the others are collected without it. May be NULL. */
+    void (*left_out)(void *context, const struct spl_error *why);
 };
 
 static inline void spl_collect_options_init(struct spl_collect_options *options)

@@ -22,8 +22,8 @@ enum {
 };
 
 struct spl_shade_params {
-    uint32_t kinds;  /* SPL_SHADE_*; 0 = EDL where colours show no shape: of a dataset that has none of its own, or classes or
-                        one colour in their place; else none */
+    uint32_t kinds;  /* SPL_SHADE_*; 0 = EDL where colours show no shape: of a dataset that has none of its own, or
+                        classes or one colour in their place; else none */
     double sun[2];   /* of SUN: azimuth, degrees clockwise from +y (north), and elevation, -90 to 90 */
     double strength; /* of EDL: the share of its light that the deepest gap loses */
     uint32_t radius; /* of EDL: pixels that are looked away, 1 to 5 */
@@ -42,7 +42,7 @@ SPL_API int spl_shade_check(const struct spl_shade_params *shade, struct spl_err
 /* What colours show. */
 enum spl_color_by {
     SPL_COLOR_BY_RGB,       /* what the dataset has: textures, maps, its splats' own */
-    SPL_COLOR_BY_ATTRIBUTE, /* an optional attribute by name: of "class" a colour each unless there is a ramp or range */
+    SPL_COLOR_BY_ATTRIBUTE, /* an optional attribute by name: of "class" a colour each without ramp and range */
     SPL_COLOR_BY_HEIGHT,    /* z, world */
     SPL_COLOR_BY_PLANE,     /* distance to a plane, positive on the side of its normal */
     SPL_COLOR_BY_NORMAL,    /* world axes: x is red, y green, z blue */
@@ -64,7 +64,7 @@ struct spl_color_params {
     double plane[6];               /* a point of it and its normal, world */
     uint8_t flat[3];
     enum spl_ramp ramp;            /* AUTO: grey of intensity, terrain of height, else viridis */
-    bool has_range;                /* false: quantiles 0.02 and 0.98 where the dataset says them, else all there may be */
+    bool has_range;                /* false: quantiles 0.02 and 0.98 where the dataset says them, else all */
     double range[2];               /* rising */
     bool shares[2];                /* an end is a quantile, 0 to 1 */
 };

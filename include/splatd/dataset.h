@@ -50,7 +50,7 @@ struct spl_stream_info {
 enum { SPL_VALUES_QUANTILES = 64, SPL_VALUES_KINDS_MAX = 64 };
 struct spl_stream_values {
     uint64_t count;                              /* that have one; 0 = the file does not say */
-    double quantiles[SPL_VALUES_QUANTILES + 1];  /* the i-th: a share i / SPL_VALUES_QUANTILES have less; least … most */
+    double quantiles[SPL_VALUES_QUANTILES + 1];  /* the i-th: a share i / SPL_VALUES_QUANTILES have less */
     double p99;                                  /* the 99th percentile */
     uint32_t kind_count;                         /* different values, where there are so few, each with how many have
                                                     it, rising; 0 = there are more */
@@ -66,7 +66,7 @@ struct spl_saved_view {
     char name[SPL_VIEW_NAME_BYTES];
     double eye[3], target[3], up[3]; /* world */
     double fov; /* degrees, vertical; across where an image is narrower than high */
-    char settings[SPL_VIEW_SETTINGS_BYTES]; /* what of the dataset it shows and how, as a JSON object; "" = all, as ever */
+    char settings[SPL_VIEW_SETTINGS_BYTES]; /* what of the dataset it shows and how, as JSON; "" = all, as ever */
     double view_height; /* of an orthographic view, in the dataset's unit; 0 = a pinhole's */
 };
 
@@ -106,8 +106,8 @@ struct spl_dataset_info {
     const struct spl_stream_values *stream_values; /* of each stream, borrowed until close; NULL = the file says nothing
                                                       of any */
     const struct spl_stream_values *heights; /* z of the leaf splats, likewise; NULL = the file does not say */
-    double default_fit[2]; /* degrees across and upright that the default view shows in an image of any shape; 0 = it has
-                              default_fov in all of them */
+    double default_fit[2]; /* degrees across and upright that the default view shows in an image of any shape; 0 = it
+                              has default_fov in all of them */
     const char *title, *description;    // may be NULL; what its packer called it; borrowed until close
     uint32_t view_count;                /* at most SPL_SAVED_VIEWS_MAX */
     const struct spl_saved_view *views; /* by name; borrowed until close */
@@ -135,10 +135,10 @@ static inline const struct spl_stream_values *spl_dataset_info_get_values(const 
  * A path that begins with https://, http:// or s3:// is asked of that server (api/remote.md), with the keys of the
  * process's environment: do not pass on paths of strangers. Pages are then held against their checksums when they are
  * read, whatever `verify` says.
- * Deadlines of one: a read asks again until nothing has come for 30 s, and takes 10 s more for each MiB at most, looking
- * up names of hosts included; opening takes as many reads as the dataset's tables need. A `cancel` ends each within a
- * second or two. What reads while it is open blocks as long: spl_dataset_find_value() the thread that calls it, pages
- * the renderer's own threads, where frames have their deadlines.
+ * Deadlines of one: a read asks again until nothing has come for 30 s, and takes 10 s more for each MiB at most,
+ * looking up names of hosts included; opening takes as many reads as the dataset's tables need. A `cancel` ends each
+ * within a second or two. What reads while it is open blocks as long: spl_dataset_find_value() the thread that calls
+ * it, pages the renderer's own threads, where frames have their deadlines.
  * Errors of one: SPL_E_USAGE (no URL that can be one, half of a key), SPL_E_UNSUPPORTED (there is no libcurl),
  * SPL_E_NOT_FOUND (404, 410), SPL_E_INPUT (no byte ranges, an empty file), SPL_E_TIMEOUT (given up; another attempt may
  * do), SPL_E_IO (anything else that its server refuses), SPL_E_CANCELLED, and SPL_E_CORRUPT, also where the file has
@@ -192,8 +192,8 @@ SPL_API void spl_dataset_close(struct spl_dataset *dataset);
 SPL_API const struct spl_dataset_info *spl_dataset_get_info(const struct spl_dataset *dataset);
 
 /* The default view as a camera of the given size: the narrower the image, the wider its vertical field of view, so that
- * what the view shows is not cut. Its near is splat_radius; an orthographic camera that is made of it may begin at the eye,
- * near 0. */
+ * what the view shows is not cut. Its near is splat_radius; an orthographic camera that is made of it may begin at the
+ * eye, near 0. */
 SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, uint32_t width, uint32_t height,
                                            struct spl_camera *camera, struct spl_error *err);
 
@@ -203,8 +203,8 @@ SPL_API int spl_dataset_get_default_camera(const struct spl_dataset *dataset, ui
  * read. Any thread; blocks on disk, or on its server. */
 SPL_API bool spl_dataset_find_value(const struct spl_dataset *dataset, int stream, uint64_t id, double *value);
 
-/* The file of the tile of a collection that has splat `id`; NULL where it is the collection's own, or there is none such.
- * Borrowed until close. Any thread. */
+/* The file of the tile of a collection that has splat `id`; NULL where it is the collection's own, or there is none
+ * such. Borrowed until close. Any thread. */
 SPL_API const char *spl_dataset_find_tile(const struct spl_dataset *dataset, uint64_t id);
 
 SPL_API const char *spl_attribute_name(enum spl_attribute attribute); /* "unknown" for none */

@@ -157,8 +157,8 @@ struct spl_pack_options {
     const char *export_primitives;
     const char *title;       /* at most 200 bytes of UTF-8 in a line; NULL = none */
     const char *description; /* at most 4000, in lines; NULL = none */
-    /* Instead of the one that is found; its name does not matter. NULL = found. In this and the next, up 0, 0, 0 is what
-     * is up in the dataset, and fov 0 is 60. */
+    /* Instead of the one that is found; its name does not matter. NULL = found. In this and the next, up 0, 0, 0 is
+     * what is up in the dataset, and fov 0 is 60. */
     const struct spl_saved_view *default_view;
     const struct spl_saved_view *views; /* by their names, of any order */
     size_t view_count;                  /* at most SPL_SAVED_VIEWS_MAX */
@@ -205,8 +205,9 @@ struct spl_pack_report {
  * rename: a crash leaves the old file or none). With photographs or maps the dataset is first written beside `output`,
  * removed as soon as it is open again, and then written with their colours, with maps once more. Blocks; uses
  * options->threads threads and about 30 MB, 80 bytes a point, 1 to 10 for each field that is kept, and 100 more for
- * each point on a wire, a pole or a cable; with memory_bytes it aims to stay below that, has one thread more and says at
- * its end (warn) where it did not. Photographs take photos->memory_bytes beside them. `report` may be NULL. Any thread. */
+ * each point on a wire, a pole or a cable; with memory_bytes it aims to stay below that, has one thread more and says
+ * at its end (warn) where it did not. Photographs take photos->memory_bytes beside them. `report` may be NULL. Any
+ * thread. */
 SPL_API int spl_pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err);
 
 SPL_END_DECLARATIONS

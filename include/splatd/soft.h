@@ -39,7 +39,7 @@ struct spl_soft_params {
     enum spl_soft_model model;
     double opacity; /* at the centre of a sphere, 0 (not drawn at all) to 1; each model's lambda follows from it */
     double blend;   /* how far beyond the ends of a term spheres are still partly solid, in its measure; eq. 22, where
-                       at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border. Classes have none */
+                       at the border they are opaque in their centres, 1 - d / r; 0 = a sharp border, as of classes */
     enum spl_soft_of of; /* depth of a sphere is that of its centre; the rest is its splat's */
     double cover;        /* share, 0 (nothing of it is seen) to 1, by which what the spheres of a sample hold back
                             together, and their colour, is scaled: the most that they ever hide of what is solid */

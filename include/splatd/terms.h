@@ -19,11 +19,11 @@ enum spl_term_measure {
     SPL_TERM_QUANTILE,   /* the same as the share of the dataset's splats that have less, 0 to 1 */
     SPL_TERM_AXIS,       /* distance to the line through shape[0..2] along shape[3..5] */
     SPL_TERM_PLANE,      /* distance to the plane through shape[0..2], positive on the side of shape[3..5] */
-    SPL_TERM_BOX,        /* distance to the box from shape[0..2] to shape[3..5], negative inside; turned around its middle
-                            by shape[6..8] degrees: around its own z, then its own y, then its own x */
+    SPL_TERM_BOX,        /* distance to the box from shape[0..2] to shape[3..5], negative inside; turned around its
+                            middle by shape[6..8] degrees: around its own z, then its own y, then its own x */
     SPL_TERM_COORDINATE, /* x, y or z: shape[3..5] is 1 in that place and 0 in the others */
-    SPL_TERM_POLYGON,    /* distance to the prism over its corners in plan, between heights shape[0] and shape[1] (infinite
-                            ones are none); negative inside */
+    SPL_TERM_POLYGON,    /* distance to the prism over its corners in plan, between heights shape[0] and shape[1]
+                            (infinite ones are none); negative inside */
     SPL_TERM_MEASURES
 };
 
@@ -69,9 +69,9 @@ struct spl_terms {
  *   z<2.5   z:1.1..1.2   polygon:x,y,x,y,x,y   polygon:…@0..2.5   !TERM (what is not in it)
  * Ends of ranges are included; 3-5 and 3..5 are the same, and the second reads better with signs: -5..-2. A box or a
  * polygon alone is its inside. A box's turn is in degrees, counter-clockwise seen from above; three numbers are of
- * SPL_TERM_BOX. At most SPL_TERMS_TEXT_MAX bytes. `field`: "soft", or "clip", whose text is a condition, or several joined
- * by " and ", each of terms joined by " or ". SPL_E_INPUT (of the field) says what is wrong with which term, at which
- * character; SPL_E_LIMIT above SPL_TERMS_MAX. On failure `out` is as it was. */
+ * SPL_TERM_BOX. At most SPL_TERMS_TEXT_MAX bytes. `field`: "soft", or "clip", whose text is a condition, or several
+ * joined by " and ", each of terms joined by " or ". SPL_E_INPUT (of the field) says what is wrong with which term, at
+ * which character; SPL_E_LIMIT above SPL_TERMS_MAX. On failure `out` is as it was. */
 SPL_API int spl_terms_parse(const char *text, const char *field, struct spl_terms *out, struct spl_error *err);
 
 /* The same of classes alone, as "2,6", "3-5" or "!7": a condition; errors are of field "class". */

@@ -11,11 +11,11 @@
 #include "common/piece.glsl"
 
 struct capsule {
-    bool upright;      /* places are (row, column), else (column, row), so that the axis goes along x more than along y */
+    bool upright;      /* places are (row, column), else (column, row), so that it goes along x more than along y */
     vec2 a, along;     /* samples: where it begins, the way to its end */
     float inverse;     /* one over the square of that way's length; 0 of none */
     float slope;       /* samples across for a sample along, within 1 */
-    float w, fall;     /* inverse depth where it begins, and how much more it is where it ends; of parallel rays depth */
+    float w, fall;     /* inverse depth where it begins, and what more it is where it ends; of parallel rays depth */
     float half_width;  /* samples times depth, or of parallel rays samples */
     float thick;       /* half its width, metres */
     float middle;      /* as of the piece, along the picture */

@@ -10,8 +10,8 @@
 
 layout(constant_id = 2) const uint CLIPPED = 0;
 
-/* Where a disc ends; compare with the offset of a sample from its centre, in radii. And what shapes that cut it ask for:
- * its centre, radius, and what is known of it. */
+/* Where a disc ends; compare with the offset of a sample from its centre, in radii. And what shapes that cut it ask
+ * for: its centre, radius, and what is known of it. */
 struct clip_line {
     vec3 direction; /* view space */
     float end;
@@ -61,7 +61,8 @@ bool is_drawn(spl_draw_chunk chunk, uint index)
  * sample, is asked of at its rim. */
 float cut(clip_line line, vec3 offset)
 {
-    precise float within = line.radius / sqrt(max(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z, 1.0));
+    precise float within =
+        line.radius / sqrt(max(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z, 1.0));
     precise vec3 p = line.center + within * offset;
     return is_kept(p, line.known, line.verdict) ? 0.0 : 2.0;
 }

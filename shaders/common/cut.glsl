@@ -1,8 +1,8 @@
 /* What shapes leave of discs, panels, meshes and lines, sample by sample, so that they end at a plane and not by their
  * radius beyond it. For chunks that a shape crosses, in a variant of its own (constant 5: SPL_CUT_*), so that others do
  * not pay for it. One plane, axis or box is among the parameters of the frame: software drivers read texels for each
- * sample, all of them together twice as long as a sample takes; and the rounds of the loop over shapes count among those
- * after which the loop over samples ends. */
+ * sample, all of them together twice as long as a sample takes; and the rounds of the loop over shapes count among
+ * those after which the loop over samples ends. */
 #ifndef SPL_CUT_GLSL
 #define SPL_CUT_GLSL
 
@@ -58,7 +58,8 @@ bool is_kept(vec3 p, uint known, uint verdict)
         return is_within_one(p) != outside || (known << 1u >> bit & (bit != 0u ? 1u : 0u)) != 0u;
     }
     bool open = verdict == CUT_OPEN;
-    uint at = frame.fill_from, count = open ? test_word(at) : 0u; /* no branch: a loop without rounds is what drivers leave out */
+    /* no branch: a loop without rounds is what drivers leave out */
+    uint at = frame.fill_from, count = open ? test_word(at) : 0u;
     term_fold f = begin_fold();
     for (uint t = 0u; t < count; t++)
         fold_shape(f, at + 1u + 2u * t, p, known);
@@ -67,8 +68,8 @@ bool is_kept(vec3 p, uint known, uint verdict)
 }
 
 /* Of several shapes, or a polygon's many sides: what is drawn of a splat that lies within `radius` of p. Where none of
- * their ends is so near, all of its samples are as its centre: distances change by no more than one goes, and what floats
- * may be off is left to the samples. */
+ * their ends is so near, all of its samples are as its centre: distances change by no more than one goes, and what
+ * floats may be off is left to the samples. */
 uint judge_cut(vec3 p, float radius, uint known)
 {
     if (CUT == 0u || CUT >= SPL_CUT_ONE)

@@ -4,8 +4,9 @@
  * plane, whose depth is linear along the image then, is there. A splat that is smaller
  * than a sample still covers the sample that its centre falls on: within `low_pass` samples of the centre it counts as
  * covered. Its depth there is the plane's, clamped to what the disc spans, r sqrt(1 - n.z^2) around its centre, or to
- * SPL_LOW_PASS_REACH if that is more. Along parallel rays a whole wall is seen edge-on at once, and would be dots: there a
- * disc is as wide as SPL_THIN says. Written without comparisons: software drivers pay more for a select than for a product. */
+ * SPL_LOW_PASS_REACH if that is more. Along parallel rays a whole wall is seen edge-on at once, and would be dots:
+ * there a disc is as wide as SPL_THIN says. Written without comparisons: software drivers pay more for a select than
+ * for a product. */
 #ifndef SPL_DISC_GLSL
 #define SPL_DISC_GLSL
 

@@ -15,9 +15,9 @@ void load_frame()
     frame = frame_in_memory;
 }
 
-/* The rays of the image: through the eye, or parallel to the viewing axis, where frame.fx and fy are samples a unit. Known
- * before a kernel is built, so that neither pays for the other. All that divides by depth on its way to the image goes
- * through ray_scale(). */
+/* The rays of the image: through the eye, or parallel to the viewing axis, where frame.fx and fy are samples a unit.
+ * Known before a kernel is built, so that neither pays for the other. All that divides by depth on its way to the image
+ * goes through ray_scale(). */
 layout(constant_id = 6) const uint PARALLEL = 0;
 
 /* What offsets from the axis at view depth z are divided by. */
@@ -36,7 +36,8 @@ float depth_slack(float z, float share)
 /* Where a point of view space falls on the image. */
 vec2 image_place(vec3 p)
 {
-    precise vec2 place = vec2(frame.fx * (p.x / ray_scale(p.z)) + frame.cx, frame.fy * (p.y / ray_scale(p.z)) + frame.cy);
+    precise vec2 place =
+        vec2(frame.fx * (p.x / ray_scale(p.z)) + frame.cx, frame.fy * (p.y / ray_scale(p.z)) + frame.cy);
     return place;
 }
 

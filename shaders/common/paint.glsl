@@ -19,7 +19,8 @@ uint palette_word(uint at)
 
 uint palette_place(float value)
 {
-    precise float place = value * uintBitsToFloat(palette_word(SPL_PALETTE_SCALE)) + uintBitsToFloat(palette_word(SPL_PALETTE_OFFSET));
+    precise float place =
+        value * uintBitsToFloat(palette_word(SPL_PALETTE_SCALE)) + uintBitsToFloat(palette_word(SPL_PALETTE_OFFSET));
     return uint(clamp(place, 0.0, float(SPL_PALETTE_COLORS) - 0.5));
 }
 

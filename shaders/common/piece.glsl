@@ -1,4 +1,5 @@
-/* A piece of a line: the straight way from a vertex of a chunk of lines to the next, between the planes near and far. */
+/* A piece of a line: the straight way from a vertex of a chunk of lines to the next, between the planes near and
+ * far. */
 #ifndef SPL_PIECE_GLSL
 #define SPL_PIECE_GLSL
 

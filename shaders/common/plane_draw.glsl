@@ -1,7 +1,8 @@
 /* What is drawn of a panel on the sample grid: a piece of a plane, which is the panel itself (panel_draw.glsl) or a
  * triangle of one with relief (mesh_draw.glsl). A sample's ray meets the plane at z = n.o / n.d (d.z = 1), exact under
- * perspective, or, parallel to the axis through (x, y), at z = (n.o - n.x x - n.y y) / n.z, in a cell whose bit says whether it is there. A hair of SPL_PANEL_HAIR cells beyond the piece's edge is
- * its own too, so that no sample falls between pieces that are rounded each on their own.
+ * perspective, or, parallel to the axis through (x, y), at z = (n.o - n.x x - n.y y) / n.z, in a cell whose bit says
+ * whether it is there. A hair of SPL_PANEL_HAIR cells beyond the piece's edge is its own too, so that no sample falls
+ * between pieces that are rounded each on their own.
  *
  * Of what is thinner than a sample, as a plane seen along its edge or far away, each cell that is there also covers the
  * sample that its middle falls on, as a disc would: rays meet too few of them. The same of pieces that reach the near
@@ -167,7 +168,8 @@ void draw_sample(panel_draw d, ivec2 at)
     precise float tilt = plane_tilt(d, uv);
     precise float z = plane_depth(d, uv, tilt);
     precise vec2 place = vec2(d.u.x * uv.x + d.u.y * uv.y + d.u.z, d.v.x * uv.x + d.v.y * uv.y + d.v.z) * z - d.eye;
-    precise vec2 beside = vec2(d.u.x * uv.x + d.u.y * uv.y + d.u.z * z, d.v.x * uv.x + d.v.y * uv.y + d.v.z * z) - d.eye;
+    precise vec2 beside =
+        vec2(d.u.x * uv.x + d.u.y * uv.y + d.u.z * z, d.v.x * uv.x + d.v.y * uv.y + d.v.z * z) - d.eye;
     place = PARALLEL != 0u ? beside : place;
     float within = clamp(z, d.least, d.most);
     uvec2 cell = uvec2(clamp(place, vec2(0.0), vec2(float(SPL_PANEL_SIDE) - 0.5)));
@@ -203,7 +205,8 @@ void draw_cell(splat_run run, panel_draw d, uvec2 cell, vec3 p)
     precise vec2 uv = floor(place) + 0.5 - vec2(frame.cx, frame.cy);
     precise float through = d.offset / (d.normal.x * uv.x + d.normal.y * uv.y + d.normal.z);
     float there = PARALLEL != 0u ? plane_depth(d, uv, plane_tilt(d, uv)) : through;
-    precise float behind = p.z * (1.0 + SPL_CELL_REACH * frame.inverse_fx), beside = p.z + SPL_CELL_REACH * frame.inverse_fx;
+    precise float behind = p.z * (1.0 + SPL_CELL_REACH * frame.inverse_fx),
+                  beside = p.z + SPL_CELL_REACH * frame.inverse_fx;
     float farthest = max(d.most, PARALLEL != 0u ? beside : behind);
     float z = clamp(there > 0.0 ? there : p.z, d.least, farthest);
     precise float tilt = z / max(abs(d.offset), 1e-30);

@@ -20,7 +20,8 @@ float test_float(uint at)
 /* What a row of the shape makes of p. */
 float shape_row(uint at, vec3 p)
 {
-    precise float q = test_float(at) * p.x + test_float(at + 1u) * p.y + test_float(at + 2u) * p.z + test_float(at + 3u);
+    precise float q =
+        test_float(at) * p.x + test_float(at + 1u) * p.y + test_float(at + 2u) * p.z + test_float(at + 3u);
     return q;
 }
 
@@ -80,7 +81,8 @@ bool is_within(uint at, uint flags, float distance)
     return above && below;
 }
 
-/* Conditions, all of which hold, test by test; a condition holds where any of its lists, or what is outside one, does. */
+/* Conditions, all of which hold, test by test; a condition holds where any of its lists, or what is outside one,
+ * does. */
 struct term_fold {
     bool all, any;        /* conditions before; of this one, lists before */
     bool within, outside; /* of this list */

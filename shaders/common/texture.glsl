@@ -73,7 +73,8 @@ void load_atom(inout code_place place, out uint atom, out float weight)
     uint codes = place.at + SPL_TEXTURE_HEADER_BITS + place.splats, at = codes + before * width;
     uint code = funnel(texture_word(at >> 5), texture_word((at >> 5) + 1u), at & 31u);
     float step = exp2((float(bitfieldExtract(header, SPL_TEXTURE_STEP, 6)) - 56.0) / 4.0);
-    float gap = 0.25 * float(bitfieldExtract(header, SPL_TEXTURE_GAP, 2) * (bitfieldExtract(header, SPL_TEXTURE_GAP, 2) + 1u));
+    float gap =
+        0.25 * float(bitfieldExtract(header, SPL_TEXTURE_GAP, 2) * (bitfieldExtract(header, SPL_TEXTURE_GAP, 2) + 1u));
     place = code_place(codes + splats * width, before, splats, place.has && (own & 1u) != 0u);
     atom = place.has ? code & ((1u << index_bits) - 1u) : 0u;
     float signed_code = float(bitfieldExtract(int(code), int(index_bits), int(weight_bits))) + 0.5;
@@ -85,7 +86,8 @@ splat_texture load_texture(spl_draw_chunk chunk, splat s, uvec3 color)
 {
     splat_texture x;
     float diameter = 2.0 * s.radius / chunk.texture_scale * frame.fx / ray_scale(s.position.z);
-    uint size = frame.texture_size, side = clamp(2u << findMSB(uint(clamp(diameter, 1.0, 64.0))), SPL_TEXTURE_SIDE_MIN, size);
+    uint size = frame.texture_size,
+         side = clamp(2u << findMSB(uint(clamp(diameter, 1.0, 64.0))), SPL_TEXTURE_SIDE_MIN, size);
     uint level = 1u + (4u * (size * size - side * side)) / 3u;
     uint atom_size = 1u + (4u * size * size - SPL_TEXTURE_SIDE_MIN * SPL_TEXTURE_SIDE_MIN) / 3u;
     x.side = side;

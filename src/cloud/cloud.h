@@ -90,6 +90,7 @@ struct spl_cloud_info {
     uint64_t points_skipped;              /* non-finite, or PTX "no return" cells */
     uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
     uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
+    char guessed[192]; /* text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "" */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
     const struct spl_cloud_image *images; /* borrowed until destroy */

@@ -5,6 +5,7 @@
 #include "cloud/text.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/memory.h"
@@ -190,6 +191,10 @@ static int recognise(struct spl_cloud *cloud, const char *line, size_t length, s
     if (code < 0)
         return code;
     spl_layout_recognise(&text->layout, &sample);
+    char *guessed = cloud->info.guessed;
+    for (size_t i = 0, used = 0; i < fields && used < sizeof cloud->info.guessed; i++)
+        used += (size_t)snprintf(guessed + used, sizeof cloud->info.guessed - used, "%s%s", i ? "," : "",
+                                 spl_column_name(text->layout.column[i]));
     return SPL_OK;
 }
 

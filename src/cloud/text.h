@@ -33,6 +33,7 @@ struct spl_text_sample {
     bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
     bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
     bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */
+    bool zero[SPL_TEXT_FIELDS];     /* likewise: some vector is zero */
 };
 
 /* False when the line has other than layout->fields values. */

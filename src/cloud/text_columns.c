@@ -189,16 +189,19 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
     for (unsigned i = 0; i + 2 < layout->fields; i++) {
         double norm = sqrt(v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2]);
         sample->crooked[i] |= !(norm == 0 || fabs(norm - 1) < 0.02);
+        sample->zero[i] |= norm == 0;
     }
     sample->lines++;
     return whole;
 }
 
-static bool is_normal(const struct spl_text_sample *s, unsigned i)
+/* Whole numbers of 0 and 1 may be dark colours; where each line ends in three of length 1, as of a floor, they are
+ * normals. */
+static bool is_normal(const struct spl_text_sample *s, unsigned i, bool last)
 {
     bool fraction = s->fraction[i] || s->fraction[i + 1] || s->fraction[i + 2];
     bool negative = s->bright[i] || s->bright[i + 1] || s->bright[i + 2];
-    return !s->crooked[i] && (fraction || negative);
+    return !s->crooked[i] && (fraction || negative || (last && !s->zero[i]));
 }
 
 static bool is_color(const struct spl_text_sample *s, unsigned i)
@@ -228,7 +231,7 @@ void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sampl
     memset(layout->column, SPL_COLUMN_SKIP, sizeof layout->column);
     set3(layout, 0, SPL_COLUMN_X);
     for (unsigned i = 3; i + 2 < layout->fields; i++)
-        if (is_normal(sample, i)) {
+        if (is_normal(sample, i, i + 3 == layout->fields)) {
             set3(layout, i, SPL_COLUMN_NX);
             break;
         }

@@ -9,6 +9,7 @@
 #include <splatd/collect.h>
 
 #include "cmd/output.h"
+#include "cmd/pack_report.h"
 #include "cmd/progress.h"
 #include "cmd/table.h"
 #include "cmd/unfinished.h"
@@ -37,9 +38,9 @@ static const struct spl_cmd_table table = {
         "Puts datasets of neighbouring tiles together as one, to serve and to render as a whole. Nothing is packed\n"
         "again: NAME.spld holds what is seen from afar, a few MB, and names the tiles, which hold all that is finer\n"
         "and stay where they are, in the same folder. A tile that changes later needs the collection made anew.\n"
-        "TILE is a dataset, a folder (all NAME.spld in it) or @LIST, a text with a path a line, relative to its own\n"
-        "folder (those with # in front are comments); up to 10,000 tiles. They have one unit, coordinate system and\n"
-        "list of attributes, and neither textures nor maps of stations.\n\n"
+        "TILE is a dataset, a folder (all NAME.spld in it but collections) or @LIST, a text with a path a line,\n"
+        "relative to its own folder (those with # in front are comments); up to 10,000 tiles. They have one unit,\n"
+        "coordinate system and list of attributes, and neither textures nor maps of stations.\n\n"
         "Tiles of a survey packed each on its own, and one city of them:\n"
         "  for tile in las/*.laz; do splatd pack $tile --keep intensity -o city/$(basename $tile .laz).spld; done\n"
         "  splatd collect city -o city/city.spld --title 'The city'\n"
@@ -47,8 +48,9 @@ static const struct spl_cmd_table table = {
         "  splatd collect city/north.spld city/south.spld -o city/both.spld && splatd info city/both.spld\n"
         "From a list of their names:\n"
         "  splatd collect @city/tiles.txt -o city/city.spld\n\n",
-    .after = "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
-             "where all points have the same value too. Progress and the summary go to stderr.\n",
+    .after =
+        "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
+        "where all points have the same value too. Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };
@@ -60,9 +62,8 @@ static int print_summary(const char *output, struct spl_error *err)
     if (rc)
         return rc;
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
-    size_t tiles = json_array_size(json_object_get(spl_dataset_get_meta(dataset), "tiles"));
     spl_cmd_put_text(stderr, output, 0);
-    fprintf(stderr, ": a collection of %zu tile%s, version %016llx, %.2f MB\n", tiles, tiles == 1 ? "" : "s",
+    fprintf(stderr, ": a collection of %u tile%s, version %016llx, %.2f MB\n", info->tiles, info->tiles == 1 ? "" : "s",
             (unsigned long long)info->version, (double)info->file_bytes / 1e6);
     spl_dataset_close(dataset);
     return SPL_OK;
@@ -71,8 +72,10 @@ static int print_summary(const char *output, struct spl_error *err)
 int spl_cmd_collect(int argc, char **argv)
 {
     struct spl_cmd_progress progress = {0};
-    struct spl_collect_options o = {
-        .size = sizeof o, .progress = spl_cmd_progress, .progress_context = &progress};
+    struct spl_collect_options o = {.size = sizeof o,
+                                    .progress = spl_cmd_progress,
+                                    .progress_context = &progress,
+                                    .left_out = spl_cmd_pack_name_refused};
     struct spl_error err = {0};
     int rc = spl_cmd_table_parse(&table, argc, argv, &o, &err);
     if (rc == SPL_CMD_DONE)
@@ -82,10 +85,8 @@ int spl_cmd_collect(int argc, char **argv)
     if (!rc && !o.input_count)
         rc = spl_fail(&err, SPL_E_USAGE,
                       "collect takes at least one dataset: splatd collect city -o city/city.spld");
-    if (!rc && !o.output)
-        rc = spl_fail(&err, SPL_E_USAGE, "collect needs a file to write to: -o NAME.spld");
     if (!rc)
-        rc = spl_cmd_check_ending("-o", o.output, "spld", &err);
+        rc = spl_cmd_check_dataset("collect", o.output, &err);
     if (rc)
         return spl_cmd_fail(&err);
     clean_up_on_signals(o.output);

@@ -70,6 +70,16 @@ int spl_cmd_check_ending(const char *option, const char *path, const char *endin
                     ending, option, ending, path);
 }
 
+int spl_cmd_check_dataset(const char *command, const char *path, struct spl_error *err)
+{
+    if (!path)
+        return spl_fail(err, SPL_E_USAGE, "%s needs a dataset to write: -o NAME.spld", command);
+    if (strcmp(spl_cmd_ending(path), "spld"))
+        return spl_fail(err, SPL_E_USAGE, "%s writes a dataset, whose name ends in .spld: -o NAME.spld, not '%.300s'",
+                        command, path);
+    return SPL_OK;
+}
+
 /* Of a format: "avi", "mp4", "7z"; not the "5" of "lod-1.5". */
 static bool is_of_a_file(const char *ending)
 {

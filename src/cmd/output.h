@@ -26,6 +26,9 @@ const char *spl_cmd_ending(const char *path);
  * taken for something else and is not written over something else. "-" and what is no regular file has any name. */
 int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err);
 
+/* The same of the dataset that `command` makes, which may not have been named (NULL) and has one ending, of a file. */
+int spl_cmd_check_dataset(const char *command, const char *path, struct spl_error *err);
+
 /* The same where `path` is to be a folder: a name that ends like a file's is refused, unless it is a folder's already
  * or a slash says that it is one; so is "-", and a file. `takes`: what the option takes, "a folder". */
 int spl_cmd_check_folder(const char *option, const char *path, const char *takes, struct spl_error *err);

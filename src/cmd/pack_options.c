@@ -327,11 +327,9 @@ static int check(const struct spl_cmd_pack *a, struct spl_error *err)
     if (!o->input_count)
         return spl_fail(err, SPL_E_USAGE, "pack needs at least one scan: splatd pack scan.las -o scan.spld; "
                                           "'splatd pack --help' shows more");
-    if (!o->output)
-        return spl_fail(err, SPL_E_USAGE, "pack needs a dataset to write: -o NAME.spld");
-    if (strcmp(spl_cmd_ending(o->output), "spld"))
-        return spl_fail(err, SPL_E_USAGE,
-                        "pack writes a dataset, whose name ends in .spld: -o NAME.spld, not '%.300s'", o->output);
+    int rc = spl_cmd_check_dataset("pack", o->output, err);
+    if (rc)
+        return rc;
     const char *contradiction = find_contradiction(a);
     return contradiction ? spl_fail(err, SPL_E_USAGE, "%s", contradiction) : SPL_OK;
 }

@@ -24,6 +24,13 @@ static inline const char *spl_unit_word(const struct spl_dataset_info *info)
 }
 
 /* How to open one. */
+/* What a file is, whether it could be opened or not. */
+enum spl_file_kind {
+    SPL_FILE_OTHER,      /* no container: a scan, a picture, nothing at all; or it cannot be read */
+    SPL_FILE_DATASET,    /* a container, sound or not */
+    SPL_FILE_COLLECTION, /* one whose META names tiles, sound or not */
+};
+
 struct spl_dataset_opening {
     bool verify;                  /* as of spl_dataset_open() */
     uint64_t tables_bytes;        /* all tables stay where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
@@ -31,6 +38,7 @@ struct spl_dataset_opening {
     struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
     uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */
     bool verify_remote;                /* with `verify`: also of a server all is read at first */
+    enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
 };
 

@@ -306,6 +306,8 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
     if (!json_is_object(dataset->meta))
         return spl_fail(err, SPL_E_CORRUPT, "%s: section META is no JSON object; pack the dataset again",
                         dataset->name);
+    if (json_object_get(dataset->meta, "tiles"))
+        dataset->kind = SPL_FILE_COLLECTION;
     const json_t *radius = json_object_get(dataset->meta, "splat_radius");
     const char *count = "a whole number, 1 or more";
     uint64_t levels = 0, whole = UINT64_MAX;

@@ -1,5 +1,6 @@
 /* An open dataset from the inside, and the stages of opening one. Only the files that open one, lookup.c, attributes.c,
- * maps.c, tables.c and textures.c include this. Each stage trusts what the ones before it have checked. */
+ * maps.c, read.c, tables.c, textures.c and tiles.c include this. Each stage trusts what the ones before it have
+ * checked. */
 #ifndef SPL_DATASET_OPEN_H
 #define SPL_DATASET_OPEN_H
 
@@ -34,6 +35,7 @@ struct spl_dataset {
     char *name; /* its file's, or what the opener calls it */
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
+    enum spl_file_kind kind; /* as far as it has been read */
     const char *beside; // while it is opened: the path that its tiles lie beside; NULL = they cannot be read
     struct spl_tiles *tiles; // of a collection (tiles.h); NULL = it is none
     bool verified;                /* every page had its checksum when it was opened, or has it when it is read */

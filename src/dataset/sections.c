@@ -103,7 +103,7 @@ static const char *section_name(const struct spl_section *section, char text[40]
 }
 
 /* Files of other others are common mistakes; name the kind where the first bytes tell it. */
-static int not_a_dataset(const struct spl_dataset *dataset, const char first[8], struct spl_error *err)
+static int not_a_dataset(struct spl_dataset *dataset, const char first[8], struct spl_error *err)
 {
     static const struct {
         const char *start, *kind;
@@ -115,8 +115,10 @@ static int not_a_dataset(const struct spl_dataset *dataset, const char first[8],
                             "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one", dataset->name,
                             others[i].kind);
     size_t letters = dataset->source.size < 4 ? (size_t)dataset->source.size : 4;
-    if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters))
+    if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters)) {
+        dataset->kind = SPL_FILE_DATASET;
         return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
+    }
     return spl_fail(err, SPL_E_INPUT,
                     "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->name);
 }
@@ -133,6 +135,7 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
         return rc;
     if (memcmp(header, SPL_FILE_MAGIC, shown))
         return not_a_dataset(dataset, (const char *)header, err);
+    dataset->kind = SPL_FILE_DATASET;
     if (dataset->source.size < sizeof *header)
         return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %zu of the header's %zu bytes are missing", dataset->name,
                         sizeof *header - bytes, sizeof *header);

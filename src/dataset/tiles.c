@@ -1,7 +1,7 @@
-/* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to be
- * opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the collection was
- * made of, which its version and the sizes of all its pages say: a tile that is replaced fails what needs it, until the
- * collection is made anew. Any thread. */
+/* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to
+ * be opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the
+ * collection was made of, which its version and the sizes of all its pages say: a tile that is replaced fails what
+ * needs it, until the collection is made anew. Any thread. */
 #include "dataset/tiles.h"
 
 #include <stdio.h>
@@ -39,8 +39,8 @@ static char *path_of(const struct spl_tiles *tiles, const struct spl_tile *tile,
 
 static bool is_same_stream(const struct spl_stream *a, const struct spl_stream *b)
 {
-    return !strcmp(a->name, b->name) && !strcmp(a->type, b->type) && !strcmp(a->unit, b->unit) && a->first == b->first &&
-           a->steps_a_unit == b->steps_a_unit;
+    return !strcmp(a->name, b->name) && !strcmp(a->type, b->type) && !strcmp(a->unit, b->unit) &&
+           a->first == b->first && a->steps_a_unit == b->steps_a_unit;
 }
 
 /* What of the tile is not as the collection says, or NULL. */
@@ -73,15 +73,19 @@ static const char *judge(const struct spl_dataset *dataset, const struct spl_til
                : "has pages of other sizes";
 }
 
-/* What opening a tile said, without its path, which clients have no business with. */
-static const char *without_path(const char *message, const char *path)
+/* What is wrong with a tile is wrong with the collection, whatever it is. `name`: what messages of the tile call it, a
+ * path, which clients have no business with, or its id. */
+static int fail_tile(const struct spl_dataset *dataset, const struct spl_tile *tile, int rc, const char *name,
+                     const char *message, struct spl_error *err)
 {
-    const size_t length = path ? strlen(path) : 0;
-    const char *rest = length && !strncmp(message, path, length) ? message + length : message;
-    return rest + strspn(rest, ": ");
+    const size_t length = name ? strlen(name) : 0;
+    const char *rest = length && !strncmp(message, name, length) ? message + length : message;
+    return spl_fail(err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
+                    "%s: its tile %s cannot be read: %s; put it back, or make the collection anew, with splatd collect",
+                    spl_dataset_get_name(dataset), tile->file, rest + strspn(rest, ": "));
 }
 
-/* Under the lock. What is wrong with a tile is wrong with the collection, whatever it is. */
+/* Under the lock. */
 static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, struct spl_error *err)
 {
     const struct spl_dataset_opening how = {.cancelled = dataset->cancelled}; /* the root's tables alone are kept */
@@ -94,9 +98,7 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
         rc = spl_fail(err, SPL_E_CORRUPT, "%s: its tile %s %s: make the collection anew, with splatd collect",
                       spl_dataset_get_name(dataset), tile->file, what);
     else if (rc)
-        rc = spl_fail(err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
-                      "%s: its tile %s cannot be read: %s; put it back, or make the collection anew, with splatd collect",
-                      spl_dataset_get_name(dataset), tile->file, without_path(why.message, path));
+        rc = fail_tile(dataset, tile, rc, path, why.message, err);
     free(path);
     if (rc) {
         spl_dataset_close(own);
@@ -112,6 +114,7 @@ static void close_tile(struct spl_tiles *tiles, struct spl_tile *tile)
 {
     spl_dataset_close(tile->open);
     tile->open = NULL;
+    tile->spoilt = false;
     tiles->open_count--;
 }
 
@@ -156,20 +159,67 @@ void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *til
 {
     struct spl_tiles *tiles = dataset->tiles;
     pthread_mutex_lock(&tiles->mutex);
-    if (!--tile->users && tiles->open_count > tiles->open_most)
+    if (!--tile->users && (tile->spoilt || tiles->open_count > tiles->open_most))
         close_tile(tiles, tile);
     pthread_mutex_unlock(&tiles->mutex);
+}
+
+/* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
+ * been put back meanwhile. */
+static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset *own, int rc,
+                       const struct spl_error *why, struct spl_error *err)
+{
+    if (rc) {
+        rc = fail_tile(dataset, tile, rc, spl_dataset_get_name(own), why->message, err);
+        pthread_mutex_lock(&dataset->tiles->mutex);
+        tile->spoilt = true;
+        pthread_mutex_unlock(&dataset->tiles->mutex);
+    }
+    spl_tiles_give_back(dataset, tile);
+    return rc;
 }
 
 int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err)
 {
     struct spl_tile *tile = spl_tiles_find(dataset, page);
     const struct spl_dataset *own;
+    struct spl_error why = {0};
+    bool sound;
     int rc = spl_tiles_borrow(dataset, tile, &own, err);
     if (rc)
         return rc;
-    rc = spl_dataset_read_page(own, page - tile->first_page, out, err);
-    spl_tiles_give_back(dataset, tile);
+    const uint32_t index = page - tile->first_page;
+    rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
+    if (!rc && !sound) // nobody looked when it was opened, so it need not have been in use
+        rc = spl_fail(&why, SPL_E_CORRUPT, "page %u fails its checksum", index);
+    return end_reading(dataset, tile, own, rc, &why, err);
+}
+
+uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
+{
+    return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
+}
+
+size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
+{
+    spl_assert(index < dataset->info.pages);
+    const struct spl_tiles *tiles = dataset->tiles;
+    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages]
+                                              : dataset->pages[index]->bytes;
+}
+
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own = dataset;
+    int rc = tile ? spl_tiles_borrow(dataset, tile, &own, err) : SPL_OK;
+    if (rc)
+        return rc;
+    const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
+    rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, err);
+    if (tile)
+        spl_tiles_give_back(dataset, tile);
     return rc;
 }
 
@@ -194,11 +244,12 @@ int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void
 {
     struct spl_tile *tile = spl_tiles_find(dataset, page);
     const struct spl_dataset *own;
+    struct spl_error why = {0};
     int rc = spl_tiles_borrow(dataset, tile, &own, err);
     if (rc)
         return rc;
-    rc = spl_dataset_read_tables(own, page - tile->first_page, block, err); /* as large: judge() has seen to that */
-    spl_tiles_give_back(dataset, tile);
+    rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
+    rc = end_reading(dataset, tile, own, rc, &why, err);
     if (!rc)
         renumber(block, tile);
     return rc;

@@ -1,7 +1,7 @@
-/* A collection: a dataset of coarse levels whose leaves are one a tile, each of them a dataset of its own that lies beside
- * it (api/format.md, Collections). From outside it is one dataset: tiles' pages, nodes, chunks and ids follow its own, tile
- * by tile, and the root of a tile's tree is the only child of its leaf. Tiles are opened when something of them is read,
- * and not more than some at a time. */
+/* A collection: a dataset of coarse levels whose leaves are one a tile, each of them a dataset of its own that lies
+ * beside it (api/format.md, Collections). From outside it is one dataset: tiles' pages, nodes, chunks and ids follow
+ * its own, tile by tile, and the root of a tile's tree is the only child of its leaf. Tiles are opened when something
+ * of them is read, and not more than some at a time. */
 #ifndef SPL_DATASET_TILES_H
 #define SPL_DATASET_TILES_H
 
@@ -19,6 +19,7 @@ struct spl_tile {
     struct spl_dataset *open; // guarded by: mutex, as all below; may be NULL
     unsigned users;
     uint64_t used; /* when, in borrowings */
+    bool spoilt;   /* something of the open one did not hold: it is closed by its last user */
 };
 
 struct spl_tiles {
@@ -35,15 +36,15 @@ struct spl_tiles {
 
 enum { SPL_TILES_MAX = 16384, SPL_TILES_OPEN_MAX = 64 };
 
-/* META's "tiles", held against the tables of the collection, which are all kept by now: fills dataset->tiles, info and rows,
- * and ties leaves to tiles. Without the key it does nothing. */
+/* META's "tiles", held against the tables of the collection, which are all kept by now: fills dataset->tiles, info and
+ * rows, and ties leaves to tiles. Without the key it does nothing. */
 int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err);
 
 /* The tile that has page `page`, NULL: it is the collection's own. */
 struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page);
 
-/* The tile's dataset, until it is given back. SPL_E_CORRUPT where it is not what the collection was made of; as opening a
- * dataset. Any thread; blocks on disk. */
+/* The tile's dataset, until it is given back. SPL_E_CORRUPT where it is not what the collection was made of; as opening
+ * a dataset. Any thread; blocks on disk. */
 int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset **out,
                      struct spl_error *err);
 void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *tile);

@@ -1,6 +1,6 @@
-/* META's "tiles" when a collection is opened: every number is bounded before it is added or anything is allocated by it, and
- * each leaf gets exactly one tile. What tiles hold themselves is looked at when they are opened (tiles.c). The opener's
- * thread. */
+/* META's "tiles" when a collection is opened: every number is bounded before it is added or anything is allocated by
+ * it, and each leaf gets exactly one tile. What tiles hold themselves is looked at when they are opened (tiles.c). The
+ * opener's thread. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,8 +21,8 @@ static int wrong(const struct spl_dataset *dataset, size_t index, const char *me
     char path[64];
     snprintf(path, sizeof path, "%s[%zu]%s%s", tile_key, index, *member ? "." : "", member);
     return spl_fail_field(err, SPL_E_CORRUPT, path,
-                          "%s: section META: \"%s\" %s: make the collection anew, with splatd collect", dataset->name, path,
-                          what);
+                          "%s: section META: \"%s\" %s: make the collection anew, with splatd collect", dataset->name,
+                          path, what);
 }
 
 /* A whole number from `least` to `most`. */
@@ -68,7 +68,8 @@ static int add_page(struct spl_dataset *dataset, size_t index, const json_t *pag
     struct spl_tiles *tiles = dataset->tiles;
     uint64_t numbers[4];
     static const uint64_t most[4] = {SPL_HEAD_BYTES_MAX / SPL_NODE_BYTES, SPL_HEAD_BYTES_MAX / SPL_CHUNK_BYTES,
-                                     (uint64_t)SPL_HEAD_BYTES_MAX / SPL_CHUNK_BYTES * SPL_CHUNK_SPLATS, SPL_PAGE_BYTES_MAX};
+                                     (uint64_t)SPL_HEAD_BYTES_MAX / SPL_CHUNK_BYTES * SPL_CHUNK_SPLATS,
+                                     SPL_PAGE_BYTES_MAX};
     for (size_t i = 0; i < 4; i++) {
         const json_t *number = json_array_get(page, i);
         if (json_array_size(page) != 4 || !json_is_integer(number) || json_integer_value(number) < 1 ||
@@ -88,7 +89,8 @@ static int add_page(struct spl_dataset *dataset, size_t index, const json_t *pag
 }
 
 /* The leaf whose only child the tile's root is. */
-static int tie(struct spl_dataset *dataset, size_t index, struct spl_tile *tile, struct sums *sums, struct spl_error *err)
+static int tie(struct spl_dataset *dataset, size_t index, struct spl_tile *tile, struct sums *sums,
+               struct spl_error *err)
 {
     struct spl_node *leaf = &dataset->whole.nodes[tile->node];
     if (leaf->child_count)
@@ -114,9 +116,9 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
     const struct {
         const char *member;
         uint64_t *sum;
-    } more[] = {{"points", &info->points},           {"leaf_splats", &info->leaf_splats}, {"splats", &info->splats},
-                {"pieces", &info->pieces},           {"panels", &info->panels},           {"panel_points", &info->panel_points},
-                {"meshes", &info->meshes},           {"mesh_points", &info->mesh_points}};
+    } more[] = {{"points", &info->points}, {"leaf_splats", &info->leaf_splats}, {"splats", &info->splats},
+                {"pieces", &info->pieces}, {"panels", &info->panels},           {"panel_points", &info->panel_points},
+                {"meshes", &info->meshes}, {"mesh_points", &info->mesh_points}};
     int rc = json_is_object(json) ? get_file(dataset, index, json, tile, err)
                                   : wrong(dataset, index, "", "is no object", err);
     if (!rc)
@@ -165,8 +167,8 @@ static int allocate(struct spl_dataset *dataset, const json_t *json, struct sums
     sums->row = dataset->rows[tiles->own_pages];
     sums->levels = dataset->info.levels;
     if (sums->page_room > SPL_SECTIONS_MAX)
-        return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: section META: \"tiles\" has more pages than there can be",
-                              dataset->name);
+        return spl_fail_field(err, SPL_E_CORRUPT, tile_key,
+                              "%s: section META: \"tiles\" has more pages than there can be", dataset->name);
     tiles->list = spl_alloc(json_array_size(json), sizeof *tiles->list, err);
     tiles->rows = spl_alloc(sums->page_room + 1, sizeof *tiles->rows, err);
     tiles->page_bytes = spl_alloc(pages + 1, sizeof *tiles->page_bytes, err);
@@ -203,11 +205,15 @@ int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err)
         return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: section META: \"tiles\" must be an array of 1 to %d",
                               dataset->name, SPL_TILES_MAX);
     if (dataset->tables_limit == UINT64_MAX)
-        return spl_fail(err, SPL_E_USAGE, "%s: this goes through all of a dataset, and it is a collection of %zu: name one of "
-                        "its tiles", dataset->name, json_array_size(json));
+        return spl_fail(err, SPL_E_USAGE,
+                        "%s: this goes through all of a dataset, and it is a collection of %zu: name one of "
+                        "its tiles",
+                        dataset->name, json_array_size(json));
     if (dataset->remote)
-        return spl_fail(err, SPL_E_UNSUPPORTED, "%s: it is a collection, whose tiles are files beside it: it is served from a disk, "
-                        "not from a server", dataset->name);
+        return spl_fail(err, SPL_E_UNSUPPORTED,
+                        "%s: it is a collection, whose tiles are files beside it: it is served from a disk, "
+                        "not from a server",
+                        dataset->name);
     if (dataset->textures || dataset->maps)
         return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: a collection has neither textures nor maps of its own",
                               dataset->name);

@@ -72,8 +72,8 @@ void spl_gpu_buffer_destroy(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer);
 void *spl_gpu_buffer_map(struct spl_gpu_buffer *buffer); /* UPLOAD and READBACK: mapped for the buffer's whole life */
 uint64_t spl_gpu_buffer_get_bytes(const struct spl_gpu_buffer *buffer);
 
-/* Kernels are embedded at build time under their file's stem ("depth" for shaders/depth.comp, its 64-bit-atomics
- * variant is "depth64"; shaders/meson.build lists them). Specialisation constants are 32 bit with ids 0..count-1; those
+/* Kernels are embedded at build time under the names of shaders/meson.build ("points", its variant of 64 bit atomics is
+ * "points64"). Specialisation constants are 32 bit with ids 0..count-1; those
  * that a kernel does not declare are ignored. SPL_E_UNSUPPORTED without limits.atomics_64 where a kernel needs them on
  * EGL. */
 enum { SPL_GPU_CONSTANTS_MAX = 8 };

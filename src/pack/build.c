@@ -155,10 +155,11 @@ static int begin_spill(struct spl_build *p, const struct spl_passes *later, stru
     }
     char *folder = spl_spill_find_memory_folder(o->output);
     if (o->warn && folder) {
-        snprintf(text, sizeof text,
-                 "'%.200s' lies in memory (tmpfs), and so does what is beyond --memory, which bounds nothing there: write "
-                 "the dataset (-o) to a folder on a disk",
-                 folder);
+        snprintf(
+            text, sizeof text,
+            "'%.200s' lies in memory (tmpfs), and so does what is beyond --memory, which bounds nothing there: write "
+            "the dataset (-o) to a folder on a disk",
+            folder);
         o->warn(o->progress_context, text);
     }
     free(folder);
@@ -171,7 +172,8 @@ static int begin_spill(struct spl_build *p, const struct spl_passes *later, stru
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
-/* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small bound. */
+/* What does not lie in arrays of points (each thread's work, tables of chunks, wires) may be more than a small
+ * bound. */
 static int end_spill(const struct spl_pack_options *o, struct spl_stage *stage, int rc, struct spl_error *err)
 {
     char text[160];
@@ -263,9 +265,10 @@ static int export_primitives(struct spl_build *p, struct spl_build_outputs *out,
     if (!p->options->export_primitives)
         return 0;
     if (p->options->warn && p->planes.count && !p->sides_known)
-        p->options->warn(p->options->progress_context,
-                         "no scan says where it was taken from, so which side of a plane is its front is guessed: in the "
-                         "drawing the ceiling of a room can be a floor");
+        p->options->warn(
+            p->options->progress_context,
+            "no scan says where it was taken from, so which side of a plane is its front is guessed: in the "
+            "drawing the ceiling of a room can be a floor");
     return spl_export_primitives(p->options->export_primitives, &p->points, &p->planes, &p->wires, p->system.unit_m,
                                  p->stage, &out->drawing, &out->drawing_length, &out->drawn, err);
 }

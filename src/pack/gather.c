@@ -173,8 +173,8 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     spl_kept_has_scan(scans, &stations);
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
-    /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is no point
-     * they alone do: beyond the bound of memory what is allocated takes room on disk, used or not. */
+    /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is no
+     * point they alone do: beyond the bound of memory what is allocated takes room on disk, used or not. */
     if (info->points_expected && !info->points_at_most && info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {

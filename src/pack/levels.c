@@ -91,8 +91,8 @@ static void load_point(const struct spl_points *p, const struct spl_tree_node *p
     out->linear = p->linear && p->linear[i];
 }
 
-/* Puts the child's splats into w->input from `at` on, their positions relative to the parent's origin, and their scalars
- * beside them. Returns where they end. */
+/* Puts the child's splats into w->input from `at` on, their positions relative to the parent's origin, and their
+ * scalars beside them. Returns where they end. */
 static size_t take_child(const struct levels *l, struct scratch *w, const struct spl_tree_node *parent,
                          const struct spl_tree_node *child, size_t at)
 {

@@ -1,5 +1,6 @@
-/* Morton order over the cubic bounds, and exact duplicates out: of equal coordinates the point stays that has a station,
- * a normal, the greater class and colour, and so on. The order is that of the points, not that in which they were read.
+/* Morton order over the cubic bounds, and exact duplicates out: of equal coordinates the point stays that has a
+ * station, a normal, the greater class and colour, and so on. The order is that of the points, not that in which they
+ * were read.
  *
  * A stable parallel radix sort of (key, index) pairs: by the first bits of their keys into parts (pieces count, one
  * prefix sum, pieces scatter), then each part digit by digit, by one worker and in so little memory that it is near. So

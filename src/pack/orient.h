@@ -39,7 +39,8 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
                           const uint32_t *neighbours, unsigned k);
 
 /* Decides component.flip over all blocks, from the edges between their components, which it moves and unites in place:
- * anchored components stay, the others show outwards on the whole. `spill` may be NULL: where as many edges more lie. */
+ * anchored components stay, the others show outwards on the whole. `spill` may be NULL: where as many edges more
+ * lie. */
 int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
                           size_t edge_count, struct spl_spill *spill, struct spl_error *err);
 

@@ -221,8 +221,8 @@ static void look_at_counts(const struct saying *s)
     }
     if (short_of.count)
         say(s,
-            "the header counts fewer points than the file has room for in %s: %llu more could lie there and are not read. "
-            "If they are points, mend the header's number",
+            "the header counts fewer points than the file has room for in %s: %llu more could lie there and are not "
+            "read. If they are points, mend the header's number",
             spl_names_list(&short_of), (unsigned long long)behind);
 }
 

@@ -36,8 +36,8 @@ void spl_spill_keep_bound(struct spl_spill *spill);
 uint64_t spl_spill_disk_most(const struct spl_spill *spill);   /* bytes of files */
 uint64_t spl_spill_memory_most(struct spl_spill *spill); /* resident bytes of the process, as the kernel counts them */
 
-/* What a pack ends with: `rc`, but where an array found no room on disk that, *err included: who wanted the array may have
- * taken it for memory. `spill` may be NULL. */
+/* What a pack ends with: `rc`, but where an array found no room on disk that, *err included: who wanted the array may
+ * have taken it for memory. `spill` may be NULL. */
 int spl_spill_explain(const struct spl_spill *spill, int rc, struct spl_error *err);
 
 /* Bytes that arrays may take before the first of them goes to a file. */
@@ -47,8 +47,8 @@ uint64_t spl_spill_get_share(uint64_t memory);
  * written there while they last. */
 int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t written, struct spl_error *err);
 
-/* The folder of `beside` where it lies in memory itself, so that what is there is beyond no bound; else NULL. The caller
- * frees. */
+/* The folder of `beside` where it lies in memory itself, so that what is there is beyond no bound; else NULL. The
+ * caller frees. */
 char *spl_spill_find_memory_folder(const char *beside);
 
 /* From now on each array of `least` bytes and more lies in a file, whatever memory there is; 0: as else. Tests only. */

@@ -1,6 +1,6 @@
-/* Whether a few points stretch the bounds: the box of all but a thousandth on either side, of an even sample, against that
- * of all. A tripod's points reach some ten times as far as most of them lie; beyond `far_ratio` something is wrong with
- * them, which bounds, first view and the search for wires and planes pay for. One thread. */
+/* Whether a few points stretch the bounds: the box of all but a thousandth on either side, of an even sample, against
+ * that of all. A tripod's points reach some ten times as far as most of them lie; beyond `far_ratio` something is wrong
+ * with them, which bounds, first view and the search for wires and planes pay for. One thread. */
 #include "pack/strays.h"
 
 #include <math.h>

@@ -4,8 +4,8 @@
 #include <math.h>
 
 /* What is drawn may reach beyond its bounds, or before the near plane: a disc by its radius, what is thinner than a
- * sample by that. Kernels keep depths to 2^-18 of them (common/sums.glsl), so that room for this many median radii costs
- * depths 1/256 of one at most, however far apart the bounds are: one stray point puts them anywhere. */
+ * sample by that. Kernels keep depths to 2^-18 of them (common/sums.glsl), so that room for this many median radii
+ * costs depths 1/256 of one at most, however far apart the bounds are: one stray point puts them anywhere. */
 static const double around_share = 0.01, around_radii = 1024, around_px = 16;
 
 double spl_camera_advance(struct spl_camera *camera, const struct spl_dataset_info *info)

@@ -1,5 +1,5 @@
-/* Kernels by name and constants. So few are kept that a walk over them costs less than recording the dispatch that asked.
- * Belongs to the renderer's thread. */
+/* Kernels by name and constants. So few are kept that a walk over them costs less than recording the dispatch that
+ * asked. Belongs to the renderer's thread. */
 #include "render/kernels.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* The renderer's kernels, made when first used and kept while they are: a name and constants name one. Views differ in
- * constants in thousands of ways, and a software driver takes megabytes a kernel, which no memory limit sees: of more than
- * SPL_KERNELS_MOST those go that were used longest ago. Everything belongs to the renderer's thread. */
+ * constants in thousands of ways, and a software driver takes megabytes a kernel, which no memory limit sees: of more
+ * than SPL_KERNELS_MOST those go that were used longest ago. Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_KERNELS_H
 #define SPL_RENDER_KERNELS_H
 

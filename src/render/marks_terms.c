@@ -43,9 +43,9 @@ int spl_marks_refuse_name(const struct spl_dataset_info *info, const char *name,
         if (spl_stream_type_from_name(info->streams[s].type) < SPL_STREAM_UNKNOWN)
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
                                      info->streams[s].name);
-    return spl_fail_field(err, SPL_E_INPUT, field, "dataset '%s' has no attribute '%s': it has %s, and any has %s%s%s%s",
-                          info->id, name, used ? known : "none", common, find_reason(name), hint ? "; " : "",
-                          hint ? hint : "");
+    return spl_fail_field(err, SPL_E_INPUT, field,
+                          "dataset '%s' has no attribute '%s': it has %s, and any has %s%s%s%s", info->id, name,
+                          used ? known : "none", common, find_reason(name), hint ? "; " : "", hint ? hint : "");
 }
 
 static int refuse_values(const struct spl_dataset_info *info, const struct spl_term *term, const char *field,

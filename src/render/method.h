@@ -1,5 +1,5 @@
 /* A method's row: all that it decides. Its file in methods/ has it, include/splatd/method.h names it, method.c finds
- * it. What methods share stands in tile.h. Everything belongs to the renderer's thread. */
+ * it. What methods share stands in renderer.h. Everything belongs to the renderer's thread. */
 #ifndef SPL_RENDER_METHOD_H
 #define SPL_RENDER_METHOD_H
 

@@ -93,6 +93,9 @@ static int find_ends(struct spl_paint *paint, const struct spl_color_params *col
                               range[1]);
     paint->low = range[0];
     paint->high = range[1] > range[0] ? range[1] : range[0] + fmax(fabs(range[0]), 1) * 1e-6;
+    if (!isfinite(paint->high - paint->low))
+        return spl_fail_field(err, SPL_E_INPUT, "range",
+                              "range is from %g to %g, wider than numbers go; write narrower ends", range[0], range[1]);
     return SPL_OK;
 }
 

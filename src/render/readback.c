@@ -42,8 +42,8 @@ static void unpack_normal(uint32_t word, float out[3])
     out[2] = z * scale;
 }
 
-/* NaN, where there is nothing, stays. A disc whose centre lies behind the near plane is drawn whole: what of it lies before
- * the eye counts as at the eye. */
+/* NaN, where there is nothing, stays. A disc whose centre lies behind the near plane is drawn whole: what of it lies
+ * before the eye counts as at the eye. */
 static void add_advance(const struct spl_tile *tile, uint32_t layer, float *depths)
 {
     if (tile->advance == 0 || (layer != SPL_LAYER_DEPTH && layer != SPL_LAYER_RANGE))

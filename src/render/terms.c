@@ -30,6 +30,11 @@ static bool check_box(const double s[9], char fault[SPL_TERM_FAULT_MAX])
             snprintf(fault, SPL_TERM_FAULT_MAX, "has a box that ends at %.9g before it begins at %.9g", s[i + 3], s[i]);
             return false;
         }
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(s[i + 3] - s[i])) {
+            snprintf(fault, SPL_TERM_FAULT_MAX, "has a box from %.9g to %.9g, wider than numbers go", s[i], s[i + 3]);
+            return false;
+        }
     for (int i = 6; i < 9; i++)
         if (!(fabs(s[i]) <= 360)) {
             snprintf(fault, SPL_TERM_FAULT_MAX, "has a box that is turned by %.9g degrees, not within -360 and 360",

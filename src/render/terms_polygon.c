@@ -31,6 +31,8 @@ static bool meet(const double a[2], const double b[2], const double c[2], const 
            (!ca && is_between(c, d, a)) || (!cb && is_between(c, d, b));
 }
 
+static const double farthest = 1e150; /* so that no product of two sides wraps to infinity */
+
 bool spl_polygon_check(const double *corners, uint32_t count, char fault[SPL_TERM_FAULT_MAX])
 {
     if (count < 3) {
@@ -40,6 +42,11 @@ bool spl_polygon_check(const double *corners, uint32_t count, char fault[SPL_TER
     for (uint32_t i = 0; i < count; i++)
         if (!isfinite(corners[2 * i]) || !isfinite(corners[2 * i + 1])) {
             snprintf(fault, SPL_TERM_FAULT_MAX, "has a number that is not finite");
+            return false;
+        }
+    for (uint32_t i = 0; i < 2 * count; i++)
+        if (fabs(corners[i]) > farthest) {
+            snprintf(fault, SPL_TERM_FAULT_MAX, "has a polygon with a corner at %.9g, beyond %g", corners[i], farthest);
             return false;
         }
     for (uint32_t i = 0; i < count; i++) {

@@ -1,7 +1,7 @@
 /* Shading for shape in a tile (shaders/shade.comp): light from normals, which a group of their own is drawn for first,
- * then eye-dome lighting from the depths that the colours leave. What they come to is a factor a sample, which resolving
- * multiplies colours with: so it is the same for every method, under soft spheres and in every tile. Belongs to the
- * renderer's thread. */
+ * then eye-dome lighting from the depths that the colours leave. What they come to is a factor a sample, which
+ * resolving multiplies colours with: so it is the same for every method, under soft spheres and in every tile. Belongs
+ * to the renderer's thread. */
 #include <math.h>
 
 #include "render/method.h"
@@ -16,7 +16,8 @@ uint32_t spl_tile_get_shades(const struct spl_tile *tile)
 
 uint32_t spl_shade_get_reach(const struct spl_view *view, const struct spl_dataset_info *info)
 {
-    const bool looks = view->layers >> SPL_LAYER_COLOR & 1 && spl_shade_for(&view->shade, &view->color, info) & SPL_SHADE_EDL;
+    const bool looks =
+        view->layers >> SPL_LAYER_COLOR & 1 && spl_shade_for(&view->shade, &view->color, info) & SPL_SHADE_EDL;
     return looks ? view->shade.radius * (uint32_t)view->supersample : 0;
 }
 
@@ -32,8 +33,8 @@ static void see_sun(const struct spl_tile *tile, float out[3])
     }
 }
 
-/* The steps in which splats overlap: of the finest, in units; of coarser ones, which are as large as lod samples, as a share
- * of the distance, or in units along parallel rays. */
+/* The steps in which splats overlap: of the finest, in units; of coarser ones, which are as large as lod samples, as a
+ * share of the distance, or in units along parallel rays. */
 static void see_splats(const struct spl_tile *tile, float out[2])
 {
     out[0] = SPL_SHADE_ROUGH * (float)spl_dataset_get_info(tile->resident->dataset)->splat_radius;
@@ -49,7 +50,8 @@ static int dispatch(struct spl_tile *tile, uint32_t kinds, bool lit, struct spl_
     const int64_t from[2] = {(int64_t)tile->x * side - params.crop_x, (int64_t)tile->y * side - params.crop_y};
     const int64_t size[2] = {(int64_t)view->camera.width * side, (int64_t)view->camera.height * side};
     const uint32_t drawn[2] = {params.width, params.height};
-    uint32_t *const low[2] = {&params.fill_level, &params.fill_from}, *const end[2] = {&params.fill_to, &params.fill_stride};
+    uint32_t *const low[2] = {&params.fill_level, &params.fill_from};
+    uint32_t *const end[2] = {&params.fill_to, &params.fill_stride};
     for (int i = 0; i < 2; i++) { /* what of the tile lies in the image, or around one that goes on */
         const bool cut = !view->surrounded;
         *low[i] = cut && from[i] < 0 ? (uint32_t)-from[i] : 0;

@@ -1,9 +1,10 @@
 /* Points a second out of LAZ files: all fields, and position with colour alone, on one thread and on two. One thread is
- * measured in processor time, so that a shared machine does not decide; two in wall time. Best of some runs. An argument
- * chooses files by a part of their names.
+ * measured in processor time, so that a shared machine does not decide; two in wall time. Best of some runs. An
+ * argument chooses files by a part of their names.
  *
  * The floors are what the issue asks: 5 M points/s of all fields, 6 M of position and colour of a layered file; LASzip
- * does 3.3 to 4.9 M on such machines, laz-perf 2.5 to 5.0, laz-rs 2.1 to 4.9. Exits 1 below a floor, 77 without scans. */
+ * does 3.3 to 4.9 M on such machines, laz-perf 2.5 to 5.0, laz-rs 2.1 to 4.9. Exits 1 below a floor, 77 without
+ * scans. */
 #include <stdio.h>
 #include <unistd.h>
 

@@ -32,7 +32,8 @@ static void check_batch(const char *text, size_t length, const struct spl_camera
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const double station[1][16] = {{0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1}};
-    static const struct spl_dataset_info dataset = {.id = "hall", .default_up = {0, 0, 1}, .station_count = 1, .stations = station};
+    static const struct spl_dataset_info dataset = {
+        .id = "hall", .default_up = {0, 0, 1}, .station_count = 1, .stations = station};
     static const struct spl_camera_defaults defaults = {
         .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 0.01, .far = INFINITY, .dataset = &dataset};
     static const struct spl_camera_limits limits = {

@@ -18,7 +18,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     memset(&soft, 0, sizeof soft);
     memset(&again, 0, sizeof again);
     int rc = spl_soft_parse(text, &soft, &err);
-    if (rc ? err.code != rc || !err.message[0] || strcmp(err.field, "soft") || soft.what.count : err.code || !soft.what.count)
+    if (rc ? err.code != rc || !err.message[0] || strcmp(err.field, "soft") || soft.what.count
+           : err.code || !soft.what.count)
         abort();
     struct spl_terms clip, same;
     struct spl_error why = {0};

@@ -43,7 +43,8 @@ static const struct golden goldens[] = {
     /* points lie up to eight pixels apart: what is hidden, what is a hole, and what closes it */
     {"wall-fill", {1.2, 4.5, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_FILL, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.002}},
-    /* discs that meet without blending; a pixel's winner may be lost to rounding, and its neighbours' smoothing with it */
+    /* discs that meet without blending; a pixel's winner may be lost to rounding, and its neighbours' smoothing with
+     * it */
     {"wall-nearest", {1.2, 4.5, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_NEAREST, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
      {1, 0.004}},
     /* millimetres, so 1 level is 1e-4 of the nearest depth here: rounding to the scale */
@@ -61,10 +62,12 @@ static const struct golden goldens[] = {
      {16, 0.004}},
     /* textures of smooth random atoms, nearest texels and, in front, interpolated ones; a fragment between two texels
      * may take either */
-    {"wall-textured", {1.2, 6.9, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 13.25,
+    {"wall-textured", {1.2, 6.9, 1.9}, {0.4, 8, 2.2}, 50, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255},
+     13.25,
      {2, 0.004}, 8},
     /* colours of a map on the ground, splats' own where it did not look, and what it saw through is gone */
-    {"overview-mapped", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+    {"overview-mapped", {-8.5, -6.5, 5.5}, {2, 1.5, 1.2}, 75, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255},
+     0,
      {1, 0.004}, .maps = true},
     /* triangles of every lattice, their colours, creases and outlines, before panels */
     {"relief-splat", {-0.5, -1.6, 0.9}, {0, 0.1, 0}, 48, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
@@ -104,15 +107,18 @@ static const struct golden goldens[] = {
     {"plan-splat", {1, 0.5, 30}, {1, 0.5, 0}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 0}, 0, {1, 0.002},
      .view_height = 14},
     /* all around, six faces and their edges, up to straight up and down, where a pixel is a sliver */
-    {"around-splat", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+    {"around-splat", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_COLOR, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002},
      .around = SPL_EQUIRECTANGULAR},
     /* ranges in a fisheye, parts of five faces; millimetres, and nothing around the circle */
-    {"fisheye-range", {0, -2, 1.5}, {-1, 3, 1.5}, 200, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+    {"fisheye-range", {0, -2, 1.5}, {-1, 3, 1.5}, 200, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002},
      .around = SPL_FISHEYE},
-    /* a spinning lidar's list of rays, a row for each of its beams, which lie closest at the horizon and fire one behind the other: no
-     * grid. Millimetres, carried along the surface of a face's nearest pixel; where another is nearest by rounding, a ray beside an
-     * edge meets the other side of it */
-    {"rays-range", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0, {1, 0.002},
+    /* a spinning lidar's list of rays, a row for each of its beams, which lie closest at the horizon and fire one
+     * behind the other: no grid. Millimetres, carried along the surface of a face's nearest pixel; where another is
+     * nearest by rounding, a ray beside an edge meets the other side of it */
+    {"rays-range", {0, -2, 1.5}, {-1, 3, 1.5}, 0, SPL_METHOD_SPLAT, SPL_LAYER_RANGE, 1, 1, {0, 0, 0, 255}, 0,
+     {1, 0.002},
      .around = SPL_RAYS},
 };
 enum { GOLDEN_COUNT = sizeof goldens / sizeof *goldens, GOLDEN_WIDTH = 160, GOLDEN_HEIGHT = 120 };

@@ -1,6 +1,6 @@
-/* What tests of whole frames share: random scenes, cameras that look at them, the comparison with the plain C reference.
- * One body for every backend; a program has one renderer, and each test its own seed, so that one more test changes the
- * data of no other. */
+/* What tests of whole frames share: random scenes, cameras that look at them, the comparison with the plain C
+ * reference. One body for every backend; a program has one renderer, and each test its own seed, so that one more test
+ * changes the data of no other. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,7 +1,7 @@
-/* Views all around and through lenses: what lies where two faces meet is as the same surface seen elsewhere, whatever draws
- * and shades it; a cube's faces are the pinholes' own images; ranges are the truth's; what a fisheye does not see is nothing;
- * every layer that there is holds its kind, into memory of the caller's as well; picks lie where the image says. One body
- * for every backend. */
+/* Views all around and through lenses: what lies where two faces meet is as the same surface seen elsewhere, whatever
+ * draws and shades it; a cube's faces are the pinholes' own images; ranges are the truth's; what a fisheye does not see
+ * is nothing; every layer that there is holds its kind, into memory of the caller's as well; picks lie where the image
+ * says. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -73,8 +73,8 @@ static int difference(const struct spl_frame *a, int at, const struct spl_frame 
     return most;
 }
 
-/* The share of pixels that are more levels off than `most` in the image that is turned by an eighth, whose edges of faces lie
- * in the middle of the other's. */
+/* The share of pixels that are more levels off than `most` in the image that is turned by an eighth, whose edges of
+ * faces lie in the middle of the other's. */
 static double find_turned(const struct spl_view *one, int most)
 {
     struct spl_view two = *one;
@@ -89,7 +89,8 @@ static double find_turned(const struct spl_view *one, int most)
     return (double)beyond / (width * height);
 }
 
-/* The mean step from one column to the next around the horizon, across the four upright edges (0), or `aside` of them. */
+/* The mean step from one column to the next around the horizon, across the four upright edges (0), or `aside` of
+ * them. */
 static double find_step(const struct spl_frame *frame, int aside)
 {
     double sum = 0;
@@ -112,7 +113,8 @@ static void no_edge_of_a_face_is_seen(void **state)
     } rows[] = {
         {SPL_METHOD_SPLAT, "none", NULL, 1, 0},
         {SPL_METHOD_SPLAT, "headlight", NULL, 2, 0},
-        {SPL_METHOD_SPLAT, "edl", NULL, 16, 0}, /* a face's pixels are narrower towards its edges, on both sides of them */
+        /* a face's pixels are narrower towards its edges, on both sides of them */
+        {SPL_METHOD_SPLAT, "edl", NULL, 16, 0},
         {SPL_METHOD_SPLAT, "none", "plane:0,0,0,0.2,0.1,1>0", 6, 0.02}, /* where what is soft ends, a disc does */
         {SPL_METHOD_NEAREST, "none", NULL, 3, 0},
         {SPL_METHOD_FILL, "none", NULL, 3, 0.01}, /* of the few holes that are left, others */
@@ -127,8 +129,9 @@ static void no_edge_of_a_face_is_seen(void **state)
         struct spl_frame frame = render(&view);
         const double step = find_step(&frame, 0), others = (find_step(&frame, -9) + find_step(&frame, 9)) / 2;
         spl_frame_finish(&frame);
-        print_message("%s, %s, %s: %g beyond %d levels; a step across edges %.2f, aside %.2f\n", spl_method_name(view.method),
-                      rows[i].shade, rows[i].soft ? rows[i].soft : "solid", share, rows[i].most, step, others);
+        print_message("%s, %s, %s: %g beyond %d levels; a step across edges %.2f, aside %.2f\n",
+                      spl_method_name(view.method), rows[i].shade, rows[i].soft ? rows[i].soft : "solid", share,
+                      rows[i].most, step, others);
         const bool holes = view.method == SPL_METHOD_FILL;
         if (!(share <= rows[i].share && (step <= 1.5 * others + 0.1 || holes)))
             fail_msg("row %zu", i);
@@ -140,7 +143,8 @@ static double true_range(const struct spl_camera *camera, const double ray[3])
 {
     double along = 0, square = 0;
     for (int k = 0; k < 3; k++) {
-        const double world = camera->rotation[k] * ray[0] + camera->rotation[3 + k] * ray[1] + camera->rotation[6 + k] * ray[2];
+        const double world =
+            camera->rotation[k] * ray[0] + camera->rotation[3 + k] * ray[1] + camera->rotation[6 + k] * ray[2];
         along += world * eye[k];
         square += eye[k] * eye[k];
     }
@@ -179,8 +183,8 @@ static void ranges_are_true(void **state)
     }
 }
 
-/* A list of directions has the ranges that an image of the same has, to the bit; and any list those of the truth, however
- * it is ordered and how often it says one. */
+/* A list of directions has the ranges that an image of the same has, to the bit; and any list those of the truth,
+ * however it is ordered and how often it says one. */
 static void rays_of_a_list_are_true(void **state)
 {
     (void)state;
@@ -206,7 +210,8 @@ static void rays_of_a_list_are_true(void **state)
     spl_frame_finish(&b);
     spl_rays_destroy(rays);
     for (int i = 0; i < count; i++) { /* of all lengths, every other twice */
-        const double z = 1 - (2 * (i / 2) + 1.0) / (count / 2), around = sqrt(1 - z * z), angle = (i / 2) * 2.4, length = exp(i % 7 - 3);
+        const double z = 1 - (2 * (i / 2) + 1.0) / (count / 2), around = sqrt(1 - z * z), angle = (i / 2) * 2.4,
+                     length = exp(i % 7 - 3);
         for (int k = 0; k < 3; k++)
             directions[i][k] = length * (k == 0 ? around * cos(angle) : k == 1 ? around * sin(angle) : z);
     }
@@ -219,7 +224,8 @@ static void rays_of_a_list_are_true(void **state)
     double sum = 0;
     for (int i = 0; i < count; i++) {
         const double *d = directions[i], length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-        sum += fabs((double)range[i] - true_range(&list.camera, (double[]){d[0] / length, d[1] / length, d[2] / length}));
+        sum +=
+            fabs((double)range[i] - true_range(&list.camera, (double[]){d[0] / length, d[1] / length, d[2] / length}));
         assert_true(i % 2 == 0 || range[i] == range[i - 1]);
     }
     print_message("rays of a list, %% of a radius: mean %.2f\n", 100 * sum / count / disc);
@@ -300,10 +306,12 @@ static void layers_hold_their_kind(void **state)
             double ray[3];
             const float *n = normal + 3 * at;
             if (spl_camera_get_ray(&view.camera, at % 64 + 0.5, at / 64 + 0.5, ray)) {
-                assert_true(range[at] > 2 && range[at] < 4 && id[at] < splats && shape[at] == SPL_SHAPE_SPLAT && coverage[at] > 0.99f);
+                assert_true(range[at] > 2 && range[at] < 4 && id[at] < splats && shape[at] == SPL_SHAPE_SPLAT &&
+                            coverage[at] > 0.99f);
                 assert_true(fabsf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1) < 0.01f && color[4 * at + 3] == 255);
             } else {
-                assert_true(isnan(range[at]) && id[at] == UINT32_MAX && !shape[at] && coverage[at] == 0 && n[0] == 0 && n[1] == 0 && n[2] == 0);
+                assert_true(isnan(range[at]) && id[at] == UINT32_MAX && !shape[at] && coverage[at] == 0 && n[0] == 0 &&
+                            n[1] == 0 && n[2] == 0);
                 assert_memory_equal(color + 4 * at, view.background, 4);
             }
         }
@@ -313,7 +321,9 @@ static void layers_hold_their_kind(void **state)
         const struct spl_image own = {SPL_LAYER_RANGE, SPL_PIXEL_F32, 64, 64, apart, row * sizeof *apart};
         view.layers = 1u << SPL_LAYER_RANGE;
         assert_int_equal(spl_renderer_render_with(renderer, ball, &view,
-                                                  &SPL_SIZED(spl_render_options, .images = &own, .image_count = 1), NULL, NULL), SPL_OK);
+                                                  &SPL_SIZED(spl_render_options, .images = &own, .image_count = 1),
+                                                  NULL, NULL),
+                         SPL_OK);
         for (int y = 0; y < 64; y++)
             assert_memory_equal(apart + row * y, range + 64 * y, 64 * sizeof *apart);
         spl_frame_finish(&frame);
@@ -349,8 +359,8 @@ static void picks_lie_where_the_image_says(void **state)
         assert_true(pick.hit && pick.depth == pick.distance && pick.splat >= 0);
         assert_true(fabs(pick.distance - (double)range[y * width + x]) < 0.1 * disc);
         assert_true(spl_camera_project(&view.camera, pick.position, pixel, &distance));
-        assert_true(fabs(pixel[0] - x - 0.5) < 1e-3 / cos((y - height / 2.0) / height * 3.1) && fabs(pixel[1] - y - 0.5) < 1e-3 &&
-                    fabs(distance - pick.distance) < 1e-5);
+        assert_true(fabs(pixel[0] - x - 0.5) < 1e-3 / cos((y - height / 2.0) / height * 3.1) &&
+                    fabs(pixel[1] - y - 0.5) < 1e-3 && fabs(distance - pick.distance) < 1e-5);
     }
     spl_frame_finish(&frame);
     assert_int_equal(spl_camera_set_fisheye(&view.camera, 150, 64, 64, NULL), SPL_OK);
@@ -360,8 +370,8 @@ static void picks_lie_where_the_image_says(void **state)
     assert_true(pick.hit);
 }
 
-/* What a coarse image of far-apart discs shows, a pick finds, as far away, and nothing where it shows nothing: every method,
- * of panoramas, fisheyes and pinholes. */
+/* What a coarse image of far-apart discs shows, a pick finds, as far away, and nothing where it shows nothing: every
+ * method, of panoramas, fisheyes and pinholes. */
 static void picks_find_what_coarse_images_show(void **state)
 {
     (void)state;
@@ -369,7 +379,8 @@ static void picks_find_what_coarse_images_show(void **state)
     struct make_splat *all = calloc(count, sizeof *all);
     assert_non_null(all);
     for (int i = 0; i < count; i++) {
-        const double z = 1 - (2 * i + 1.0) / count, around = sqrt(1 - z * z), angle = i * M_PI * (3 - sqrt(5)), far = 2 + i % 5;
+        const double z = 1 - (2 * i + 1.0) / count, around = sqrt(1 - z * z), angle = i * M_PI * (3 - sqrt(5)),
+                     far = 2 + i % 5;
         const double n[3] = {around * cos(angle), around * sin(angle), z};
         all[i] = (struct make_splat){.radius = 0.1f};
         for (int k = 0; k < 3; k++) {
@@ -392,7 +403,8 @@ static void picks_find_what_coarse_images_show(void **state)
             view.layers = 1u << SPL_LAYER_RANGE | 1u << SPL_LAYER_ID;
             assert_int_equal(kind == 2   ? spl_camera_set_fov(&view.camera, 80, w, h, NULL)
                              : kind == 1 ? spl_camera_set_fisheye(&view.camera, 170, w, h, NULL)
-                                         : spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, w, h, NULL), SPL_OK);
+                                         : spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, w, h, NULL),
+                             SPL_OK);
             assert_int_equal(spl_renderer_render(renderer, sieve, &view, &frame, NULL), SPL_OK);
             const float *range = frame.images[SPL_LAYER_RANGE].pixels;
             const uint32_t *id = frame.images[SPL_LAYER_ID].pixels;
@@ -401,11 +413,14 @@ static void picks_find_what_coarse_images_show(void **state)
                 assert_int_equal(spl_renderer_pick(renderer, sieve, &view, x + 0.5, y + 0.5, &pick, NULL), SPL_OK);
                 hits += pick.hit;
                 const bool shown = isfinite(range[at]);
-                others += pick.hit != shown || (shown && (fabs(pick.distance - (double)range[at]) > 1e-5 * pick.distance ||
-                                                          pick.splat != (id[at] == UINT32_MAX ? -1 : (int64_t)id[at])));
+                others +=
+                    pick.hit != shown || (shown && (fabs(pick.distance - (double)range[at]) > 1e-5 * pick.distance ||
+                                                    pick.splat != (id[at] == UINT32_MAX ? -1 : (int64_t)id[at])));
             }
-            print_message("%s, %s: %d of %d picks hit, %d otherwise\n", spl_method_name(method), names[kind], hits, picks, others);
-            assert_true(hits > 0 && hits < picks && others <= (method == SPL_METHOD_FILL ? picks / 4 : 0)); // its filter looks on and on
+            print_message("%s, %s: %d of %d picks hit, %d otherwise\n", spl_method_name(method), names[kind], hits,
+                          picks, others);
+            // its filter looks on and on
+            assert_true(hits > 0 && hits < picks && others <= (method == SPL_METHOD_FILL ? picks / 4 : 0));
             spl_frame_finish(&frame);
         }
     spl_renderer_remove(renderer, sieve);

@@ -52,7 +52,8 @@ static double edl(const struct spl_frame *frame, const struct spl_view *view, do
             slant += (k ? -1 : 1) * (parallel ? there : z / there);
         }
         slant = fabs(slant) / 2 * view->camera.fx / r;
-        deeper += fmax((parallel ? (z - sum / 2) / far_off : sum / 2 * z - 1) - rough * (1 + slant), 0); /* of NaN it is 0 */
+        /* of NaN it is 0 */
+        deeper += fmax((parallel ? (z - sum / 2) / far_off : sum / 2 * z - 1) - rough * (1 + slant), 0);
     }
     return 1 - view->shade.strength * (SPL_SHADE_DEPTH * deeper / (1 + SPL_SHADE_DEPTH * deeper));
 }
@@ -61,7 +62,8 @@ static double edl(const struct spl_frame *frame, const struct spl_view *view, do
 static double light(const struct spl_frame *frame, const struct spl_view *view, int x, int y)
 {
     const struct spl_camera *camera = &view->camera;
-    const float *n = (const float *)frame->images[SPL_LAYER_NORMAL].pixels + 3 * ((size_t)y * camera->width + (size_t)x);
+    const float *n =
+        (const float *)frame->images[SPL_LAYER_NORMAL].pixels + 3 * ((size_t)y * camera->width + (size_t)x);
     const double *r = camera->rotation, degree = acos(-1) / 180, *sun = view->shade.sun;
     const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
     const double ray[3] = {parallel ? 0 : (x + 0.5 - camera->cx) / camera->fx,
@@ -104,7 +106,9 @@ static void compare_shading(struct spl_dataset *dataset, struct spl_view view)
                     continue;
                 }
                 double kept = light(&plain, &view, x, y);
-                kept *= view.shade.kinds & SPL_SHADE_EDL ? edl(&plain, &view, spl_dataset_get_info(dataset)->splat_radius, x, y) : 1;
+                kept *= view.shade.kinds & SPL_SHADE_EDL
+                            ? edl(&plain, &view, spl_dataset_get_info(dataset)->splat_radius, x, y)
+                            : 1;
                 darker += kept < 0.8;
                 for (int c = 0; c < 3; c++)
                     differ += fabs(color_at(&plain, at)[c] * kept - color_at(&shaded, at)[c]) > 0.5 + cases[i].levels;
@@ -132,24 +136,29 @@ static void shading_is_as_in_c(void **state)
     done(dataset);
 }
 
-/* A wall of discs that lean by up to six degrees, from aside: eye-dome lighting leaves it as it is, and finds the disc that
- * stands before it. */
+/* A wall of discs that lean by up to six degrees, from aside: eye-dome lighting leaves it as it is, and finds the disc
+ * that stands before it. */
 static void walls_keep_their_colors(void **state)
 {
     (void)state;
     enum { side = 60, count = side * side + 1 };
     struct make_splat *splats = calloc(count, sizeof *splats);
     for (int i = 0; i < count; i++) {
-        const double lean[2] = {0.2 * (uniform() - 0.5), 0.2 * (uniform() - 0.5)}, length = hypot(hypot(lean[0], lean[1]), 1);
-        splats[i] = (struct make_splat){.position = {0.05 * (i % side) - 1.5, 0.05 * (i / side) - 1.5, 0},
-                                        .normal = {(float)(lean[0] / length), (float)(lean[1] / length), (float)(1 / length)},
-                                        .radius = 0.05f, .color = {200, 180, 160}};
+        const double lean[2] = {0.2 * (uniform() - 0.5), 0.2 * (uniform() - 0.5)},
+                     length = hypot(hypot(lean[0], lean[1]), 1);
+        splats[i] =
+            (struct make_splat){.position = {0.05 * (i % side) - 1.5, 0.05 * (i / side) - 1.5, 0},
+                                .normal = {(float)(lean[0] / length), (float)(lean[1] / length), (float)(1 / length)},
+                                .radius = 0.05f,
+                                .color = {200, 180, 160}};
     }
-    splats[count - 1] = (struct make_splat){.position = {0, 0, 0.5}, .normal = {0, 0, 1}, .radius = 0.3f, .color = {200, 180, 160}};
+    splats[count - 1] =
+        (struct make_splat){.position = {0, 0, 0.5}, .normal = {0, 0, 1}, .radius = 0.3f, .color = {200, 180, 160}};
     struct spl_dataset *dataset = make_dataset(splats, count);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
     struct spl_view view = looking(origin, 2, 320, 240);
-    assert_int_equal(spl_camera_look_at(&view.camera, (double[]){0.4, -1.6, 1.2}, origin, (double[]){0, 0, 1}, NULL), 0);
+    assert_int_equal(spl_camera_look_at(&view.camera, (double[]){0.4, -1.6, 1.2}, origin, (double[]){0, 0, 1}, NULL),
+                     0);
     size_t wall = 0, gaps = 0, drawn = 0;
     view.lod = 0;
     view.shade.kinds = SPL_SHADE_NONE;
@@ -176,7 +185,8 @@ static void walls_keep_their_colors(void **state)
 /* The places (by an entry more or less) among the palette that a value may have. */
 static bool is_shown(const struct spl_paint *paint, const uint8_t color[4], double value, int slack)
 {
-    const double place = paint->classes ? value : (value - paint->low) / (paint->high - paint->low) * SPL_PALETTE_COLORS;
+    const double place =
+        paint->classes ? value : (value - paint->low) / (paint->high - paint->low) * SPL_PALETTE_COLORS;
     for (int i = -slack; i <= slack; i++) {
         const int entry = isnan(value) ? SPL_PALETTE_UNKNOWN
                                        : (int)fmin(fmax(floor(place) + i, 0), SPL_PALETTE_COLORS - 1);
@@ -355,7 +365,8 @@ static void tiles_show_the_same(void **state)
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
-        frames_test(shading_is_as_in_c), frames_test(walls_keep_their_colors), frames_test(values_are_shown), frames_test(panels_show_theirs),
+        frames_test(shading_is_as_in_c), frames_test(walls_keep_their_colors),
+        frames_test(values_are_shown),   frames_test(panels_show_theirs),
         frames_test(flat_is_flat),       frames_test(tiles_show_the_same),
     };
     return frames_run(argc, argv, "colors", tests, sizeof tests / sizeof *tests);

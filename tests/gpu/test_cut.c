@@ -201,8 +201,8 @@ static void cuts_are_exact(void **state)
         fail_msg("%zu of %zu samples are off", off, within);
 }
 
-/* A loop of a software driver's kernel ends after 65535 rounds, those of loops within it counted: of as many large discs as
- * an invocation draws, the last and nearest is whole, whatever asks its samples. */
+/* A loop of a software driver's kernel ends after 65535 rounds, those of loops within it counted: of as many large
+ * discs as an invocation draws, the last and nearest is whole, whatever asks its samples. */
 static void large_discs_are_whole(void **state)
 {
     enum { discs = SPL_RUN_SPLATS, side = 2 * SPL_WINDOW };
@@ -237,7 +237,8 @@ static void large_discs_are_whole(void **state)
             const float *whole = plain.images[SPL_LAYER_DEPTH].pixels, *left = cut.images[SPL_LAYER_DEPTH].pixels;
             for (size_t p = 0; p < (size_t)side * side; p++)
                 if (!(left[p] == whole[p]) || !isfinite(whole[p]))
-                    fail_msg("%s, method %s: pixel %zu, %zu", around[i], spl_method_name(view.method), p % side, p / side);
+                    fail_msg("%s, method %s: pixel %zu, %zu", around[i], spl_method_name(view.method), p % side,
+                             p / side);
             spl_frame_finish(&cut);
         }
         spl_frame_finish(&plain);

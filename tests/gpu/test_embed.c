@@ -141,7 +141,8 @@ static void images_that_do_not_fit_are_refused(void **state)
     for (int i = 0; i <= 10; i++) {
         struct spl_error err = {0};
         struct spl_frame frame;
-        struct spl_render_options options = {.size = sizeof options, .images = i < 10 ? &bad[i] : NULL, .image_count = 1};
+        struct spl_render_options options = {
+            .size = sizeof options, .images = i < 10 ? &bad[i] : NULL, .image_count = 1};
         assert_int_equal(spl_renderer_render_with(renderer, dataset, &view, &options, &frame, &err), SPL_E_USAGE);
         assert_string_equal(err.field, "images");
         assert_null(frame.images[SPL_LAYER_DEPTH].pixels);
@@ -206,7 +207,8 @@ static void picks_agree_with_the_image(void **state)
         }
     }
     assert_true(hits > 5 && misses > 2);
-    /* Of a wall's splats, which lie equally near, GPUs may take another: kernels of one layer round not as of another. */
+    /* Of a wall's splats, which lie equally near, GPUs may take another: kernels of one layer round not as of
+     * another. */
     assert_true(others == 0 || !spl_renderer_get_device(renderer)->software);
     struct spl_pick pick;
     struct spl_error err = {0};

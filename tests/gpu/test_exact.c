@@ -1,8 +1,8 @@
-/* Depth, and the range of views all around, against the truth: a tilted plane and a sphere, sampled densely with exact normals, quantised by the codec and
- * blended by the kernels. At every pixel that sees the surface at no more than 70 degrees, well inside its rim, the
- * point that comes back lies within 3 % of a splat radius of the surface; its depth, which slant enlarges by 1 / cos,
- * is that near the truth in 99 % of these pixels, and in all that see the surface within 35 degrees. One body for every
- * backend. */
+/* Depth, and the range of views all around, against the truth: a tilted plane and a sphere, sampled densely with exact
+ * normals, quantised by the codec and blended by the kernels. At every pixel that sees the surface at no more than 70
+ * degrees, well inside its rim, the point that comes back lies within 3 % of a splat radius of the surface; its depth,
+ * which slant enlarges by 1 / cos, is that near the truth in 99 % of these pixels, and in all that see the surface
+ * within 35 degrees. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -124,8 +124,9 @@ static void check_view(const struct spl_dataset *dataset, const struct spl_primi
     double away[3];
     sub3(eye, p->center, away);
     if (parallel)
-        assert_int_equal(spl_camera_set_orthographic(&view.camera, 2 * tan(M_PI / 9) * sqrt(dot3(away, away)), 320, 240, NULL),
-                         SPL_OK);
+        assert_int_equal(
+            spl_camera_set_orthographic(&view.camera, 2 * tan(M_PI / 9) * sqrt(dot3(away, away)), 320, 240, NULL),
+            SPL_OK);
     if (around) { /* and turned, so that what is measured lies across the edge of two faces */
         double *r = view.camera.rotation;
         assert_int_equal(spl_camera_set_around(&view.camera, projection, 1024, 512, NULL), SPL_OK);
@@ -202,9 +203,11 @@ static void plane_depth_is_true(void **state)
                      distance);
             check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_PERSPECTIVE, name);
             if (view % 3 == 1)
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC, "parallel rays");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC,
+                           "parallel rays");
             if (view == 1)
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR, "all around");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR,
+                           "all around");
         }
         spl_renderer_remove(renderer, dataset);
         spl_dataset_close(dataset);
@@ -239,8 +242,10 @@ static void sphere_depth_is_true(void **state)
             snprintf(name, sizeof name, "sphere %s, view %d", place ? "at UTM" : "at the origin", i);
             check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_PERSPECTIVE, name);
             if (i == 1) {
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC, "parallel rays");
-                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR, "all around");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_ORTHOGRAPHIC,
+                           "parallel rays");
+                check_view(dataset, &scene.primitives[0], eye, radius_of_spacing * spacing, SPL_EQUIRECTANGULAR,
+                           "all around");
             }
         }
         spl_renderer_remove(renderer, dataset);

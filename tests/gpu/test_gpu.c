@@ -107,7 +107,8 @@ static void refuses_devices_by_reason(void **state)
     char far_index[32], half_index[32];
     snprintf(far_index, sizeof far_index, "%s:999", device);
     snprintf(half_index, sizeof half_index, "%s:0x", device);
-    const char *const wrong[] = {"no such card", far_index, half_index, "vulkan:", "egl:x", "ffffffffffffffffffffffffffffffff"};
+    const char *const wrong[] = {"no such card", far_index, half_index,
+                                 "vulkan:",      "egl:x",   "ffffffffffffffffffffffffffffffff"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         struct spl_error err = {0};
         assert_int_equal(spl_gpu_open(&(struct spl_gpu_options){.device = wrong[i]}, &gpu, &err), SPL_E_NO_DEVICE);

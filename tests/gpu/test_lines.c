@@ -92,8 +92,10 @@ static struct spl_dataset *one_line(int pieces, float width, int linear)
 {
     struct make_splat all[vertices + 2] = {0};
     for (int i = 0; i < 2; i++)
-        all[i] = (struct make_splat){
-            .position = {0.1 * i, 0, -0.5}, .normal = {0, -1, 0}, .radius = 0.05f, .linear = linear == 1 || linear > 1 + i};
+        all[i] = (struct make_splat){.position = {0.1 * i, 0, -0.5},
+                                     .normal = {0, -1, 0},
+                                     .radius = 0.05f,
+                                     .linear = linear == 1 || linear > 1 + i};
     for (int i = 0; i <= pieces; i++)
         all[2 + i] = (struct make_splat){.position = {2.0 * i / pieces - 1, 0, 0.2 * i / pieces},
                                          .normal = {0, -1, 0},

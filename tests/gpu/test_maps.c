@@ -412,7 +412,8 @@ static void backs_lie_behind(void **state)
     }
 }
 
-/* A hundred stations, each chunk seen by others: the image is the same however it is cut, and when it is drawn again. */
+/* A hundred stations, each chunk seen by others: the image is the same however it is cut, and when it is drawn
+ * again. */
 static void stations_leave_no_seams(void **state)
 {
     enum { count = 6000, stations = 100 };

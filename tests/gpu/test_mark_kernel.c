@@ -1,6 +1,6 @@
 /* The kernel that marks splats against plain C, byte by byte: chunks as selection lists them, of random splats with
- * streams of two types, panels and meshes, with blended ranges, tables, shapes and several of these at once. Its tests are
- * selection's own; what they ought to be, test_marks.c of the unit tests says. One body for every backend. */
+ * streams of two types, panels and meshes, with blended ranges, tables, shapes and several of these at once. Its tests
+ * are selection's own; what they ought to be, test_marks.c of the unit tests says. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -37,10 +37,12 @@ static enum spl_select_answer yes(void *context, uint32_t page)
 }
 
 /* Marks of the whole list, by the kernel. The caller's to free(). */
-static uint8_t *mark(const struct spl_dataset *dataset, const struct spl_draw_list *list, const struct spl_camera *camera)
+static uint8_t *mark(const struct spl_dataset *dataset, const struct spl_draw_list *list,
+                     const struct spl_camera *camera)
 {
-    static const char *const names[SPL_CHUNK_KINDS] = {
-        [SPL_CHUNK_DISCS] = "soft_mark", [SPL_CHUNK_PANELS] = "soft_mark_cells", [SPL_CHUNK_MESHES] = "soft_mark_mesh_cells"};
+    static const char *const names[SPL_CHUNK_KINDS] = {[SPL_CHUNK_DISCS] = "soft_mark",
+                                                       [SPL_CHUNK_PANELS] = "soft_mark_cells",
+                                                       [SPL_CHUNK_MESHES] = "soft_mark_mesh_cells"};
     const uint64_t bytes = list->mark_words * 4;
     struct spl_gpu_buffer *marks, *back, *frames[64], *pages[64];
     struct spl_gpu_buffer *chunks = put(SPL_GPU_UPLOAD, list->chunks, list->chunk_count * sizeof *list->chunks);
@@ -106,7 +108,8 @@ static void place_of(const struct spl_draw_chunk *draw, const struct spl_chunk *
     spl_chunk_decode(&local, page, i, &splat);
     for (int c = 0; c < 3; c++) {
         const double *r = camera->rotation + 3 * c;
-        float offset = (float)r[0] * splat.position[0] + (float)r[1] * splat.position[1] + (float)r[2] * splat.position[2];
+        float offset =
+            (float)r[0] * splat.position[0] + (float)r[1] * splat.position[1] + (float)r[2] * splat.position[2];
         p[c] = (c == 0 ? draw->origin_x : c == 1 ? draw->origin_y : draw->origin_z) + offset;
     }
 }
@@ -203,7 +206,8 @@ static void compare_all(const struct spl_dataset *dataset, bool panels)
         if (round % 3 != 2)
             soft.what.terms[soft.what.count++] = range("class", panels ? 1 : 3, panels ? 1.5 : 4 + 3 * uniform());
         if (round % 3)
-            soft.what.terms[soft.what.count++] = shape(SPL_TERM_AXIS + (enum spl_term_measure)(round / 2 % 3), -1, 0.5 * uniform());
+            soft.what.terms[soft.what.count++] =
+                shape(SPL_TERM_AXIS + (enum spl_term_measure)(round / 2 % 3), -1, 0.5 * uniform());
         kinds |= compare_marks(dataset, &soft, what);
     }
     assert_int_equal(kinds, 7);

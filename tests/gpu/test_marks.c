@@ -85,7 +85,8 @@ static void attributes_filter(void **state)
         same_by_all(dataset, &view, "classes 2, 3 and 7");
         view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {uncertain(0.4, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty above 0.4");
-        view.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}}};
+        view.soft =
+            (struct spl_soft_params){.what = {.count = 2, .terms = {uncertain(0.1, 0.3), class_of(5, INFINITY)}}};
         same_by_all(dataset, &view, "uncertainty from 0.1 to 0.3, or class from 5");
         done(dataset);
     }
@@ -98,7 +99,8 @@ static void shapes_filter(void **state)
     struct spl_view view = looking(origin, 3.2, 160, 120);
     view.lod = 0;
     for (int measure = SPL_TERM_AXIS; measure <= SPL_TERM_BOX; measure++) {
-        view.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of((enum spl_term_measure)measure, origin)}}};
+        view.soft =
+            (struct spl_soft_params){.what = {.count = 1, .terms = {shape_of((enum spl_term_measure)measure, origin)}}};
         same_by_all(dataset, &view, measure == SPL_TERM_AXIS ? "axis" : measure == SPL_TERM_PLANE ? "plane" : "box");
         view.soft.what.terms[view.soft.what.count++] = class_of(0, 1);
         same_by_all(dataset, &view, "a shape or classes");
@@ -257,8 +259,8 @@ static void textured_splats_filter(void **state)
 
 static void equal_frames(const struct spl_dataset *dataset, const struct spl_view *a, const struct spl_view *b);
 
-/* Lines stand for linear splats, of which some are soft: the solid ones are drawn themselves, as by a view without lines.
- * Where none is, lines are. */
+/* Lines stand for linear splats, of which some are soft: the solid ones are drawn themselves, as by a view without
+ * lines. Where none is, lines are. */
 static void lines_give_way(void **state)
 {
     enum { discs = 2000, vertices = 27 };
@@ -303,7 +305,8 @@ static void nothing_and_everything(void **state)
             soft.soft.what.terms[0] = shape_of(SPL_TERM_BOX, (const double[3]){50, 50, 50}); /* far away */
             equal_frames(i ? panels : dataset, &plain, &soft);
             soft.soft = (struct spl_soft_params){.what = {.count = 1, .terms = {class_of(0, 255)}}};
-            all.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}}; /* by marks */
+            /* by marks */
+            all.soft = (struct spl_soft_params){.what = {.count = 2, .terms = {class_of(0, 3), class_of(4, 7)}}};
             equal_frames(i ? panels : dataset, &soft, &all);
             struct spl_frame frame = render(i ? panels : dataset, &all);
             const float *coverage = frame.images[SPL_LAYER_COVERAGE].pixels;

@@ -1,6 +1,6 @@
-/* Panels, and meshes, which are panels with relief, against the plain C reference: every kind of mask and colours, every
- * level of lattice, from far away, near by, within; as the discs and points that their cells stand for; forged ones; in
- * tiles. One body for both kinds and every backend. */
+/* Panels, and meshes, which are panels with relief, against the plain C reference: every kind of mask and colours,
+ * every level of lattice, from far away, near by, within; as the discs and points that their cells stand for; forged
+ * ones; in tiles. One body for both kinds and every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

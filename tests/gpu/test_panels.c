@@ -1,5 +1,5 @@
-/* Panels by what must be seen of them: walls that are closed, floors at a slant, planes along their edge, cells far away,
- * thin walls, what is hidden, what stations colour and trim, picks. One body for every backend. */
+/* Panels by what must be seen of them: walls that are closed, floors at a slant, planes along their edge, cells far
+ * away, thin walls, what is hidden, what stations colour and trim, picks. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

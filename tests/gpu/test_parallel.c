@@ -135,7 +135,8 @@ static void the_eye_may_be_anywhere(void **state)
         const float *range = b.images[SPL_LAYER_RANGE].pixels;
         size_t differs = 0, pixels = 128 * 96;
         for (size_t i = 0; i < pixels; i++) {
-            differs += isnan(da[i]) != isnan(db[i]) || fabs((double)db[i] - 1e6 - (double)da[i]) > 0.07; /* a float's step */
+            /* a float's step */
+            differs += isnan(da[i]) != isnan(db[i]) || fabs((double)db[i] - 1e6 - (double)da[i]) > 0.07;
             assert_true(range[i] == db[i] || isnan(db[i]));
         }
         assert_true(count_off(&a, &b, 1) <= 3 && differs <= 3);
@@ -228,7 +229,8 @@ static void sections_and_picks_are_true(void **state)
         double pixel[2], z;
         if (hits++ % 40)
             continue;
-        assert_int_equal(spl_renderer_pick(renderer, dataset, &view, i % 120 + 0.5, i / 120 + 0.5, &pick, &err), SPL_OK);
+        assert_int_equal(spl_renderer_pick(renderer, dataset, &view, i % 120 + 0.5, i / 120 + 0.5, &pick, &err),
+                         SPL_OK);
         assert_true(pick.hit && pick.distance == pick.depth);
         assert_true(fabs(pick.depth - (double)depth[i]) < 1e-6);
         if (!spl_camera_project(&view.camera, pick.position, pixel, &z))
@@ -280,11 +282,15 @@ static void strays_cost_no_depth(void **state)
     static const double strays[] = {2, 1e4, 5e6, 1e9};
     struct make_splat splats[wall + 1];
     for (int i = 0; i < wall; i++)
-        splats[i] = (struct make_splat){.position = {origin[0] + 0.05 * (i % side), origin[1], origin[2] + 0.05 * (i / side)},
-                                        .normal = {0, 1, 0}, .radius = 0.05f, .color = {200, 100, 50}};
+        splats[i] =
+            (struct make_splat){.position = {origin[0] + 0.05 * (i % side), origin[1], origin[2] + 0.05 * (i / side)},
+                                .normal = {0, 1, 0},
+                                .radius = 0.05f,
+                                .color = {200, 100, 50}};
     for (int i = 0; i < 4 * SPL_METHOD_COUNT; i++) {
         const double away = strays[i / SPL_METHOD_COUNT], middle = 0.05 * side / 2;
-        const double target[3] = {origin[0] + middle, origin[1], origin[2] + middle}, eye[3] = {target[0], origin[1] + 8, target[2]};
+        const double target[3] = {origin[0] + middle, origin[1], origin[2] + middle},
+                     eye[3] = {target[0], origin[1] + 8, target[2]};
         splats[wall] = splats[0];
         for (int a = 0; a < 3; a++)
             splats[wall].position[a] += away;
@@ -301,7 +307,8 @@ static void strays_cost_no_depth(void **state)
             if (isnan(depth[k]))
                 continue;
             hits++;
-            if (!(fabs((double)depth[k] - 8) < 2e-3)) /* the splats' own, which are stored to 0.05 of their radius, or so */
+            /* the splats' own, which are stored to 0.05 of their radius, or so */
+            if (!(fabs((double)depth[k] - 8) < 2e-3))
                 fail_msg("%s, a stray %g away: depth %.6f", spl_method_name(view.method), away, (double)depth[k]);
         }
         assert_true(hits > (view.method == SPL_METHOD_POINTS ? 300 : 9000));
@@ -310,8 +317,8 @@ static void strays_cost_no_depth(void **state)
     }
 }
 
-/* Pixels of a wall of discs whose plane the rays lie in, `turn` radians from the image's rows, and columns or rows, along
- * whichever it is longer, that have none of it. */
+/* Pixels of a wall of discs whose plane the rays lie in, `turn` radians from the image's rows, and columns or rows,
+ * along whichever it is longer, that have none of it. */
 static size_t count_wall(struct spl_view *view, double turn, size_t *gaps)
 {
     enum { discs = 18, side = 201 };

@@ -2,7 +2,8 @@
  * differ by a level at most; models are within a level of the reference in doubles; where too much overlaps, tiles are
  * cut, or it is told; a level of detail hides as much as what it stands for; cells of panels count once where nodes
  * meet; a turn all round flips nothing; they lie over what is solid and change no other layer; opacity 0 draws none;
- * nobody waits longer for them, others come between in the middle of a pixel, and a device that is lost is told. One body for every backend. */
+ * nobody waits longer for them, others come between in the middle of a pixel, and a device that is lost is told. One
+ * body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -203,7 +204,8 @@ static void no_crowd_hides_more_than_the_cover(void **state)
             }
             assert_true(fabs(coverage[2] - cover * coverage[1] - (1 - cover) * coverage[0]) < 1e-5);
             for (int c = 0; c < 4; c++) /* all three are rounded, colour by alpha twice */
-                assert_true(fabs(color[2][c] - cover * color[1][c] - (1 - cover) * color[0][c]) <= (c < 3 ? 2.01 : 1.01));
+                assert_true(fabs(color[2][c] - cover * color[1][c] - (1 - cover) * color[0][c]) <=
+                            (c < 3 ? 2.01 : 1.01));
             dense += coverage[0] == 0 && coverage[1] > 0.99;
         }
         assert_true(dense > 25 || i == 2); /* of which 1 - cover is seen through */
@@ -441,7 +443,8 @@ static void loss_is_told(void **state)
 }
 
 /* A wall along x, upright where `lean` is 0, of panels of 16 cells: one in the octant below x = 0, one in that above,
- * both `reach` cells beyond where these meet. Splats in the corners say where that is. `covered`: behind a large disc. */
+ * both `reach` cells beyond where these meet. Splats in the corners say where that is. `covered`: behind a large
+ * disc. */
 static struct spl_dataset *wall_of_two(int reach, double lean, int levels, bool covered)
 {
     enum { side = SPL_PANEL_SIDE };

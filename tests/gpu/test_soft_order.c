@@ -1,7 +1,7 @@
-/* Sorting, listing and blending of soft spheres against plain C in the same fixed point, equal to the bit but for GPUs: items that
- * are random, in one place, behind one another on a sample, none, one, larger than the image, smaller than a sample,
- * around the eye, partly solid, of every opacity, behind what is solid, and in several windows of depth. In the form
- * that software drivers take, and in that of GPUs. One body for every backend. */
+/* Sorting, listing and blending of soft spheres against plain C in the same fixed point, equal to the bit but for GPUs:
+ * items that are random, in one place, behind one another on a sample, none, one, larger than the image, smaller than a
+ * sample, around the eye, partly solid, of every opacity, behind what is solid, and in several windows of depth. In the
+ * form that software drivers take, and in that of GPUs. One body for every backend. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

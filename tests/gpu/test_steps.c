@@ -98,10 +98,12 @@ static void interrupted_frames_have_the_bytes_that_they_have_alone(void **state)
             int interruptions = 0;
             for (int v = 0; v < 2; v++) {
                 views[v].method = (enum spl_method)method;
-                views[v].fill.kernel = method == SPL_METHOD_FILL ? sides[i] > 1 ? 3 : 8 : 0; /* that tiles have room for */
+                /* that tiles have room for */
+                views[v].fill.kernel = method == SPL_METHOD_FILL ? sides[i] > 1 ? 3 : 8 : 0;
                 views[v].supersample = sides[i];
                 if (v && sides[i] < 4) { /* in faces */
-                    assert_int_equal(spl_camera_set_around(&views[v].camera, SPL_EQUIRECTANGULAR, 240, 120, NULL), SPL_OK);
+                    assert_int_equal(spl_camera_set_around(&views[v].camera, SPL_EQUIRECTANGULAR, 240, 120, NULL),
+                                     SPL_OK);
                     views[v].layers &= ~(1u << SPL_LAYER_DEPTH);
                 }
                 assert_int_equal(spl_renderer_render(renderer, datasets[v], &views[v], &alone[v], NULL), SPL_OK);

@@ -1,5 +1,6 @@
-/* Tables that are read by page: a frame that waits for them has the bytes that it has where all are kept; where they have no
- * room, coarser nodes stand in, the same each time; a head that cannot be read fails its frames until it can. */
+/* Tables that are read by page: a frame that waits for them has the bytes that it has where all are kept; where they
+ * have no room, coarser nodes stand in, the same each time; a head that cannot be read fails its frames until it
+ * can. */
 #include <errno.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -33,10 +33,11 @@ static void same_pixels(const struct spl_frame frames[2], int layer, const char 
         if (values[0] != values[1])
             break;
     }
-    fail_msg("%s, seed %llu: %zu of %zu pixels of layer %s differ, the first at column %zu, row %zu: channel %zu is %#x "
-             "in one tile, %#x in %u",
-             what, (unsigned long long)seed, differ, pixels, spl_layer_name((enum spl_layer)layer), first % a->width,
-             first / a->width, channel, values[0], values[1], frames[1].stats.tiles);
+    fail_msg(
+        "%s, seed %llu: %zu of %zu pixels of layer %s differ, the first at column %zu, row %zu: channel %zu is %#x "
+        "in one tile, %#x in %u",
+        what, (unsigned long long)seed, differ, pixels, spl_layer_name((enum spl_layer)layer), first % a->width,
+        first / a->width, channel, values[0], values[1], frames[1].stats.tiles);
 }
 
 /* A pixel is the same in whatever tile it lies, to the bit. Of 20,000 points some lie so close to a border of samples
@@ -169,9 +170,10 @@ static void a_surrounded_piece_is_as_in_the_whole(void **state)
             assert_int_equal(spl_renderer_render(renderer, dataset, &piece, &alone, NULL), SPL_OK);
             piece.surrounded = true;
             assert_int_equal(spl_renderer_render(renderer, dataset, &piece, &surrounded, NULL), SPL_OK);
-            const size_t others = find_others(&whole, &surrounded, left, top), before = find_others(&whole, &alone, left, top);
-            print_message("%s, %d: of %d pixels %zu differ, %zu alone\n", spl_method_name(method), samples, width * height,
-                          others, before);
+            const size_t others = find_others(&whole, &surrounded, left, top),
+                         before = find_others(&whole, &alone, left, top);
+            print_message("%s, %d: of %d pixels %zu differ, %zu alone\n", spl_method_name(method), samples,
+                          width * height, others, before);
             const size_t most = method == SPL_METHOD_FILL ? width * height / 20 : 2; /* its filter looks on and on */
             if (others > most || before < 4 * others + 50)
                 fail_msg("%s", spl_method_name(method));

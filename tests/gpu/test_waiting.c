@@ -1,5 +1,5 @@
-/* Pages that come late, or never: reads of the file pass a gate of the test's. A frame waits without holding up others, has
- * the bytes that it has alone, and leaves nothing behind when it is given up. */
+/* Pages that come late, or never: reads of the file pass a gate of the test's. A frame waits without holding up others,
+ * has the bytes that it has alone, and leaves nothing behind when it is given up. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -24,8 +24,10 @@
 enum { few = 6000, many = 4000000, width = 96, height = 64, open_gate = 1 << 30 };
 
 static const char *device;
-static atomic_int may_pass = open_gate, fault; /* reads that go through; what one of those to come answers: errno, -1 = 0 bytes */
-static atomic_int reads, wakes, jumped_s, last_fd = -1, hanging_fd = -1; /* of reads: the last; that hang until it is another */
+/* reads that go through; what one of those to come answers: errno, -1 = 0 bytes */
+static atomic_int may_pass = open_gate, fault;
+/* of reads: the last; that hang until it is another */
+static atomic_int reads, wakes, jumped_s, last_fd = -1, hanging_fd = -1;
 static struct spl_dataset *large, *one, *other;
 
 /* In place of the C library's. */
@@ -137,7 +139,8 @@ static struct spl_frame alone(const struct spl_dataset *dataset, const struct sp
 /* Finishes `got`. */
 static void assert_same(struct spl_frame *got, const struct spl_frame *expected)
 {
-    assert_memory_equal(got->images[SPL_LAYER_COLOR].pixels, expected->images[SPL_LAYER_COLOR].pixels, width * height * 4);
+    assert_memory_equal(got->images[SPL_LAYER_COLOR].pixels, expected->images[SPL_LAYER_COLOR].pixels,
+                        width * height * 4);
     spl_frame_finish(got);
 }
 

@@ -1,9 +1,10 @@
-/* make_wall [--station] [--unit=UNIT] [--crs=CRS] [--small | --large | --textured | --mapped | --knot | --tree | --heap] NAME.spld…: a
- * coloured wall of 40 × 40 splats (--small: its lower half; --large: 600 × 600, several MiB), two levels, in the plane
- * x = 0. --textured gives its splats up to 8 of 16 atoms, --mapped the map of a station at (2, 0, 1) that sees it in
- * other colours, striped, and through its splats from y = 0.5 on. --knot makes what once took long to open, --tree a
- * ground of several levels on many small pages, --heap 20,000 discs, one behind the other, each of which covers the image. --unit= and --crs= are what the dataset says, nothing where they are
- * empty; --station is one that looks along +x from the origin. */
+/* make_wall [--station] [--unit=UNIT] [--crs=CRS] [--small | --large | --textured | --mapped | --knot | --tree |
+ * --heap] NAME.spld…: a coloured wall of 40 × 40 splats (--small: its lower half; --large: 600 × 600, several MiB), two
+ * levels, in the plane x = 0. --textured gives its splats up to 8 of 16 atoms, --mapped the map of a station at (2, 0,
+ * 1) that sees it in other colours, striped, and through its splats from y = 0.5 on. --knot makes what once took long
+ * to open, --tree a ground of several levels on many small pages, --heap 20,000 discs, one behind the other, each of
+ * which covers the image. --unit= and --crs= are what the dataset says, nothing where they are empty; --station is one
+ * that looks along +x from the origin. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -90,7 +91,8 @@ int main(int argc, char **argv)
     }
     if (!strcmp(kind, "--mapped")) {
         struct spl_dataset *plain = make_dataset_levels(splats, (size_t)(side * side), 2);
-        const struct make_map map = {.row = mapped_row(station, 0, map_side, SPL_MAP_LEVELS_MAX, map_side), .look = look};
+        const struct make_map map = {.row = mapped_row(station, 0, map_side, SPL_MAP_LEVELS_MAX, map_side),
+                                     .look = look};
         for (int i = 2; i < argc; i++)
             write_mapped_alike(plain, &map, 1, true, argv[i]);
         spl_dataset_close(plain);

@@ -1,6 +1,7 @@
 /* Preloaded into a daemon: until the file that SLOW_DISK_GATE names is there, a dataset's file cannot be opened, and no
- * file gets a name that ends in SLOW_DISK_NAME; while the one that SLOW_DISK_READS names is there, only as many reads end
- * as the number in it says; as on a disk that is slow or a share that does not answer. Names of hosts that end in .slow take 30 s. */
+ * file gets a name that ends in SLOW_DISK_NAME; while the one that SLOW_DISK_READS names is there, only as many reads
+ * end as the number in it says; as on a disk that is slow or a share that does not answer. Names of hosts that end in
+ * .slow take 30 s. */
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -61,8 +62,8 @@ __attribute__((visibility("default"))) ssize_t pread(int fd, void *out, size_t b
     return (ssize_t)syscall(SYS_pread64, fd, out, bytes, offset);
 }
 
-__attribute__((visibility("default"))) int getaddrinfo(const char *name, const char *service, const struct addrinfo *hints,
-                                                       struct addrinfo **out)
+__attribute__((visibility("default"))) int getaddrinfo(const char *name, const char *service,
+                                                       const struct addrinfo *hints, struct addrinfo **out)
 {
     typedef int function(const char *, const char *, const struct addrinfo *, struct addrinfo **);
     function *next;

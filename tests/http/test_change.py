@@ -91,6 +91,10 @@ def test_what_curl_makes_of_a_file_and_a_slash():
         for body in (b"ply\nformat ascii 1.0\n" + 200 * b" ", b"LASF" + 300 * b"\0", b"1 2 3\n" * 99):
             said = put(d, "scan", body).json()["detail"]
             assert "'splatd pack SCAN -o NAME.spld'" in said and said.endswith("then PUT that file"), said
+            assert put(d, "my-collection", body).json()["detail"].endswith("then PUT that file")  # whatever it is called
+        for body in (WALL_1[:-100], WALL_1[:40], WALL_1[:4] + WALL_1[5:], WALL_1[:8] + b"\7" + WALL_1[9:], b""):
+            reply = put(d, "hall", body)
+            assert reply.status == 422 and "pack the scan" not in reply.json()["detail"], reply.body
 
 
 def pieces(body, size, pause=0.0):

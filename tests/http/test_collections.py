@@ -159,6 +159,7 @@ def test_a_collection_is_not_uploaded():
         with Daemon(REAL, "--tokens", str(tokens), datasets=[folder / "city"]) as d:
             reply = d.ask("/v1/datasets/town", "PUT", body, {"Authorization": "Bearer 0123456789abcdef0123456789abcdef"})
             assert reply.status == 422 and "files beside it" in reply.json()["detail"], reply.body
+            assert "pack the scan" not in reply.json()["detail"], reply.body
             assert not (folder / "city/town.spld").exists()
 
 

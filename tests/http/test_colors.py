@@ -64,7 +64,7 @@ def test_what_is_wrong_is_named():
                                    ("color_by=", "color_by", "empty"), ("color_by=class&color_by=height", "color_by", "color_by"),
                                    ("color_by=height&ramp=jet", "ramp", "jet"),
                                    ("color_by=height&range=5", "range", "5"), ("color_by=plane:0,0,0,0,0,1&range=q0..q1", "range", "quantiles"),
-                                   ("color_by=class&range=2..1", "range", "2..1"),
+                                   ("color_by=class&range=2..1", "range", "2..1"), ("color_by=height&range=-1e308..1e308", "range", "wider"),
                                    ("color_by=" + "x" * 500, "color_by", "")]:
             reply = d.ask(f"{VIEW}?{query}")
             problem = reply.json()

@@ -39,7 +39,8 @@ for command in commands:
 for words, wanted in {
     "serve": r"NAME\.spld.*: splatd serve \S+\.spld", "pack": r"one scan: splatd pack \S+ -o \S+\.spld",
     "pack a.ply": r"-o NAME\.spld", "collect": r"one dataset: splatd collect \S+ -o \S+\.spld", "collect a.spld": r"-o NAME\.spld",
-    "collect a.spld -o b.ply": r"-o NAME\.spld, not 'b\.ply'", "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
+    "collect a.spld -o b.ply": r"-o NAME\.spld, not 'b\.ply'", "collect a.spld -o -": r"-o NAME\.spld, not '-'",
+    "render": r"one dataset: splatd render \S+ -o \S+", "render a.spld": "-o OUT",
     "render a.spld b.spld -o c.png": "takes one dataset", "tour": r"one dataset: splatd tour \S+ --path \S+ -o \S+",
     "tour a.spld -o b.mp4": "--path FILE", "tour a.spld --path b.json": r"-o OUT\.mp4",
     "info": r"one dataset: splatd info \S+\.spld", "synth": r"one SCENE: splatd synth \S+ -o \S+", "synth courtyard": "-o DIR",

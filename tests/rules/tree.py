@@ -1,5 +1,5 @@
 """The rules of the source tree that a compiler does not hold: which room includes which, who may see an outside API, how
-long a file may be, nothing left open. CONTRIBUTING.md has the reasons.
+long a file and a line may be, nothing left open. CONTRIBUTING.md has the reasons.
 
 usage: tree.py ROOT       prints each violation as FILE:LINE: what, exit 1 if there are any
        tree.py --self-test plants every kind of violation and checks that it is found
@@ -18,6 +18,7 @@ OUTSIDE = [(re.compile(r"^(vulkan|GL|GLES\d?|EGL|KHR)/"), "gpu"), (re.compile(r"
 # A public header includes public headers and these.
 PLAIN_C = {"stdbool.h", "stddef.h", "stdint.h", "stdio.h", "math.h"}
 LONGEST = 800
+COLUMNS = 120  # but of tables (.def), whose rows are one line each
 # A method's name stands in its own file, in the table, beside its kernels, in documents and in tests; everyone else asks the
 # table, the page and scripts that are shipped among them.
 METHODS = pathlib.PurePath("include/splatd/method.h")
@@ -134,6 +135,8 @@ def violations(root):
         if source and len(lines) > LONGEST:
             yield f"{relative}:{LONGEST + 1}: longer than {LONGEST} lines; split it"
         for number, line in enumerate(lines, 1):
+            if source and path.suffix != ".def" and len(line) > COLUMNS:
+                yield f"{relative}:{number}: {len(line)} columns, more than {COLUMNS}"
             if code and OPEN_ENDS.search(line):
                 yield f"{relative}:{number}: left open: {line.strip()}"
             found = INCLUDE.match(line) if source else None
@@ -155,6 +158,8 @@ PLANTED = {  # file: (content, the start of what must be said; None = nothing)
     "src/attic/new.c": ('#include "base/error.h"\n', "unknown room attic"),
     "include/splatd/deep.h": ('#include "base/error.h"\n', "a public header includes base/error.h"),
     "shaders/long.comp": ("// line\n" * (LONGEST + 1), "longer than"),
+    "tests/unit/wide.c": ("// " + "\u00e9" * (COLUMNS - 3) + "\n// " + "e" * (COLUMNS - 2) + "\n", f"{COLUMNS + 1} columns"),
+    "src/service/wide.def": ("// " + "e" * COLUMNS + "\n", None),
     "tests/unit/later.c": ("/* TODO: test this */\n", "left open"),
     "include/splatd/method.h": ("#define SPL_METHODS(METHOD) \\\n    METHOD(DOTS, dots) \\\n    METHOD(FOG, fog)\n",
                                 "method fog has no file"),

@@ -1,7 +1,7 @@
-/* What stations' maps may be: taken from another place than they say, in another light, while somebody stood there, from
- * near and from far, one or a hundred; and what is hard to see in them: poles, steps in depth, wires before the sky, what
- * lies at the station itself. Each view is drawn with the splats' own colours and with maps. Maps may lose what their
- * panoramas are wrong by, but no more: each row says how much at most. */
+/* What stations' maps may be: taken from another place than they say, in another light, while somebody stood there,
+ * from near and from far, one or a hundred; and what is hard to see in them: poles, steps in depth, wires before the
+ * sky, what lies at the station itself. Each view is drawn with the splats' own colours and with maps. Maps may lose
+ * what their panoramas are wrong by, but no more: each row says how much at most. */
 #include "conditions.h"
 
 #include <math.h>
@@ -76,7 +76,8 @@ static void contents(struct conditions *c, const struct survey *all)
 
 static void from_scans_alone(struct conditions *c, const struct survey *all)
 {
-    static const struct sight sights[] = {{"masonry, lod 1", "masonry", 1, 1.5}, {"masonry, lod 4", "masonry", 4, 0.25}};
+    static const struct sight sights[] = {{"masonry, lod 1", "masonry", 1, 1.5},
+                                          {"masonry, lod 4", "masonry", 4, 0.25}};
     struct survey survey = {.blind = true};
     if (!wants(c, "maps: from the scans alone", false))
         return;
@@ -84,8 +85,8 @@ static void from_scans_alone(struct conditions *c, const struct survey *all)
     measure_with(c, &survey, "maps: from the scans alone", sights, 2, false);
 }
 
-/* Poses that are off, to the left and to the right in turn. Lines at a wrong place cost the more the sharper they are, so
- * what may be lost is that of lines that are as sharp as the panorama. */
+/* Poses that are off, to the left and to the right in turn. Lines at a wrong place cost the more the sharper they are,
+ * so what may be lost is that of lines that are as sharp as the panorama. */
 static void misplaced(struct conditions *c, const struct survey *all)
 {
     static const struct {
@@ -179,8 +180,8 @@ static void stations(struct conditions *c, const struct survey *all, const struc
         return;
     survey.step = 6;
     for (int i = 0; i < SURVEY_STATIONS_MAX; i++)
-        survey_add(&survey, yard, (double[3]){-2.2 + 0.44 * (i % 10), -3.4 + 0.34 * (i / 10), 1.5 + 0.02 * (i % 7)}, NULL,
-                   256);
+        survey_add(&survey, yard, (double[3]){-2.2 + 0.44 * (i % 10), -3.4 + 0.34 * (i / 10), 1.5 + 0.02 * (i % 7)},
+                   NULL, 256);
     measure_with(c, &survey, "maps: stations", &hundred, 1, true);
 }
 

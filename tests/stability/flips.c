@@ -1,8 +1,9 @@
 /* Around soft spheres no order flips. The truth is the model that has no order, densities that add, in doubles
  * (soft_rays.h): of a turn in steps of a degree no pixel of an image may change by more, beside what the truth changes
- * there, than the truth's own largest step. Spheres are dense, of random places and of two colours that differ as far as
- * colours do, so that whatever comes first is seen. What the plant does is what the paper does: six orders, one along each
- * axis, of which the one nearest to the view's direction is taken; it flips in the middle between two axes. */
+ * there, than the truth's own largest step. Spheres are dense, of random places and of two colours that differ as far
+ * as colours do, so that whatever comes first is seen. What the plant does is what the paper does: six orders, one
+ * along each axis, of which the one nearest to the view's direction is taken; it flips in the middle between two
+ * axes. */
 #include "themes.h"
 
 #include <math.h>
@@ -75,7 +76,8 @@ static struct spl_view look(const struct world *world, struct ball balls[SPHERES
     view.layers = 1u << SPL_LAYER_COLOR;
     view.lod = 0;
     view.background[3] = 255;
-    view.soft = (struct spl_soft_params){.what.count = 1, .model = SPL_SOFT_MODEL_EXPRESS, .opacity = opacity, .cover = 1};
+    view.soft =
+        (struct spl_soft_params){.what.count = 1, .model = SPL_SOFT_MODEL_EXPRESS, .opacity = opacity, .cover = 1};
     view.soft.what.terms[0] = (struct spl_term){
         .measure = SPL_TERM_PLANE, .least = -100, .most = INFINITY, .shape = {0, 0, 0, 0, 0, 1}};
     return view;

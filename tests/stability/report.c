@@ -20,7 +20,8 @@ static const struct known {
     {"finer-is-better", "density", NULL, "splat", -1, BLUR},
     {"finer-is-better", "powerline", "from-above", "splat", -1.2, BLUR},
     {"finer-is-better", "thin-walls", "wedge", "splat", -1.5, BLUR},
-    {"lies-on-the-truth", "interior", "from-the-sofa", "splat", 0.12, "not found yet; 0.110 pixels, in the whole form alone"},
+    {"lies-on-the-truth", "interior", "from-the-sofa", "splat", 0.12,
+     "not found yet; 0.110 pixels, in the whole form alone"},
 };
 enum { known_count = sizeof known / sizeof *known };
 

@@ -249,7 +249,12 @@ static void narrower_than_a_pixel(struct suite *suite)
         double first = 0;
         for (int size = 8; size >= 1; size /= 2) {
             struct spl_view view = look(&world, (enum spl_soft_model)model, 0.3);
-            struct place place = {world.name, size == 8 ? "1/1" : size == 4 ? "1/2" : size == 2 ? "1/4" : "1/8", models[model], NULL};
+            struct place place = {world.name,
+                                  size == 8   ? "1/1"
+                                  : size == 4 ? "1/2"
+                                  : size == 2 ? "1/4"
+                                              : "1/8",
+                                  models[model], NULL};
             struct spl_frame frame;
             spl_camera_scale(&view.camera, size / 2.0, size / 2.0);
             view.camera.width = WIDTH * (uint32_t)size / 2;
@@ -298,8 +303,8 @@ static void rings(struct suite *suite)
     }
 }
 
-/* A sheet, what lies to the right of its middle soft. With eq. 22 it fades to the right; without, it is cut: the largest
- * change of a column to the next is less than half. */
+/* A sheet, what lies to the right of its middle soft. With eq. 22 it fades to the right; without, it is cut: the
+ * largest change of a column to the next is less than half. */
 static void borders(struct suite *suite)
 {
     enum { side = 60 };

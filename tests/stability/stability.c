@@ -6,7 +6,8 @@
  *                                               way: all of it, or the conditions that begin so, or all the others
  *   stability conditions [NAME…] [--method METHOD] --update [--whole]   writes the table's rows anew, those of these
  *                                               conditions and of the method; read it before it is committed
- *   stability plant half-pixel|margin-0|pop|no-trim|six-axes     a planted fault: exits 0 only where the check meant for it
+ *   stability plant half-pixel|margin-0|pop|no-trim|six-axes     a planted fault: exits 0 only where the check meant
+ * for it
  *                                               catches it
  *
  * The small form is what tests/run.sh runs; --whole takes every view of every scene and larger sizes; --verbose

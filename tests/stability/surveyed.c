@@ -105,7 +105,7 @@ void world_init_yard(struct world *world)
     survey_finish(&survey);
 }
 
-/* ---------------------------------------------------------------------------------------------------------- stations */
+/* --------------------------------------------------------------------------------------------------------- stations */
 
 /* What of a surface's light reaches the eye, in levels. */
 static uint8_t lit(const double *sun, const double normal[3], uint8_t level)
@@ -154,7 +154,7 @@ void survey_finish(struct survey *survey)
     survey->count = 0;
 }
 
-/* ----------------------------------------------------------------------------------------------------------- packing */
+/* ---------------------------------------------------------------------------------------------------------- packing */
 
 /* A grid of rays, column by column, from below. */
 static void write_scan(FILE *file, const struct survey_station *station, double step_degrees)
@@ -203,8 +203,8 @@ static void write_panoramas(const struct survey *survey, const char *folder)
         fprintf(list,
                 "%s\n{\"name\": \"station-%zu\", \"color\": \"%zu.png\", \"width\": %u, \"height\": %u, \"position\": "
                 "[%.17g, %.17g, %.17g], \"rotation\": [1, 0, 0, 0, 1, 0, 0, 0, 1]}",
-                i ? "," : "", i + 1, i, s->panorama.width, s->panorama.height, s->position[0] + s->off[0], s->position[1] + s->off[1],
-                s->position[2] + s->off[2]);
+                i ? "," : "", i + 1, i, s->panorama.width, s->panorama.height, s->position[0] + s->off[0],
+                s->position[1] + s->off[1], s->position[2] + s->off[2]);
     }
     fprintf(list, "]}\n");
     must(fclose(list), &(struct spl_error){.message = "panoramas.json cannot be written"});

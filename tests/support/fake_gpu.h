@@ -1,4 +1,5 @@
-/* A device of host memory behind the front of the GPU layer, for tests of who uses that: it counts, and fails on demand. */
+/* A device of host memory behind the front of the GPU layer, for tests of who uses that: it counts, and fails on
+ * demand. */
 #ifndef TEST_SUPPORT_FAKE_GPU_H
 #define TEST_SUPPORT_FAKE_GPU_H
 

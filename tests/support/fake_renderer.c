@@ -1,11 +1,12 @@
 /* A renderer without a device, linked in place of the real one where tests are about the service: frames of a flat
- * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS and FAKE_SOFT_MS (see frame_ns()), in steps of a
- * tile like the real one's, which those of soft models base and concentric end early where that is asked for; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open,
- * no room for frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it
- * takes to put them on the device, and FAKE_HANG_MS that the first frame
- * ignores its deadline for, as a hanging driver does; FAKE_LOSE_LOADING pages of one dataset in which the device is lost;
- * FAKE_LOSE_FRAME that every frame begun meanwhile loses it, FAKE_REFUSE datasets that have no room; device "other" is of another kind.
- * TSan sees all of it, which it cannot with a driver that compiles its own code. */
+ * colour that take as long as FAKE_FRAME_MS says and, by setting and size, FAKE_MPX_MS and FAKE_SOFT_MS (see
+ * frame_ns()), in steps of a tile like the real one's, which those of soft models base and concentric end early where
+ * that is asked for; losses on demand, failures to open after FAKE_OPEN_LIMIT times, FAKE_OPEN_MS to open, no room for
+ * frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it takes
+ * to put them on the device, and FAKE_HANG_MS that the first frame ignores its deadline for, as a hanging driver does;
+ * FAKE_LOSE_LOADING pages of one dataset in which the device is lost; FAKE_LOSE_FRAME, while which every frame loses
+ * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. TSan sees all of it, which it
+ * cannot with a driver that compiles its own code. */
 #include <splatd/render.h>
 
 #include <stdlib.h>
@@ -189,8 +190,10 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
     struct spl_frame_steps *steps = *out = spl_alloc(1, sizeof *steps, err);
     if (!steps)
         return SPL_E_NOMEM;
-    *steps = (struct spl_frame_steps){.renderer = renderer, .view = *view, .left = spl_view_get_samples(view),
-                                       .there_ns = spl_now_ns() + (uint64_t)setting("FAKE_PAGES_MS", 0) * SPL_NS_PER_MS};
+    *steps = (struct spl_frame_steps){.renderer = renderer,
+                                      .view = *view,
+                                      .left = spl_view_get_samples(view),
+                                      .there_ns = spl_now_ns() + (uint64_t)setting("FAKE_PAGES_MS", 0) * SPL_NS_PER_MS};
     return 0;
 }
 

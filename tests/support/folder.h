@@ -1,5 +1,5 @@
-/* A folder for the files of a test program: two fixtures of its group, and names in it. Anything that goes wrong ends the
- * program. */
+/* A folder for the files of a test program: two fixtures of its group, and names in it. Anything that goes wrong ends
+ * the program. */
 #ifndef TEST_SUPPORT_FOLDER_H
 #define TEST_SUPPORT_FOLDER_H
 

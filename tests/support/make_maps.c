@@ -31,8 +31,8 @@ struct make_maps make_maps(const struct spl_dataset *dataset, uint32_t count, ui
                                     .near = 0.5f + (float)i,
                                     .slack = 0.01f * (float)i};
         for (int a = 0; a < 3; a++)
-            row->position[a] = info->bounds_min[a] +
-                               hash(seed, 10 * i + (uint32_t)a) / 4294967296.0 * (info->bounds_max[a] - info->bounds_min[a]);
+            row->position[a] = info->bounds_min[a] + hash(seed, 10 * i + (uint32_t)a) / 4294967296.0 *
+                                                         (info->bounds_max[a] - info->bounds_min[a]);
         spl_assert(!spl_map_judge(row));
         maps.words[i] = malloc(spl_map_words(row) * sizeof *maps.words[i]);
         for (size_t w = 0; w < spl_map_words(row); w++)

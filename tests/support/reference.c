@@ -150,7 +150,8 @@ static void sample_texture(const struct scene *s, const struct disc *d, const fl
 {
     const struct spl_dictionary *dictionary = spl_dataset_get_dictionary(s->dataset);
     int size = (int)dictionary->size, side = SPL_TEXTURE_SIDE_MIN;
-    float diameter = 2 * d->radius / d->texture_scale * (float)s->camera.fx / ray_scale(&s->camera, d->p[2]), u[3], v[3], uv[3], vv[3];
+    float diameter = 2 * d->radius / d->texture_scale * (float)s->camera.fx / ray_scale(&s->camera, d->p[2]), u[3],
+          v[3], uv[3], vv[3];
     while (side < size && (float)side <= diameter)
         side *= 2;
     spl_tangent_frame(d->world, u, v);

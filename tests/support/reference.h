@@ -1,6 +1,6 @@
 /* A plain C renderer that gives the same images from the same container as the GPU: one thread, one loop, wide sums.
- * It shares the CPU decode and the joining of wires with the product, and nothing of the frame: what is drawn, how large
- * and how heavy is chosen by naive_select.h. */
+ * It shares the CPU decode and the joining of wires with the product, and nothing of the frame: what is drawn, how
+ * large and how heavy is chosen by naive_select.h. */
 #ifndef TEST_SUPPORT_REFERENCE_H
 #define TEST_SUPPORT_REFERENCE_H
 

@@ -107,7 +107,8 @@ static bool block(const struct filter *f, const struct cell *c, float z, int dx,
 {
     float angle = (f->parallel ? 1 : c->w) * c->spacing * f->radius, kernel = (float)f->plan->kernel;
     float squared = (float)(dx * dx + dy * dy);
-    float reach = constant ? kernel : fminf(angle * f->reach, kernel), nearer = (f->parallel ? z - 1 / c->w : z * c->w - 1) - f->margin * angle;
+    float reach = constant ? kernel : fminf(angle * f->reach, kernel),
+          nearer = (f->parallel ? z - 1 / c->w : z * c->w - 1) - f->margin * angle;
     if (c->w <= 0 || nearer <= 0)
         return false;
     if (squared > 0 && squared <= reach * reach) {

@@ -1,6 +1,6 @@
-/* Lines with a width; see reference_lines.h. Written from the comments of shaders/common/capsule.glsl: a piece covers what
- * lies within half its width of its picture, a sample in all at least, round at its ends; the inverse depth goes evenly
- * from end to end. Every sample of the image is asked, so no bound of the kernels' walk is shared. */
+/* Lines with a width; see reference_lines.h. Written from the comments of shaders/common/capsule.glsl: a piece covers
+ * what lies within half its width of its picture, a sample in all at least, round at its ends; the inverse depth goes
+ * evenly from end to end. Every sample of the image is asked, so no bound of the kernels' walk is shared. */
 #include "support/reference_lines.h"
 
 #include <math.h>

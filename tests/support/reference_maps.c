@@ -1,5 +1,5 @@
-/* See reference_maps.h. Written from the comments of shaders/map.comp and shaders/common/trim.glsl; floats where kernels
- * use floats. */
+/* See reference_maps.h. Written from the comments of shaders/map.comp and shaders/common/trim.glsl; floats where
+ * kernels use floats. */
 #include "support/reference_maps.h"
 
 #include <math.h>

@@ -13,7 +13,8 @@ static double depth_of(const struct spl_frame_params *params, const struct soft_
                              (y + (double)params->tile_y + 0.5 - (double)params->cy) / (double)params->fy};
     const double length = sqrt(slope[0] * slope[0] + slope[1] * slope[1] + 1), z = (double)item->z;
     const double r = fmax((double)item->radius, (double)params->low_pass * z / (double)params->fx);
-    const double left = (double)item->radius * (double)item->radius / (r * r), a = left < 1 ? spl_soft_thin(soft->opacity) : 1;
+    const double left = (double)item->radius * (double)item->radius / (r * r),
+                 a = left < 1 ? spl_soft_thin(soft->opacity) : 1;
     const double off[2] = {(double)item->x - slope[0] * z, (double)item->y - slope[1] * z};
     const double along = (off[0] * slope[0] + off[1] * slope[1]) / length;
     const double delta = sqrt(fmax(off[0] * off[0] + off[1] * off[1] - along * along, 0)) / r;
@@ -26,9 +27,10 @@ static double depth_of(const struct spl_frame_params *params, const struct soft_
                             fmin(fmax((until * length - middle) / r, -edge), edge), edge};
     double parts[3];
     for (int i = 0; i < 3; i++)
-        parts[i] = soft->model == SPL_SOFT_MODEL_BASE
-                       ? spl_soft_base_part(delta, ends[i])
-                       : spl_soft_concentric_part(spl_soft_shells((double)params->fx * r / fmax(z, 1e-9)), delta, ends[i]);
+        parts[i] =
+            soft->model == SPL_SOFT_MODEL_BASE
+                ? spl_soft_base_part(delta, ends[i])
+                : spl_soft_concentric_part(spl_soft_shells((double)params->fx * r / fmax(z, 1e-9)), delta, ends[i]);
     double whole = 2 * depth * parts[2], share = (parts[1] - parts[0]) / fmax(2 * parts[2], 1e-12);
     const double thinned = left * (a + (1 - a) * left);
     if (soft->blend > 0 && item->mark < SPL_MARK_WHOLE) {

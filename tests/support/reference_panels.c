@@ -166,12 +166,13 @@ static void smooth(const struct drawn *d, const float at[2], uint8_t color[3])
         color[c] = (uint8_t)(between[c] + 0.5f);
 }
 
-static void put(const struct drawn *d, int64_t x, int64_t y, float z, float tilt, const float *middle, const float at[2],
-                void (*each)(void *, const struct reference_fragment *), void *context)
+static void put(const struct drawn *d, int64_t x, int64_t y, float z, float tilt, const float *middle,
+                const float at[2], void (*each)(void *, const struct reference_fragment *), void *context)
 {
     const struct spl_camera *camera = d->plane->camera;
     const int cell[2] = {(int)clamped(at[0], 0, side - 0.5f), (int)clamped(at[1], 0, side - 0.5f)};
-    struct reference_fragment f = {.x = x, .y = y, .z = z, .slant = slant_of(tilt), .light = middle, .middle = middle, .id = d->id};
+    struct reference_fragment f = {
+        .x = x, .y = y, .z = z, .slant = slant_of(tilt), .light = middle, .middle = middle, .id = d->id};
     f.behind = is_parallel(d->plane) ? d->normal[2] > 0 : d->offset > 0;
     memcpy(f.normal, d->normal, sizeof f.normal);
     if (x < 0 || y < 0 || x >= camera->width || y >= camera->height || !(d->panel.cells[cell[1]] >> cell[0] & 1) ||
@@ -182,7 +183,8 @@ static void put(const struct drawn *d, int64_t x, int64_t y, float z, float tilt
     each(context, &f);
 }
 
-/* The depth at which the ray through r (sample - principal point) meets the plane; *tilt: one over its normal along it. */
+/* The depth at which the ray through r (sample - principal point) meets the plane; *tilt: one over its normal along
+ * it. */
 static float meet(const struct drawn *d, const float r[2], float *tilt)
 {
     bool parallel = is_parallel(d->plane);
@@ -323,7 +325,8 @@ static void show_piece(const struct drawn *d, float corner, const float rise[2],
         for (int i = 0; i < 3; i++)
             p[i] += height * d->plane->n[i];
         project(d->plane, p, place);
-        float z = middle_depth(d, p, place), tilt = is_parallel(d->plane) ? 1 / d->normal[2] : z / fmaxf(fabsf(d->offset), 1e-30f);
+        float z = middle_depth(d, p, place),
+              tilt = is_parallel(d->plane) ? 1 / d->normal[2] : z / fmaxf(fabsf(d->offset), 1e-30f);
         if (p[2] > 0 && place[0] >= 0 && place[1] >= 0)
             put(d, (int64_t)place[0], (int64_t)place[1], z, tilt, p, at, each, context);
     }

@@ -1,5 +1,5 @@
-/* The reference renderer's images: samples become pixels; see reference.h. Written from the comments of resolve.comp and
- * map.comp. */
+/* The reference renderer's images: samples become pixels; see reference.h. Written from the comments of resolve.comp
+ * and map.comp. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -78,7 +78,8 @@ static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
         return (uint64_t)(at->mapped[c] + 0.5f);
     if (sums(s))
         return (at->color[c] + at->weight / 2) / at->weight;
-    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c) + 0.5f) : at->payload >> 8 * c & 255;
+    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c) + 0.5f)
+                                                 : at->payload >> 8 * c & 255;
 }
 
 /* Method nearest keeps how far a depth was bent as a share of it, a float of four bits behind its first. */

@@ -86,8 +86,8 @@ static inline void view_point(const struct scene *s, int64_t x, int64_t y, float
     p[2] = z;
 }
 
-/* reference_resolve.c: adds the colours of every station's map, of which each chunk must be seen; a pixel of every image
- * that `frame` has. */
+/* reference_resolve.c: adds the colours of every station's map, of which each chunk must be seen; a pixel of every
+ * image that `frame` has. */
 void reference_add_maps(struct scene *s);
 void reference_resolve_pixel(const struct scene *s, uint32_t x, uint32_t y, struct spl_frame *frame);
 

@@ -1,6 +1,6 @@
 /* What tests leave to the builds without sanitisers. ThreadSanitizer takes ten times as long and looks only for what
- * threads share, AddressSanitizer three times, for what a small input does to memory as much as a large one. A test that
- * does less under AddressSanitizer is named in `shortened` of tests/meson.build. */
+ * threads share, AddressSanitizer three times, for what a small input does to memory as much as a large one. A test
+ * that does less under AddressSanitizer is named in `shortened` of tests/meson.build. */
 #ifndef TEST_SUPPORT_SANITISED_H
 #define TEST_SUPPORT_SANITISED_H
 

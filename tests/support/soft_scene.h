@@ -1,5 +1,5 @@
-/* What a dataset's view draws as soft spheres, for the reference of soft_rays.h: written from headers and docs, apart from
- * the product's selection. */
+/* What a dataset's view draws as soft spheres, for the reference of soft_rays.h: written from headers and docs, apart
+ * from the product's selection. */
 #ifndef TEST_SUPPORT_SOFT_SCENE_H
 #define TEST_SUPPORT_SOFT_SCENE_H
 
@@ -12,7 +12,8 @@
 #include "support/soft_rays.h"
 
 /* Every splat that the view draws at its lod, as a sphere in view space, by depth and of equal depths by id. Those of
- * class `solid` are left out; -1 = none are. So are those whose centres lie before the near plane, as splats do. The caller's to free(). Panels and lines must not be there. */
+ * class `solid` are left out; -1 = none are. So are those whose centres lie before the near plane, as splats do. The
+ * caller's to free(). Panels and lines must not be there. */
 struct soft_sphere *soft_spheres_of(const struct spl_dataset *dataset, const struct spl_view *view, int solid,
                                     size_t *count);
 

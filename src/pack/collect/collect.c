@@ -49,13 +49,26 @@ static int read_tiles(struct spl_collect *c, struct spl_error *err)
     int rc = SPL_OK;
     spl_stage_begin(c->stage, "reading tiles", "tiles", c->count);
     for (size_t i = 0; !rc && i < c->count; i++) {
-        rc = spl_collect_read(c, &c->tiles[i], err);
+        struct spl_collect_tile *tile = &c->tiles[i];
+        rc = spl_collect_read(c, tile, err);
+        if (rc == 1) {
+            free(tile->path);
+            tile->path = NULL;
+        }
         spl_stage_add(c->stage, 1, 0);
-        if (!rc)
+        if (rc >= 0)
             rc = spl_stage_check(c->stage, err);
     }
     spl_stage_end(c->stage);
-    return rc ? rc : check_copies(c, err);
+    if (rc)
+        return rc;
+    size_t kept = 0;
+    for (size_t i = 0; i < c->count; i++)
+        if (c->tiles[i].path)
+            c->tiles[kept++] = c->tiles[i];
+    c->count = kept;
+    return kept ? check_copies(c, err)
+                : spl_fail_field(err, SPL_E_NOT_FOUND, "inputs", "no tile is among them, but collections alone");
 }
 
 /* From here on the nodes of tiles are leaves, with what was clustered for them. */

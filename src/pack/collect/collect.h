@@ -19,6 +19,7 @@
 struct spl_collect_tile {
     char *path;       // owned
     const char *name; /* of `path`: the file's, in its folder */
+    bool in_folder;   /* it was not named itself, so it may be left out */
     uint64_t version;
     double origin[3], bounds[2][3]; /* of the root's cube; least and most of its points */
     float size;
@@ -60,12 +61,13 @@ struct spl_collect {
 /* Fills the tiles' names from the options, sorted by name, none twice, all in the output's folder (find.c). */
 int spl_collect_find(struct spl_collect *c, struct spl_error *err);
 
-/* Takes the attributes of the first tile, or holds those of another against them (streams.c). Only names that the packer
- * writes, in its order, can be written again. */
+/* Takes the attributes of the first tile, or holds those of another against them (streams.c). Only names that the
+ * packer writes, in its order, can be written again. */
 int spl_collect_take_streams(struct spl_collect *c, const struct spl_dataset *dataset, const char *name,
                              struct spl_error *err);
 
-/* Opens the tile, holds it against the first, and adds its root's splats to the points (read.c). */
+/* Opens the tile, holds it against the first, and adds its root's splats to the points (read.c). 1: it is a collection
+ * in a folder, and no tile; that is told. */
 int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struct spl_error *err);
 
 #define SPL_COLLECT_MOST 1e15 /* of coordinates and lengths, as of a node's */

@@ -1,5 +1,6 @@
 /* Which tiles are meant: files, folders with all datasets in them, lists with a path a line. A collection names its
- * tiles by their file names, so all of them lie in one folder with it. The caller's thread; one descriptor at a time. */
+ * tiles by their file names, so all of them lie in one folder with it. The caller's thread; one descriptor at a
+ * time. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -21,7 +22,7 @@ static bool is_dataset(const char *name)
 }
 
 /* Takes ownership of `path`, which may be NULL: then there was no memory for it. */
-static int add(struct spl_collect *c, char *path, struct spl_error *err)
+static int add(struct spl_collect *c, char *path, bool in_folder, struct spl_error *err)
 {
     if (path && !spl_array_reserve(c->tiles, c->capacity, c->count + 1, err)) {
         if (c->count == SPL_COLLECT_TILES_MAX) {
@@ -31,7 +32,8 @@ static int add(struct spl_collect *c, char *path, struct spl_error *err)
                                   "fewer",
                                   SPL_COLLECT_TILES_MAX);
         }
-        c->tiles[c->count++] = (struct spl_collect_tile){.path = path, .name = spl_input_name(path)};
+        c->tiles[c->count++] = (struct spl_collect_tile){
+            .path = path, .name = spl_input_name(path), .in_folder = in_folder};
         return SPL_OK;
     }
     free(path);
@@ -53,7 +55,7 @@ static int add_folder(struct spl_collect *c, const char *path, struct spl_error 
             continue;
         if (asprintf(&inner, "%s%s%s", path, slash, item->d_name) < 0)
             inner = NULL;
-        rc = add(c, inner, err);
+        rc = add(c, inner, true, err);
     }
     if (!rc && errno)
         rc = spl_fail_errno(err, errno, "%.300s: this folder cannot be read to its end", path);
@@ -67,7 +69,8 @@ static int add_folder(struct spl_collect *c, const char *path, struct spl_error 
 static int add_path(struct spl_collect *c, const char *path, struct spl_error *err)
 {
     struct stat status;
-    return !stat(path, &status) && S_ISDIR(status.st_mode) ? add_folder(c, path, err) : add(c, strdup(path), err);
+    return !stat(path, &status) && S_ISDIR(status.st_mode) ? add_folder(c, path, err)
+                                                           : add(c, strdup(path), false, err);
 }
 
 static int add_list(struct spl_collect *c, const char *name, struct spl_error *err)
@@ -134,7 +137,10 @@ static int check_tile(const struct spl_collect *c, const struct spl_collect_tile
                               "there, or move the tile",
                               tile->path, output);
     if (!strcmp(tile->name, spl_input_name(output)))
-        return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s is an input too; choose another name", output);
+        return spl_fail_field(err, SPL_E_USAGE, "output",
+                              "%.300s is an input too; choose another name, or name the folder, which stands for all "
+                              "tiles in it",
+                              output);
     json_t *name = json_string(tile->name);
     json_decref(name);
     return name ? SPL_OK

@@ -52,7 +52,8 @@ int spl_collect_take_lines(struct spl_collect *c, const struct spl_chunk *chunk,
             v[i].color_class |= (uint32_t)splat.color[a] << 8 * a;
         }
         if (!(splat.radius > 0 && (double)splat.radius <= SPL_COLLECT_MOST))
-            return spl_fail(err, SPL_E_CORRUPT, "a vertex of a line in a tile's root has radius %g; pack the tile again",
+            return spl_fail(err, SPL_E_CORRUPT,
+                            "a vertex of a line in a tile's root has radius %g; pack the tile again",
                             (double)splat.radius);
     }
     measure(v, chunk->count);

@@ -8,12 +8,8 @@
 #include "pack/collect/collect.h"
 
 /* What no collection has, whatever the other tiles are. */
-static int check(const struct spl_collect_tile *tile, const struct spl_dataset_info *info, const json_t *meta,
-                 struct spl_error *err)
+static int check(const struct spl_collect_tile *tile, const struct spl_dataset_info *info, struct spl_error *err)
 {
-    if (json_object_get(meta, "tiles"))
-        return spl_fail_field(err, SPL_E_INPUT, "inputs",
-                              "%.200s: it is a collection itself (\"tiles\"); name its tiles instead", tile->path);
     if (info->atoms)
         return spl_fail_field(err, SPL_E_INPUT, "inputs",
                               "%.200s: it has textures (%u atoms), which a collection has not; pack it with "
@@ -128,16 +124,34 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
     return NULL;
 }
 
+/* A collection is no tile, whether it can be opened or not: left out of a folder, refused where it was named itself. */
+static int refuse_collection(const struct spl_collect *c, const struct spl_collect_tile *tile, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = spl_fail_field(tile->in_folder ? &why : err, SPL_E_INPUT, "inputs",
+                            "%.200s: it is a collection itself (\"tiles\")%s", tile->path,
+                            tile->in_folder ? ", and no tile" : "; name its tiles instead");
+    if (tile->in_folder && c->options->left_out)
+        c->options->left_out(c->options->progress_context, &why);
+    return tile->in_folder ? 1 : rc;
+}
+
 int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struct spl_error *err)
 {
-    const struct spl_dataset_opening how = {.tables_bytes = 1, .cancelled = c->stage->cancelled};
+    enum spl_file_kind kind = SPL_FILE_OTHER;
+    const struct spl_dataset_opening how = {.tables_bytes = 1, .cancelled = c->stage->cancelled, .kind = &kind};
     struct spl_dataset *dataset = NULL;
-    int rc = spl_dataset_open_as(tile->path, &how, &dataset, err);
+    struct spl_error why = {0};
+    int rc = spl_dataset_open_as(tile->path, &how, &dataset, &why);
+    if (kind == SPL_FILE_COLLECTION && rc != SPL_E_CANCELLED) {
+        spl_dataset_close(dataset);
+        return refuse_collection(c, tile, err);
+    }
     if (rc)
-        return rc;
+        return spl_fail_field(err, rc, why.field, "%s", why.message);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const json_t *meta = spl_dataset_get_meta(dataset);
-    rc = check(tile, info, meta, err);
+    rc = check(tile, info, err);
     if (!rc && !c->first)
         take_first(c, info, meta);
     else if (!rc)

@@ -96,7 +96,8 @@ static int add(struct spl_collect *c, const struct spl_collect_tile *tile, const
 
 /* The cells of a chunk's panels, each the disc that it stands for. */
 static int add_cells(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_node *root,
-                     const struct spl_chunk *chunk, const uint32_t *page, const struct values *values, struct spl_error *err)
+                     const struct spl_chunk *chunk, const uint32_t *page, const struct values *values,
+                     struct spl_error *err)
 {
     struct spl_panel_frame frame;
     int rc = reserve(c, (size_t)chunk->count * SPL_PANEL_SIDE * SPL_PANEL_SIDE, err);
@@ -122,7 +123,8 @@ static int add_cells(struct spl_collect *c, const struct spl_collect_tile *tile,
 static int take_chunk(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_dataset *dataset,
                       const struct spl_tables *tables, uint32_t index, struct spl_error *err)
 {
-    uint32_t page[SPL_CHUNK_WORDS_MAX + SPL_STREAMS_MAX * SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS]; /* of it the chunk */
+    /* of it the chunk */
+    uint32_t page[SPL_CHUNK_WORDS_MAX + SPL_STREAMS_MAX * SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
     struct spl_chunk own = tables->chunks[index], *chunk = &own;
     const struct spl_node *root = tables->nodes;
     struct values values;

@@ -107,12 +107,12 @@ int spl_collect_take_streams(struct spl_collect *c, const struct spl_dataset *da
         if (to->scalar < 0 || to->scalar >= SPL_POINT_SCALARS)
             continue;
         struct spl_scalar_values *scalar = &p->scalar[to->scalar];
-        *scalar = (struct spl_scalar_values){
-            .storage = SPL_STORE_F64,
-            .votes = to->scalar == SPL_SCALAR_RETURN || to->scalar == SPL_SCALAR_RETURNS || to->scalar == SPL_SCALAR_SCAN,
-            .plain = !steps,
-            .first = to->first,
-            .steps_a_unit = steps ? to->steps_a_unit : 1};
+        *scalar = (struct spl_scalar_values){.storage = SPL_STORE_F64,
+                                             .votes = to->scalar == SPL_SCALAR_RETURN ||
+                                                      to->scalar == SPL_SCALAR_RETURNS || to->scalar == SPL_SCALAR_SCAN,
+                                             .plain = !steps,
+                                             .first = to->first,
+                                             .steps_a_unit = steps ? to->steps_a_unit : 1};
         probe.scalar[to->scalar] = *scalar;
         probe.scalar[to->scalar].values = &probe; /* there are some */
     }

@@ -1,5 +1,6 @@
-/* How the values of attributes, and heights, are distributed over all tiles' leaves, from what each tile says of its own:
- * kinds by their counts, else every interval between two quantiles as so many values in its middle. The caller's thread. */
+/* How the values of attributes, and heights, are distributed over all tiles' leaves, from what each tile says of its
+ * own: kinds by their counts, else every interval between two quantiles as so many values in its middle. The caller's
+ * thread. */
 #include "dataset/values.h"
 #include "pack/collect/collect.h"
 

@@ -65,7 +65,7 @@ struct spl_catalog_entry {
     _Atomic uint64_t limit_bytes;    /* about the memory limit that holds all of it; 0 = not known, or it has no maps */
 
     struct spl_replica replicas[SPL_DEVICES_MAX];
-    unsigned replicas_left;     // owned by: loop, until the last unref; which are still to be loaded, or to be let go of
+    unsigned replicas_left;     // owned by: loop, until the last unref; that are to be loaded, or to be let go of
     unsigned home;              // owned by: loop; number of the device that draws it where none has less to do
     enum spl_entry_state state; // owned by: loop
     struct spl_error err;       // owned by: loop

@@ -152,19 +152,23 @@ int spl_incoming_check(struct spl_incoming *incoming, const char *target, const 
 {
     if (fsync(incoming->fd))
         return fail(incoming, err, "sync");
+    enum spl_file_kind kind = SPL_FILE_OTHER;
+    struct spl_dataset_opening opening = *how;
+    opening.kind = &kind;
     struct spl_error why = {0};
-    int rc = spl_catalog_entry_open(incoming->path, target, how, entry, &why);
-    if (!rc && (*entry)->info->tiles) { // nor may who uploads one see what lies beside it by naming it
+    int rc = spl_catalog_entry_open(incoming->path, target, &opening, entry, &why);
+    if (!rc && kind == SPL_FILE_COLLECTION) { // nor may who uploads one see what lies beside it by naming it
         spl_catalog_entry_destroy(*entry);
         *entry = NULL;
-        rc = spl_fail(&why, SPL_E_INPUT, "a collection is made of files beside it, which no upload brings along: upload its "
-                                         "tiles, and let splatd collect make it where they lie");
+        rc = spl_fail(&why, SPL_E_INPUT,
+                      "a collection is made of files beside it, which no upload brings along: upload its tiles, and "
+                      "let splatd collect make it where they lie");
     }
     if (!rc)
         return 0;
     char message[sizeof why.message];
     spl_catalog_hide_folder(message, sizeof message, why.message, incoming->path);
-    bool unpacked = rc == SPL_E_INPUT && incoming->bytes && !strstr(message, "collection");
+    bool unpacked = rc == SPL_E_INPUT && kind == SPL_FILE_OTHER && incoming->bytes;
     const char *advice = unpacked ? ": pack the scan first, then PUT that file" : "";
     spl_incoming_abort(incoming);
     return spl_fail(err, rc, "%s%s", message, advice);

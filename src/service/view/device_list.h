@@ -12,9 +12,9 @@ struct spl_device_list {
     size_t count;
 };
 
-/* `text`: such names joined by commas, the same one again for a device that is to be used twice; or "all", which is every
- * usable GPU of the backend that has most of them. SPL_E_USAGE and SPL_E_NO_DEVICE, field "device". On failure nothing is
- * held. */
+/* `text`: such names joined by commas, the same one again for a device that is to be used twice; or "all", which is
+ * every usable GPU of the backend that has most of them. SPL_E_USAGE and SPL_E_NO_DEVICE, field "device". On failure
+ * nothing is held. */
 int spl_device_list_init(struct spl_device_list *list, const char *text, struct spl_error *err);
 void spl_device_list_finish(struct spl_device_list *list);
 

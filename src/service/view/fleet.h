@@ -1,9 +1,9 @@
 /* The devices that serve: a pipeline each, side by side, and in front of them one of everything that the loop asks.
  *
- * A view goes to the device that has the least to do, and where that is none to its dataset's home, so that idle
- * devices keep each their own datasets' pages. They are of one kind, so the bytes are those of any of them. A dataset is
+ * A view goes to the device that has the least to do, and of those alike to its dataset's home, so that idle devices
+ * keep each their own datasets' pages. They are of one kind, so the bytes are those of any of them. A dataset is
  * resident on each that has room for it; a device that is lost, or gone for good, leaves the others serving. All calls
- * are the loop thread's unless they say otherwise, and none of them blocks but create() and destroy(). */
+ * are the loop thread's unless they say otherwise, and none of them blocks but destroy(). */
 #ifndef SPL_SERVICE_FLEET_H
 #define SPL_SERVICE_FLEET_H
 
@@ -12,9 +12,10 @@
 struct spl_fleet;
 
 struct spl_fleet_options {
-    struct spl_pipeline_options pipeline; /* of all devices together: `queue`, `encoders`, samples and bytes are shared out;
-                                           * `number`, the renderer's device and sharers are set here */
-    const char *devices;                  /* as spl_renderer_options.device, several joined by commas; or "all" */
+    /* Of all devices together: `queue`, `encoders`, samples and bytes are shared out; `number`, `of`, the renderer's
+     * device and sharers are set here. */
+    struct spl_pipeline_options pipeline;
+    const char *devices; /* as spl_renderer_options.device, several joined by commas; or "all" */
 };
 
 /* Starts a pipeline for each device. Entries of the options: the caller's references. SPL_E_NO_DEVICE, field "device",

@@ -8,7 +8,7 @@
  *
  * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
  * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and
- * drop() send their replicas to the gpu thread, take_change() brings them back. Devices are a fleet of these (fleet.h). */
+ * drop() send their replicas to the gpu thread, take_change() brings them back. Several are a fleet (fleet.h). */
 #ifndef SPL_SERVICE_PIPELINE_H
 #define SPL_SERVICE_PIPELINE_H
 

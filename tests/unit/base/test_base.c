@@ -35,8 +35,8 @@ static void every_code_has_a_row(void **state)
 static void bytes_have_suffixes_and_no_overflow(void **state)
 {
     (void)state;
-    static const char *const refused[] = {"", "G", "-1", " 1", "+1", "1 ", "1X", "1GB", "1k", "1.5G", "0x10", "16777216T",
-                                          "18446744073709551616"};
+    static const char *const refused[] = {
+        "", "G", "-1", " 1", "+1", "1 ", "1X", "1GB", "1k", "1.5G", "0x10", "16777216T", "18446744073709551616"};
     uint64_t bytes = 0;
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
         assert_false(spl_bytes_from_text(refused[i], 1, &bytes));

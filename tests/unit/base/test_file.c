@@ -93,7 +93,8 @@ static void a_failure_leaves_what_was_there(void **state)
     assert_int_equal(errno, ENOENT);
 }
 
-/* What a writer that was killed left goes with the next sweep; what one that lives holds, and what is no writer's, stays. */
+/* What a writer that was killed left goes with the next sweep; what one that lives holds, and what is no writer's,
+ * stays. */
 static void what_killed_writers_left_is_swept(void **state)
 {
     (void)state;

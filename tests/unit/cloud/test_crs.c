@@ -50,12 +50,11 @@ static void wkt_is_read(void **state)
         {UTM("", "\"US survey foot\"", ",1.0"), "wkt | us-ft | unknown"},
         {UTM("", "\"Foot\"", ",1"), "wkt | ft | unknown"},
         {UTM("", "\"metre\"", ""), "wkt | unknown | unknown"},
-        {"COMPD_CS[\"C\"," UTM(",AUTHORITY[\"EPSG\",\"2992\"]", "\"foot\"",
-                               ",0.3048") "," HEIGHT("\"US survey foot\",0.304800609601219",
-                                                     ",AUTHORITY[\"EPSG\",\"6360\"]") "]",
+        {"COMPD_CS[\"C\"," UTM(",AUTHORITY[\"EPSG\",\"2992\"]", "\"foot\"", ",0.3048") "," HEIGHT(
+             "\"US survey foot\",0.304800609601219", ",AUTHORITY[\"EPSG\",\"6360\"]") "]",
          "EPSG:2992+EPSG:6360 | ft | us-ft"},
-        {"COMPD_CS[\"C\"," UTM(",AUTHORITY[\"EPSG\",\"25832\"]", "\"metre\"", ",1") "," HEIGHT(
-             "\"metre\",1", "") ",AUTHORITY[\"EPSG\",\"5555\"]]",
+        {"COMPD_CS[\"C\"," UTM(",AUTHORITY[\"EPSG\",\"25832\"]", "\"metre\"",
+                               ",1") "," HEIGHT("\"metre\",1", "") ",AUTHORITY[\"EPSG\",\"5555\"]]",
          "EPSG:25832 | m | m"},
         {"COMPD_CS[\"C\"," UTM("", "\"metre\"", ",1") "," HEIGHT("\"metre\",1", "") ",AUTHORITY[\"EPSG\",\"5555\"]]",
          "EPSG:5555 | m | m"},
@@ -94,7 +93,8 @@ static void wkt_is_read(void **state)
          "wkt | angles | ft"},
         /* the first of two counts */
         {"PROJCS[\"P\",UNIT[\"metre\",1]],PROJCS[\"Q\",UNIT[\"foot\",0.3048]]", "wkt | m | unknown"},
-        {"COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"metres\",1.0]]], VERT_CS[\"V\", UNIT [ \"metres\", 1 ] ] ]", "wkt | m | m"},
+        {"COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"metres\",1.0]]], VERT_CS[\"V\", UNIT [ \"metres\", 1 ] ] ]",
+         "wkt | m | m"},
         {"PROJCS[\"say \"\"hi\"\"\",GEOGCS[],UNIT[\"metre\",1,]]", NULL},
         {"PROJCS[\"say \"\"hi\"\"\",GEOGCS[],UNIT[\"metre\",1]]", "wkt | m | unknown"},
     };
@@ -203,7 +203,8 @@ static void keys_are_read(void **state)
         {{.entries = {{1024, 0, 1, 2}, {2048, 0, 1, 32767}}}, "- | angles | unknown", ""},
         {{.entries = {{1024, 0, 1, 3}, {2048, 0, 1, 4978}}}, "EPSG:4978 | m | unknown", ""},
         /* a system of its own: that of the base is not taken for it */
-        {{.entries = {{1024, 0, 1, 1}, {1026, 34737, 5, 3}, {2048, 0, 1, 4269}, {3072, 0, 1, 32767}, {3076, 0, 1, 9002}},
+        {{.entries = {{1024, 0, 1, 1}, {1026, 34737, 5, 3}, {2048, 0, 1, 4269}, {3072, 0, 1, 32767},
+                      {3076, 0, 1, 9002}},
           .text = "ab|site|"},
          "- | ft | unknown", "site"},
         {{.entries = {{3072, 0, 1, 32767}, {3076, 0, 1, 32767}, {3077, 34736, 1, 3}}, .doubles = {0, 0, 0, 0.201168}},
@@ -283,11 +284,11 @@ static void numbers_say_units(void **state)
     static const struct {
         uint32_t epsg;
         double metres; /* -1: angles */
-    } rows[] = {{25832, 1},     {28992, 1},  {2154, 1},   {3857, 1},      {2222, 0.3048}, {2223, 0.3048}, {2992, 0.3048},
-                {2993, 1},      {2994, 0.3048}, {2991, 1}, {2276, 1200.0 / 3937}, {2278, 1200.0 / 3937}, {2263, 1200.0 / 3937},
-                {32617, 1},     {32667, 1200.0 / 3937}, {32058, 1200.0 / 3937}, {4326, -1}, {4269, -1}, {4978, 1}, {4979, -1},
-                {7415, 1},      {5703, 1},   {6360, 1200.0 / 3937}, {8228, 0.3048}, {29371, 1.0000135965},
-                {2314, 0.3047972654}, {900913, 1}, {32767, 0}, {0, 0}, {1999, 0}};
+    } rows[] = {{25832, 1}, {28992, 1}, {2154, 1}, {3857, 1}, {2222, 0.3048}, {2223, 0.3048}, {2992, 0.3048},
+                {2993, 1}, {2994, 0.3048}, {2991, 1}, {2276, 1200.0 / 3937}, {2278, 1200.0 / 3937},
+                {2263, 1200.0 / 3937}, {32617, 1}, {32667, 1200.0 / 3937}, {32058, 1200.0 / 3937}, {4326, -1},
+                {4269, -1}, {4978, 1}, {4979, -1}, {7415, 1}, {5703, 1}, {6360, 1200.0 / 3937}, {8228, 0.3048},
+                {29371, 1.0000135965}, {2314, 0.3047972654}, {900913, 1}, {32767, 0}, {0, 0}, {1999, 0}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         bool angles;
         double metres = spl_crs_get_unit(rows[i].epsg, &angles);

@@ -145,15 +145,18 @@ static void lists_of_views(void **state)
         {VIEW("\"width\": 1e308, " LOOK), NULL, NULL, "a.json", "width", "1e+308"},
         {FRAME(LEAST, ""), NULL, NULL, "a.json", "w", "-9.22337e+18"},
         {FRAME(HALF, ""), NULL, NULL, "a.json", "w", "4.61169e+18"},
-        {NULL, "1 PINHOLE " LEAST " 480 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "WIDTH", "-9.22337e+18"},
-        {NULL, "1 PINHOLE 640 " HALF " 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "HEIGHT", "4.61169e+18"},
+        {NULL, "1 PINHOLE " LEAST " 480 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "WIDTH",
+         "-9.22337e+18"},
+        {NULL, "1 PINHOLE 640 " HALF " 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "HEIGHT",
+         "4.61169e+18"},
         {NULL, "1 PINHOLE 640 480 500 1e999 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "PARAMS", "1e999"},
         {NULL, "1 PINHOLE nan 480 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "WIDTH", "nan"},
         {NULL, LEAST " PINHOLE 640 480 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "CAMERA_ID", LEAST},
         {NULL, PAST " PINHOLE 640 480 500 510 3 2\n", "1 " POSE " 1 a.jpg\n\n", "cameras.txt", "CAMERA_ID", PAST},
         {NULL, "1 PINHOLE 640 480 500 510 3 2\n", "1 " POSE " " PAST " a.jpg\n\n", "images.txt", "CAMERA_ID", PAST},
         {NULL, "1 PINHOLE 640 480 500 510 3 2\n", "1 1 0 0 nan 1 2 3 1 a.jpg\n\n", "images.txt", "QUATERNION", "nan"},
-        {NULL, "1 PINHOLE 640 480 500 510 3 2\n", "1 1 0 0 0 1 1e999 3 1 a.jpg\n\n", "images.txt", "TRANSLATION", "1e999"},
+        {NULL, "1 PINHOLE 640 480 500 510 3 2\n", "1 1 0 0 0 1 1e999 3 1 a.jpg\n\n", "images.txt", "TRANSLATION",
+         "1e999"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -189,14 +189,16 @@ static void test_times_and_order(void **state)
 static void test_paths_all_around(void **state)
 {
     (void)state;
-#define AROUND(projection)                                                                                                      \
-    "{\"keyframes\":[{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,5],\"projection\":\"" projection "\"}},"                       \
+#define AROUND(projection)                                                                                             \
+    "{\"keyframes\":[{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,5],\"projection\":\"" projection "\"}},"             \
     "{\"camera\":{\"eye\":[4,0,0],\"target\":[4,9,0],\"projection\":\"" projection "\"}}]}"
     static const struct {
         const char *text;
         uint32_t width, height, wanted[2];
-    } rows[] = {{AROUND("equirectangular"), 1440, 720, {0}}, {AROUND("cube"), 1920, 320, {0}}, {AROUND("fisheye"), 720, 720, {0}},
-                {AROUND("equirectangular"), 256, 128, {256}}, {AROUND("cube"), 198, 33, {0, 33}}, {AROUND("fisheye"), 90, 90, {0, 90}},
+    } rows[] = {{AROUND("equirectangular"), 1440, 720, {0}}, {AROUND("cube"), 1920, 320, {0}},
+                {AROUND("fisheye"), 720, 720, {0}},
+                {AROUND("equirectangular"), 256, 128, {256}}, {AROUND("cube"), 198, 33, {0, 33}},
+                {AROUND("fisheye"), 90, 90, {0, 90}},
                 {"{\"camera_type\":\"equirectangular\",\"render_width\":512,\"render_height\":256,\"camera_path\":["
                  "{\"camera_to_world\":" MATRIX ",\"fov\":60},{\"camera_to_world\":" MATRIX "}]}", 512, 256, {0}}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -266,8 +268,11 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[],\"fps\":1e-300}", "fps"},
         {"{\"keyframes\":[],\"closed\":1}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"), "keyframes[1].camera.projection"},
-        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"model\":\"SIMPLE_RADIAL\",\"params\":[900,640,360,0.1]}}"), "keyframes[1].camera.params"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"),
+         "keyframes[1].camera.projection"},
+        {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"model\":\"SIMPLE_RADIAL\",\"params\":[900,640,360,0.1]}"
+             "}"),
+         "keyframes[1].camera.params"},
         {OWN("{\"camera\":{\"gltf\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"perspective\":{\"yfov\":1,"
              "\"znear\":1,\"aspectRatio\":1}}}}"),
          "keyframes[1].camera.gltf.perspective.aspectRatio"},

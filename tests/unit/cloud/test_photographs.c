@@ -139,8 +139,9 @@ static void binary_means_what_text_means(void **state)
     remove(in_folder("cameras.bin"));
     folder_put_text("cameras.txt", "7 PINHOLE 640 480 500 510 331.25 228.5\n"
                             "9 OPENCV 640 480 500 510 331.25 228.5 -0.2 0.05 0.001 -0.002\n");
-    folder_put_text("images.txt", "17 -0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "
-                           "-0.06410832213881687 0.16613728300474614 4.6401280721795111 9 east/a.jpg\n\n");
+    folder_put_text("images.txt",
+                    "17 -0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "
+                    "-0.06410832213881687 0.16613728300474614 4.6401280721795111 9 east/a.jpg\n\n");
     if (load(&text, test_folder, NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(binary.count, 1);

@@ -83,6 +83,32 @@ static void columns_are_recognised_by_their_values(void **state)
     assert_int_equal(l.attributes, SPL_CLOUD_NORMAL);
     assert_true(l.first.normal[0][1] == -1 && l.first.normal[1][0] == 0.6f);
     loaded_finish(&l);
+    load_text("1 2 3 0 0 1\n4 5 6 0 0 1\n7 8 9 1 0 0\n", NULL, &l); /* a floor, and a wall */
+    assert_int_equal(l.attributes, SPL_CLOUD_NORMAL);
+    assert_true(l.first.normal[1][2] == 1 && l.first.normal[2][0] == 1);
+    loaded_finish(&l);
+    load_text("1 2 3 0.0 0.0 1.0\n4 5 6 0.006 0.0 -0.995\n", NULL, &l); /* rounded */
+    assert_int_equal(l.attributes, SPL_CLOUD_NORMAL);
+    loaded_finish(&l);
+    static const char *const dark[] = {"1 2 3 0 0 1\n4 5 6 0 0 0\n", "1 2 3 0 0 1\n4 5 6 0 1 1\n",
+                                       "1 2 3 0 0 1\n4 5 6 0 0 2\n"}; /* near black */
+    for (size_t i = 0; i < 3; i++) {
+        load_text(dark[i], NULL, &l);
+        assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+        loaded_finish(&l);
+    }
+    load_text("1 2 3 0.6 0.8 0\n4 5 6 0.5 0.5 0.5\n", NULL, &l); /* a colour of length 1 by chance */
+    assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+    assert_color(&l, 0, 153, 204, 0);
+    loaded_finish(&l);
+    load_text("1 2 3 7 0 0 1\n4 5 6 9 0 0 1\n", NULL, &l); /* behind an intensity */
+    assert_true(l.attributes & SPL_CLOUD_NORMAL);
+    loaded_finish(&l);
+    load_text("1 2 3 255 0 0 1 0 0\n4 5 6 255 0 0 1 0 0\n", NULL, &l); /* and behind one colour */
+    assert_int_equal(l.attributes, SPL_CLOUD_NORMAL | SPL_CLOUD_COLOR);
+    assert_color(&l, 1, 255, 0, 0);
+    assert_true(l.first.normal[1][0] == 1);
+    loaded_finish(&l);
     load_text("1 2 3 10 20 30 0 0 1\n1 2 3 40 50 60 0 0.6 -0.8\n", NULL, &l);
     assert_int_equal(l.attributes, SPL_CLOUD_NORMAL | SPL_CLOUD_COLOR);
     assert_color(&l, 1, 40, 50, 60);
@@ -116,9 +142,12 @@ static void surveyors_names_are_coordinates(void **state)
     load_text("# easting northing elevation\n1 2 3\n", NULL, &l);
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
-    static const char *const german[] = {"Punkt;Rechtswert;Hochwert;H\xc3\xb6he\nP1;1;2;3\n", "RECHTSWERT,HOCHWERT,H\xc3\x96HE\n1,2,3\n",
-                                         "Hoehe Rechtswert Hochwert\n3 1 2\n", "Ostwert,Nordwert,h\xf6he\n1,2,3\n",
-                                         "X_,Y_,Z_\n1,2,3\n", "z_coord,y_coord,x_coord\n3,2,1\n"};
+    static const char *const german[] = {"Punkt;Rechtswert;Hochwert;H\xc3\xb6he\nP1;1;2;3\n",
+                                         "RECHTSWERT,HOCHWERT,H\xc3\x96HE\n1,2,3\n",
+                                         "Hoehe Rechtswert Hochwert\n3 1 2\n",
+                                         "Ostwert,Nordwert,h\xf6he\n1,2,3\n",
+                                         "X_,Y_,Z_\n1,2,3\n",
+                                         "z_coord,y_coord,x_coord\n3,2,1\n"};
     for (size_t i = 0; i < sizeof german / sizeof *german; i++) {
         load_text(german[i], NULL, &l);
         assert_point(&l, 0, 1, 2, 3);

@@ -98,6 +98,22 @@ static void test_json(void **state)
     json_decref(json);
 }
 
+static void test_columns_by_their_values(void **state)
+{
+    char output[16384];
+    (void)state;
+    write_text("floor.xyz", "1 2 0 0 0 1\n3 4 0 0 0 1\n");
+    json_t *json = json_of("floor.xyz");
+    assert_true(is(json, "columns_by_values", "\"x,y,z,nx,ny,nz\"") && is(json, "attributes", "[\"normal\"]"));
+    json_decref(json);
+    assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "\n  columns       x,y,z,nx,ny,nz by the values\n"));
+    write_text("floor.xyz", "x y z r g b\n1 2 0 0 0 1\n3 4 0 0 0 1\n");
+    json = json_of("floor.xyz");
+    assert_true(is(json, "columns_by_values", "null") && is(json, "attributes", "[\"color\"]"));
+    json_decref(json);
+}
+
 static void test_headers_that_lie(void **state)
 {
     char output[16384];
@@ -228,10 +244,13 @@ static void test_panoramas(void **state)
 {
     char output[16384];
     (void)state;
-    assert_int_equal(run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
-                     0);
+    assert_int_equal(
+        run("synth courtyard --points 2000 --panoramas 256 --samples 1 -o yard >/dev/null 2>&1", output, sizeof output),
+        0);
     json_t *json = json_of("yard/courtyard.ply"), *pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0,\"places\":0,\"map_bytes\":86688}]"));
+    assert_true(
+        is(pack, "panoramas",
+           "[{\"path\":\"yard/panoramas\",\"panoramas\":4,\"photographs\":0,\"places\":0,\"map_bytes\":86688}]"));
     assert_true(is(pack, "warnings", "[]"));
     assert_true(json_integer_value(json_object_get(pack, "dataset_bytes")) ==
                 86688 + 10 * json_integer_value(json_object_get(json, "points")));
@@ -247,7 +266,8 @@ static void test_panoramas(void **state)
     write_text("yard/panoramas/panoramas.json", "{\"panoramas\": 7}");
     json = json_of("yard/second.ply");
     pack = json_object_get(json, "pack");
-    assert_true(is(pack, "panoramas", "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0,\"places\":0,\"map_bytes\":0}]"));
+    assert_true(is(pack, "panoramas",
+                   "[{\"path\":\"yard/panoramas\",\"panoramas\":0,\"photographs\":0,\"places\":0,\"map_bytes\":0}]"));
     assert_int_equal(json_array_size(json_object_get(pack, "warnings")), 1);
     json_decref(json);
     assert_int_equal(run("info yard/second.ply", output, sizeof output), 0);
@@ -262,7 +282,8 @@ static void test_panoramas(void **state)
                      86688 / 4); /* of a place nobody knows it */
     json_decref(json);
     assert_int_equal(run("info yard/second.ply", output, sizeof output), 0);
-    assert_non_null(strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
+    assert_non_null(
+        strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
 }
 
 static int make_folder(void **state)
@@ -284,6 +305,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_json),    cmocka_unit_test(test_headers_that_lie), cmocka_unit_test(test_several),
         cmocka_unit_test(test_options), cmocka_unit_test(test_images),
+        cmocka_unit_test(test_columns_by_their_values),
         cmocka_unit_test(test_metres_beside_feet), cmocka_unit_test(test_panoramas),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -402,7 +402,8 @@ static void test_splats_by_id(void **state)
     enum { count = 1000 };
     struct make_splat *splats = some_splats(count);
     struct spl_dataset *dataset = make_dataset_levels(splats, count, 1); // ids are indices
-    int class = spl_dataset_find_stream(dataset, "class"), uncertainty = spl_dataset_find_stream(dataset, "uncertainty");
+    int class = spl_dataset_find_stream(dataset, "class"),
+        uncertainty = spl_dataset_find_stream(dataset, "uncertainty");
     struct spl_splat splat;
     double value;
     assert_true(class >= 0 && uncertainty >= 0 && spl_dataset_find_stream(dataset, "intensity") < 0);

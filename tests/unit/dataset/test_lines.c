@@ -44,7 +44,8 @@ static void make(struct made *m, uint32_t count, uint32_t length)
                                 .linear = i + 1 < count && i % length != length - 1};
         memcpy(m->position[i], (double[3]){x, 2 + 0.01 * noise(i), 0.01 * x * x}, sizeof m->position[i]);
     }
-    m->used = spl_chunk_encode(m->vertices, (const double(*)[3])m->position, count, &options, &m->chunk, m->words, NULL);
+    m->used =
+        spl_chunk_encode(m->vertices, (const double(*)[3])m->position, count, &options, &m->chunk, m->words, NULL);
 }
 
 static void vertices_come_back(void **state)

@@ -189,7 +189,8 @@ static void what_cannot_be_written_leaves_nothing(void **state)
         maps.asked = 0;
         maps.rows[3] = maps.rows[0];
         free(maps.words[3]);
-        maps.words[3] = memcpy(malloc(4 * spl_map_words(&maps.rows[0])), maps.words[0], 4 * spl_map_words(&maps.rows[0]));
+        maps.words[3] =
+            memcpy(malloc(4 * spl_map_words(&maps.rows[0])), maps.words[0], 4 * spl_map_words(&maps.rows[0]));
         err = (struct spl_error){0};
         spl_memory_fail_after(n);
         int rc = spl_dataset_rewrite(&what, path, &err);

@@ -1,5 +1,5 @@
-/* The page cache: what is read is what was written; what was spoilt is gone; the bound holds, the longest unused go first;
- * a folder is shared, outlives its process, and a disk that takes nothing costs nothing but the cache. */
+/* The page cache: what is read is what was written; what was spoilt is gone; the bound holds, the longest unused go
+ * first; a folder is shared, outlives its process, and a disk that takes nothing costs nothing but the cache. */
 #include <dirent.h>
 #include <fcntl.h>
 #include <setjmp.h>
@@ -169,7 +169,8 @@ static void test_the_bound(void **state)
 {
     (void)state;
     enum { most = 40 * (HEADER + BYTES), count = 300 };
-    struct spl_page_key key = spl_page_key_of("https://h/bound", "\"1\"", 5), cold = spl_page_key_of("https://h/cold", "\"1\"", 5);
+    struct spl_page_key key = spl_page_key_of("https://h/bound", "\"1\"", 5),
+                        cold = spl_page_key_of("https://h/cold", "\"1\"", 5);
     struct spl_page_cache *cache = open_cache(most);
     unsigned files;
     put(cache, key, 0, 1);

@@ -1,6 +1,6 @@
 /* A remote file over a link that does as the test says: its bytes come whole whatever breaks off, what is wrong at its
- * server is an error that says so, a file that changes is never mixed with what it was, and what several ask for at once is
- * asked once. */
+ * server is an error that says so, a file that changes is never mixed with what it was, and what several ask for at
+ * once is asked once. */
 #include <malloc.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -131,7 +131,8 @@ static void stop(struct server *s)
     free(s->bytes);
 }
 
-static int try_open(struct server *s, const struct spl_remote_how *how, struct spl_dataset_source *out, struct spl_error *err)
+static int try_open(struct server *s, const struct spl_remote_how *how, struct spl_dataset_source *out,
+                    struct spl_error *err)
 {
     const struct spl_remote_link link = {.ask = ask, .close = close_link, .context = s};
     return spl_remote_open_link(&link, "https://h/a/hall.spld", how, out, err);
@@ -149,7 +150,8 @@ static struct spl_dataset_source open_with(struct server *s, const struct spl_re
 
 static const struct spl_remote_how patient = {.deadline_ms = 5000}, hasty = {.deadline_ms = 400};
 
-static int read_range(struct spl_dataset_source *source, const struct server *s, uint64_t offset, size_t bytes, struct spl_error *err)
+static int read_range(struct spl_dataset_source *source, const struct server *s, uint64_t offset, size_t bytes,
+                      struct spl_error *err)
 {
     char *out = malloc(bytes + 1);
     out[bytes] = 77;
@@ -254,7 +256,8 @@ static void test_a_server_that_stays_away(void **state)
     assert_non_null(strstr(err.message, "cannot read hall: "));
     const int asks = s.asks; // nobody else is at it
     err = (struct spl_error){0};
-    assert_int_equal(read_range(&source, &s, 2 * BLOCK, 10, &err), SPL_E_TIMEOUT); // nobody waits for it once more so soon
+    // nobody waits for it once more so soon
+    assert_int_equal(read_range(&source, &s, 2 * BLOCK, 10, &err), SPL_E_TIMEOUT);
     assert_true(s.asks == asks && strstr(err.message, "a moment ago"));
     s.failing = 0;
     usleep((unsigned)hasty.deadline_ms * 1000);
@@ -277,8 +280,12 @@ static void test_refusals_are_told_at_once(void **state)
         long status;
         int opening;
         const char *part;
-    } rows[] = {{401, SPL_E_IO, "credentials"}, {403, SPL_E_IO, "credentials"}, {404, SPL_E_NOT_FOUND, "look at the path"},
-                {410, SPL_E_NOT_FOUND, "look at the path"}, {416, SPL_E_INPUT, "empty"}, {307, SPL_E_IO, "AWS_REGION"},
+    } rows[] = {{401, SPL_E_IO, "credentials"},
+                {403, SPL_E_IO, "credentials"},
+                {404, SPL_E_NOT_FOUND, "look at the path"},
+                {410, SPL_E_NOT_FOUND, "look at the path"},
+                {416, SPL_E_INPUT, "empty"},
+                {307, SPL_E_IO, "AWS_REGION"},
                 {200, SPL_E_INPUT, "no byte ranges"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct server s;
@@ -290,7 +297,8 @@ static void test_refusals_are_told_at_once(void **state)
         s.status = rows[i].status;
         s.failing = 1;
         assert_int_equal(try_open(&s, &patient, &source, &err), rows[i].opening);
-        assert_true(strstr(err.message, rows[i].part) && strstr(err.message, status) && strstr(err.message, "https://h/a/"));
+        assert_true(strstr(err.message, rows[i].part) && strstr(err.message, status) &&
+                    strstr(err.message, "https://h/a/"));
         source = open_with(&s, &patient);
         s.failing = 1;
         err = (struct spl_error){0};
@@ -320,7 +328,8 @@ static void test_answers_that_are_none(void **state)
     }
 }
 
-/* Found by the server that was told what is wanted, or by the head of an answer that minds nothing; by length, tag or date. */
+/* Found by the server that was told what is wanted, or by the head of an answer that minds nothing; by length, tag or
+ * date. */
 static void test_a_file_that_changes(void **state)
 {
     (void)state;
@@ -394,7 +403,8 @@ static void test_equal_requests_are_joined(void **state)
         s.failing = fails;
         s.status = 403;
         for (int i = 0; i < readers; i++) { // the first has all that the others want
-            all[i] = (struct reader){.source = &source, .s = &s, .offset = (i ? 10 + i % 4 : 10) * BLOCK, .bytes = i ? 5 : 4 * BLOCK};
+            all[i] = (struct reader){
+                .source = &source, .s = &s, .offset = (i ? 10 + i % 4 : 10) * BLOCK, .bytes = i ? 5 : 4 * BLOCK};
             pthread_create(&all[i].thread, NULL, read_on_thread, &all[i]);
             while (!i && get_asks(&s) < 2)
                 usleep(1000);
@@ -424,7 +434,8 @@ static void test_crowd(void **state)
         s.failing = round % 2;
         s.cutting = 3;
         for (int i = 0; i < readers; i++) {
-            all[i] = (struct reader){.source = &source, .s = &s, .offset = (uint64_t)(round * 5 + i * 2) * BLOCK + 99, .bytes = 3 * BLOCK};
+            all[i] = (struct reader){
+                .source = &source, .s = &s, .offset = (uint64_t)(round * 5 + i * 2) * BLOCK + 99, .bytes = 3 * BLOCK};
             pthread_create(&all[i].thread, NULL, read_on_thread, &all[i]);
         }
         for (int i = 0; i < readers; i++) {
@@ -452,7 +463,8 @@ static void test_cancelling(void **state)
     atomic_bool cancelled = false;
     pthread_t thread;
     start(&s, SMALL);
-    struct spl_dataset_source source = open_with(&s, &(struct spl_remote_how){.deadline_ms = 60000, .cancelled = &cancelled});
+    struct spl_dataset_source source =
+        open_with(&s, &(struct spl_remote_how){.deadline_ms = 60000, .cancelled = &cancelled});
     s.failing = 1000;
     pthread_create(&thread, NULL, cancel_soon, &cancelled);
     uint64_t began_ns = spl_now_ns();
@@ -487,7 +499,8 @@ static void test_the_page_cache(void **state)
         if (round == 2) { // what its reader finds wrong is asked for again
             source.far->forget(source.context, 22 * BLOCK + 5, BLOCK);
             expect_range(&source, &s, 20 * BLOCK, 10 * BLOCK);
-            assert_true(s.asks == asks + 2 && s.asked[asks + 1].first == 22 * BLOCK && s.asked[asks + 1].bytes == 2 * BLOCK);
+            assert_true(s.asks == asks + 2 && s.asked[asks + 1].first == 22 * BLOCK &&
+                        s.asked[asks + 1].bytes == 2 * BLOCK);
         }
         spl_dataset_source_close(&source);
     }
@@ -537,10 +550,12 @@ static void test_bytes_that_are_spoilt(void **state)
         struct spl_dataset *dataset;
         s.flipping = 1;
         s.flipped = kept ? 30 : s.size - 100; // in the header, in what is behind pages
-        struct spl_dataset_source source = open_with(&s, &(struct spl_remote_how){.deadline_ms = 5000, .cache = kept ? cache : NULL});
+        struct spl_dataset_source source =
+            open_with(&s, &(struct spl_remote_how){.deadline_ms = 5000, .cache = kept ? cache : NULL});
         struct spl_error err = {0};
         uint32_t *page;
-        assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld", &how, &dataset, &err), SPL_E_CORRUPT);
+        assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld", &how, &dataset, &err),
+                         SPL_E_CORRUPT);
         source.far->forget(source.context, 0, source.size); // as who opens it by its URL does
         assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld", &how, &dataset, NULL), SPL_OK);
         assert_true(spl_dataset_is_remote(dataset) && !strcmp(spl_dataset_get_info(dataset)->id, "hall"));
@@ -605,7 +620,8 @@ static bool is_same(void *context)
 static void test_a_server_that_claims_exabytes(void **state)
 {
     (void)state;
-    static const struct spl_source_far far = {.fetch = fetch_lie, .expect = hint, .forget = hint, .has_changed = is_same};
+    static const struct spl_source_far far = {
+        .fetch = fetch_lie, .expect = hint, .forget = hint, .has_changed = is_same};
     enum { TABLE, ROWS, ATOM, PDIR, TOO_FAR, COUNT };
     static const struct {
         int code;
@@ -622,20 +638,26 @@ static void test_a_server_that_claims_exabytes(void **state)
         struct spl_file_header *header = &liar->header;
         struct spl_dataset *dataset;
         struct spl_error err = {0};
-        *header = (struct spl_file_header){.version = SPL_FILE_VERSION, .header_bytes = sizeof *header, .file_bytes = size,
-                                           .table_offset = sizeof *header, .section_count = 2};
+        *header = (struct spl_file_header){.version = SPL_FILE_VERSION,
+                                           .header_bytes = sizeof *header,
+                                           .file_bytes = size,
+                                           .table_offset = sizeof *header,
+                                           .section_count = 2};
         memcpy(header->magic, SPL_FILE_MAGIC, sizeof header->magic);
         if (lie == TABLE || lie == ROWS)
             header->section_count = lie == TABLE ? UINT32_MAX : SPL_SECTIONS_MAX;
         liar->sections[0] = (struct spl_section){.type = SPL_SECTION_META, .offset = 256, .bytes = 2};
-        liar->sections[1] = (struct spl_section){.type = lie == ATOM ? SPL_SECTION_ATOMS : SPL_SECTION_DIRECTORY, .offset = 320,
+        liar->sections[1] = (struct spl_section){.type = lie == ATOM ? SPL_SECTION_ATOMS : SPL_SECTION_DIRECTORY,
+                                                 .offset = 320,
                                                  .bytes = size / 2 & ~(uint64_t)63};
         header->table_hash = XXH3_64bits(liar->sections, 2 * sizeof *liar->sections);
         header->header_hash = XXH3_64bits(header, offsetof(struct spl_file_header, header_hash));
         const struct spl_dataset_source source = {.size = size, .context = liar, .far = &far, .owned = true};
         const size_t before = count_held();
-        assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld", &(struct spl_dataset_opening){.tables_bytes = SPL_TABLES_BYTES},
-                                                    &dataset, &err), wanted[lie].code);
+        assert_int_equal(spl_dataset_open_source_as(&source, "https://h/a/hall.spld",
+                                                    &(struct spl_dataset_opening){.tables_bytes = SPL_TABLES_BYTES},
+                                                    &dataset, &err),
+                         wanted[lie].code);
         assert_non_null(strstr(err.message, wanted[lie].message));
         assert_true(!liar->held_most || liar->held_most <= before + wanted[lie].held_most);
         free(liar);

@@ -12,7 +12,8 @@
 #include "dataset/remote_retry.h"
 #include "dataset/remote_url.h"
 
-static const struct spl_s3_account nobody, somebody = {.key_id = "AKIDEXAMPLE", .secret = "wJalrXUtn", .region = "eu-central-1"};
+static const struct spl_s3_account nobody,
+    somebody = {.key_id = "AKIDEXAMPLE", .secret = "wJalrXUtn", .region = "eu-central-1"};
 
 static void expect_url(const char *text, const struct spl_s3_account *account, const char *get, const char *shown,
                        const char *stem)
@@ -35,32 +36,39 @@ static void expect_url(const char *text, const struct spl_s3_account *account, c
 static void test_urls(void **state)
 {
     (void)state;
-    expect_url("https://h.example/a/hall.spld", &nobody, "https://h.example/a/hall.spld", "https://h.example/a/hall.spld", "hall");
-    expect_url("http://u:p@w@h:81/x.y.spld?sig=a/b.c", &nobody, "http://u:p@w@h:81/x.y.spld?sig=a/b.c", "http://h:81/x.y.spld", "x.y");
+    expect_url("https://h.example/a/hall.spld", &nobody, "https://h.example/a/hall.spld",
+               "https://h.example/a/hall.spld", "hall");
+    expect_url("http://u:p@w@h:81/x.y.spld?sig=a/b.c", &nobody, "http://u:p@w@h:81/x.y.spld?sig=a/b.c",
+               "http://h:81/x.y.spld", "x.y");
     expect_url("HTTPS://h/hall.spld", &nobody, "HTTPS://h/hall.spld", "HTTPS://h/hall.spld", "hall");
     expect_url("https://[::1]:8/hall", &nobody, "https://[::1]:8/hall", "https://[::1]:8/hall", "hall");
-    expect_url("s3://b/k/hall.spld", &nobody, "https://s3.us-east-1.amazonaws.com/b/k/hall.spld", "s3://b/k/hall.spld", "hall");
+    expect_url("s3://b/k/hall.spld", &nobody, "https://s3.us-east-1.amazonaws.com/b/k/hall.spld", "s3://b/k/hall.spld",
+               "hall");
     expect_url("s3://b/a b+ü?.spld", &somebody, "https://s3.eu-central-1.amazonaws.com/b/a%20b%2B%C3%BC%3F.spld",
                "s3://b/a b+ü?.spld", "a b+ü?");
     const struct spl_s3_account other = {.endpoint = "http://127.0.0.1:9000/"};
-    expect_url("s3://bucket/hall.spld", &other, "http://127.0.0.1:9000/bucket/hall.spld", "s3://bucket/hall.spld", "hall");
+    expect_url("s3://bucket/hall.spld", &other, "http://127.0.0.1:9000/bucket/hall.spld", "s3://bucket/hall.spld",
+               "hall");
 }
 
 static void test_what_is_no_url(void **state)
 {
     (void)state;
-    static const char *const paths[] = {"hall.spld", "/a/b.spld", "./http:/x", "c://x", "a b://x", "://x", "", "1http://x"};
+    static const char *const paths[] = {"hall.spld", "/a/b.spld", "./http:/x", "c://x",
+                                        "a b://x",   "://x",      "",          "1http://x"};
     for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
         assert_false(spl_remote_is_url(paths[i]));
-    assert_true(spl_remote_is_url("file:///etc/passwd") && spl_remote_is_url("ftp://h/x") && spl_remote_is_url("S3://b/k"));
+    assert_true(spl_remote_is_url("file:///etc/passwd") && spl_remote_is_url("ftp://h/x") &&
+                spl_remote_is_url("S3://b/k"));
 }
 
 static void test_refused(void **state)
 {
     (void)state;
-    static const char *const urls[] = {"file:///etc/passwd", "ftp://h/x.spld", "gopher://h/x", "https:///x.spld", "https://",
-                                       "https://h/a b.spld", "https://h/\xc3\xa4.spld", "https://h/a\n.spld", "https://h/x#y",
-                                       "s3://bucket", "s3://bucket/", "s3:///key", "s3://b@d/key", "http://@h/x", "http://:8/x"};
+    static const char *const urls[] = {"file:///etc/passwd", "ftp://h/x.spld", "gopher://h/x", "https:///x.spld",
+                                       "https://", "https://h/a b.spld", "https://h/\xc3\xa4.spld",
+                                       "https://h/a\n.spld", "https://h/x#y", "s3://bucket", "s3://bucket/",
+                                       "s3:///key", "s3://b@d/key", "http://@h/x", "http://:8/x"};
     for (size_t i = 0; i < sizeof urls / sizeof *urls; i++) {
         struct spl_remote_url url;
         struct spl_error err = {0};
@@ -81,8 +89,9 @@ static void test_refused(void **state)
 static void test_secrets_are_in_no_message(void **state)
 {
     (void)state;
-    static const char *const urls[] = {"ftp://u:HIDDEN@h/x?HIDDEN", "https://u:HIDDEN@h/a b?HIDDEN", "https://u:HIDDEN@h/x?HIDDEN#y",
-                                       "http://u:HID?DEN@h", "https://u:HIDDEN@h/\x01"};
+    static const char *const urls[] = {"ftp://u:HIDDEN@h/x?HIDDEN", "https://u:HIDDEN@h/a b?HIDDEN",
+                                       "https://u:HIDDEN@h/x?HIDDEN#y", "http://u:HID?DEN@h",
+                                       "https://u:HIDDEN@h/\x01"};
     for (size_t i = 0; i < sizeof urls / sizeof *urls; i++) {
         struct spl_remote_url url;
         struct spl_error err = {0};
@@ -101,7 +110,8 @@ static void test_secrets_are_in_no_message(void **state)
 static void test_policy(void **state)
 {
     (void)state;
-    static const long again[] = {408, 429, 500, 502, 503, 504}, never[] = {0, 200, 204, 206 + 1, 301, 307, 400, 401, 403, 404, 410, 416, 501, 505};
+    static const long again[] = {408, 429, 500, 502, 503, 504},
+                      never[] = {0, 200, 204, 206 + 1, 301, 307, 400, 401, 403, 404, 410, 416, 501, 505};
     for (size_t i = 0; i < sizeof again / sizeof *again; i++)
         assert_int_equal(spl_remote_judge(again[i]), SPL_REMOTE_AGAIN);
     for (size_t i = 0; i < sizeof never / sizeof *never; i++) {

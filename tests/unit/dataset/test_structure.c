@@ -197,8 +197,8 @@ FORGE(description_list, json_object_set_new(p->meta, "description", json_array()
 static void set_view(struct parts *p, const char *name, double eye)
 {
     json_object_set_new(p->meta, "views",
-                        json_pack("[{s:s, s:[f, f, f], s:[f, f, f], s:s}]", "name", name, "eye", eye, 0.0, 0.0, "target",
-                                  0.0, 0.0, 0.0, "later", "more"));
+                        json_pack("[{s:s, s:[f, f, f], s:[f, f, f], s:s}]", "name", name, "eye", eye, 0.0, 0.0,
+                                  "target", 0.0, 0.0, 0.0, "later", "more"));
 }
 FORGE(view_right, set_view(p, "door", 1))
 FORGE(view_name, set_view(p, "a/b", 1))

@@ -1,6 +1,6 @@
-/* A file of 10^10 splats that is nowhere: 62 GB on 3699 pages, a full octree of seven levels, whose directory and heads are
- * made as they are read. It opens within what tables may take, having read the root's head alone; a view's walk reads
- * those of the pages that it comes to, and no others. Says how long that takes (RESULTS.md). */
+/* A file of 10^10 splats that is nowhere: 62 GB on 3699 pages, a full octree of seven levels, whose directory and heads
+ * are made as they are read. It opens within what tables may take, having read the root's head alone; a view's walk
+ * reads those of the pages that it comes to, and no others. Says how long that takes (RESULTS.md). */
 #include <malloc.h>
 #include <math.h>
 #include <setjmp.h>
@@ -22,7 +22,8 @@
 #include "render/select.h"
 
 enum { deepest = 6, node_chunks = 300, page_nodes = 81, tables_mib = 64 };
-static const uint64_t node_count = 299593, splats_of_node = (uint64_t)node_chunks * SPL_CHUNK_SPLATS; // (8^7 - 1) / 7 nodes
+// (8^7 - 1) / 7 nodes
+static const uint64_t node_count = 299593, splats_of_node = (uint64_t)node_chunks * SPL_CHUNK_SPLATS;
 static const double side = 4096;
 
 static struct far_away {
@@ -121,13 +122,13 @@ static int make_file(void **state)
     }
     uint64_t leaf_splats = (1ull << 3 * deepest) * splats_of_node, offset = sizeof file.header;
     json_t *meta = json_pack(
-        "{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:[s], s:{s:I, s:i, s:i, "
-        "s:{s:I, s:i, s:i, s:I, s:i, s:i, s:i, s:I}, s:[]}}",
-        "points", (json_int_t)leaf_splats, "leaf_splats", (json_int_t)leaf_splats, "levels", deepest + 1, "splat_radius",
-        1.0, "bounds", "min", 0.0, 0.0, 0.0, "max", side, side, side, "default_view", "eye", -1.0, -1.0, 0.0, "target",
-        side, side, side, "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "sources", "nowhere", "counts",
-        "splats", (json_int_t)(node_count * splats_of_node), "pieces", 0, "linear_chunks", 0, "bits", "position",
-        (json_int_t)(24 * node_count * splats_of_node), "radius", 0, "normal", 0, "color",
+        "{s:I, s:I, s:i, s:f, s:{s:[fff], s:[fff]}, s:{s:[fff], s:[fff], s:[fff], s:f}, s:{s:b}, s:[s], s:{s:I, s:i, "
+        "s:i, s:{s:I, s:i, s:i, s:I, s:i, s:i, s:i, s:I}, s:[]}}",
+        "points", (json_int_t)leaf_splats, "leaf_splats", (json_int_t)leaf_splats, "levels", deepest + 1,
+        "splat_radius", 1.0, "bounds", "min", 0.0, 0.0, 0.0, "max", side, side, side, "default_view", "eye", -1.0, -1.0,
+        0.0, "target", side, side, side, "up", 0.0, 0.0, 1.0, "fov", 50.0, "attributes", "color", 1, "sources",
+        "nowhere", "counts", "splats", (json_int_t)(node_count * splats_of_node), "pieces", 0, "linear_chunks", 0,
+        "bits", "position", (json_int_t)(24 * node_count * splats_of_node), "radius", 0, "normal", 0, "color",
         (json_int_t)(8 * node_count * splats_of_node), "linear", 0, "clip", 0, "lines", 0, "chunk",
         (json_int_t)(480 * node_count * (node_chunks + 1)), "stream_bits");
     assert_non_null(meta);

@@ -485,7 +485,8 @@ static void test_bad_files(void **state)
         spoil_store(&good, path, false);
     }
     struct spoil f = spoil_load(path); /* both missing: heads then have words too many */
-    spoil_find(&f, SPL_SECTION_ATOMS)->type = spoil_find(&f, SPL_SECTION_TEXTURES)->type = SPL_FOURCC('N', 'O', 'N', 'E');
+    spoil_find(&f, SPL_SECTION_ATOMS)->type = spoil_find(&f, SPL_SECTION_TEXTURES)->type =
+        SPL_FOURCC('N', 'O', 'N', 'E');
     spoil_store(&f, path, true);
     spoil_expect(path, "section PDIR: page 0 has another number of nodes or chunks");
     spoil_store(&good, path, false);

@@ -1,6 +1,6 @@
-/* A collection is one dataset from outside: its tiles' pages, nodes, chunks, ids and values are found as those of the tiles
- * themselves are; few tiles are open at a time; one that is not what the collection was made of is refused by name, and so is a
- * META that cannot be. */
+/* A collection is one dataset from outside: its tiles' pages, nodes, chunks, ids and values are found as those of the
+ * tiles themselves are; few tiles are open at a time; one that is not what the collection was made of is refused by
+ * name, and so is a META that cannot be. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,6 +21,7 @@
 #include "dataset/tables.h"
 #include "dataset/tiles.h"
 #include "support/make_dataset.h"
+#include "support/spoil.h"
 
 enum { tile_count = 8, own_splats = 64 };
 
@@ -50,7 +51,8 @@ static void make_tile(unsigned t, uint8_t red)
     struct make_splat *splats = calloc(4000, sizeof *splats);
     splats_of[t] = 300 + 400 * t;
     for (unsigned i = 0; i < splats_of[t]; i++) {
-        splats[i] = (struct make_splat){.normal = {0, 0, 1}, .radius = 0.1f, .color = {red, (uint8_t)i}, .classification = (uint8_t)(t + i % 3)};
+        splats[i] = (struct make_splat){
+            .normal = {0, 0, 1}, .radius = 0.1f, .color = {red, (uint8_t)i}, .classification = (uint8_t)(t + i % 3)};
         for (int a = 0; a < 3; a++)
             splats[i].position[a] = 32.0 * (t >> a & 1) + 4 + 8.0 * (double)((i * (a + 1)) % 97) / 97;
     }
@@ -77,14 +79,14 @@ static json_t *describe(unsigned t)
         uint64_t ids = 0;
         for (uint32_t c = 0; c < tables->chunk_count; c++)
             ids += tables->chunks[c].count;
-        json_array_append_new(pages, json_pack("[iiIi]", (int)tables->node_count, (int)tables->chunk_count, (json_int_t)ids,
-                                               (int)spl_dataset_get_page_bytes(tile, p)));
+        json_array_append_new(pages, json_pack("[iiIi]", (int)tables->node_count, (int)tables->chunk_count,
+                                               (json_int_t)ids, (int)spl_dataset_get_page_bytes(tile, p)));
     }
     json = json_pack("{s:s, s:o, s:i, s:i, s:I, s:I, s:I, s:i, s:i, s:i, s:i, s:i, s:o}", "file", name_of(t), "version",
-                     json_sprintf("%016llx", (unsigned long long)info->version), "node", (int)t + 1, "levels", (int)info->levels,
-                     "points", (json_int_t)info->points, "leaf_splats", (json_int_t)info->leaf_splats, "splats",
-                     (json_int_t)info->splats, "pieces", 0, "panels", 0, "panel_points", 0, "meshes", 0, "mesh_points", 0,
-                     "pages", pages);
+                     json_sprintf("%016llx", (unsigned long long)info->version), "node", (int)t + 1, "levels",
+                     (int)info->levels, "points", (json_int_t)info->points, "leaf_splats",
+                     (json_int_t)info->leaf_splats, "splats", (json_int_t)info->splats, "pieces", 0, "panels", 0,
+                     "panel_points", 0, "meshes", 0, "mesh_points", 0, "pages", pages);
     json_object_set_new(json, "splat_radius", json_real(info->splat_radius));
     spl_dataset_close(tile);
     assert_non_null(json);
@@ -106,6 +108,18 @@ static void make_city(const char *name, const json_t *said)
     make_dataset_file(path_of(name), splats, own_splats, 2);
     make_dataset_meta = NULL;
     json_decref(meta);
+}
+
+/* "forged.spld", which says this of a tile; `value` NULL: nothing. */
+static void forge(size_t tile, const char *key, const char *value)
+{
+    json_t *forged = json_deep_copy(tiles), *entry = json_array_get(forged, tile);
+    if (value)
+        json_object_set_new(entry, key, json_loads(value, JSON_DECODE_ANY, NULL));
+    else
+        json_object_del(entry, key);
+    make_city("forged.spld", forged);
+    json_decref(forged);
 }
 
 static int set_up(void **state)
@@ -163,7 +177,8 @@ static void check_tile(const struct spl_dataset *city, unsigned t, uint32_t *pag
             assert_int_equal(there->nodes[n].depth, own->nodes[n].depth + leaf->depth + 1);
             assert_int_equal(there->nodes[n].page, *page);
             assert_true(there->nodes[n].first_child == own->nodes[n].first_child + first_node);
-            assert_true(there->nodes[n].first_chunk - there->first_chunk == own->nodes[n].first_chunk - own->first_chunk);
+            assert_true(there->nodes[n].first_chunk - there->first_chunk ==
+                        own->nodes[n].first_chunk - own->first_chunk);
         }
         if (!p)
             assert_null(spl_node_judge_child(leaf, &there->nodes[0]));
@@ -189,7 +204,8 @@ static void check_tile(const struct spl_dataset *city, unsigned t, uint32_t *pag
         double origin[2][3], value[2];
         assert_true(spl_dataset_find_splat(tile, i, &a) && spl_dataset_find_splat(city, first_id + i, &b));
         assert_memory_equal(&a, &b, sizeof a);
-        assert_true(spl_dataset_find_value(tile, 0, i, &value[0]) && spl_dataset_find_value(city, 0, first_id + i, &value[1]));
+        assert_true(spl_dataset_find_value(tile, 0, i, &value[0]) &&
+                    spl_dataset_find_value(city, 0, first_id + i, &value[1]));
         assert_true(value[0] == value[1]);
         assert_true(spl_dataset_find_chunk(tile, i, &chunk, origin[0]) &&
                     spl_dataset_find_chunk(city, first_id + i, &chunk, origin[1]));
@@ -255,6 +271,37 @@ static void test_a_tile_that_is_another(void **state)
     spl_dataset_close(later);
 }
 
+/* In place, while it is open and while it is not: its page fails, and is there again with the tile. */
+static void test_a_tile_that_is_damaged(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    const size_t bytes = spl_dataset_get_page_bytes(city, 1);
+    char *page = malloc(bytes), *again = malloc(bytes);
+    assert_int_equal(spl_dataset_read_page(city, 1, page, NULL), SPL_OK);
+    for (int i = 0; i < 2; i++) {
+        struct spoil file = spoil_load(path_of("tile-0.spld"));
+        struct spl_error err = {0};
+        ((uint8_t *)spoil_at(&file, SPL_SECTION_PAGE))[40] ^= 1;
+        spoil_store(&file, path_of("tile-0.spld"), false);
+        free(file.bytes);
+        assert_int_equal(spl_dataset_read_page(city, 1, again, &err), SPL_E_CORRUPT);
+        if (!strstr(err.message, "city: its tile tile-0.spld cannot be read: page 0 fails its checksum; put it back"))
+            fail_msg("%s", err.message);
+        unlink(path_of("tile-0.spld"));
+        make_tile(0, 0);
+        assert_int_equal(spl_dataset_read_page(city, 1, again, NULL), SPL_OK);
+        assert_memory_equal(again, page, bytes);
+        if (!i) {
+            spl_dataset_close(city);
+            city = open_city("city.spld");
+        }
+    }
+    free(page);
+    free(again);
+    spl_dataset_close(city);
+}
+
 static void test_only_beside_a_file(void **state)
 {
     (void)state;
@@ -270,6 +317,44 @@ static void test_only_beside_a_file(void **state)
     spl_dataset_close(city);
     assert_int_equal(spl_dataset_open_whole(path_of("city.spld"), false, &city, &err), SPL_E_USAGE);
     assert_non_null(strstr(err.message, "collection of 8"));
+}
+
+static void expect_kind(const char *name, enum spl_file_kind expected, int code)
+{
+    enum spl_file_kind kind = SPL_FILE_OTHER;
+    struct spl_dataset *dataset;
+    struct spl_error err = {0};
+    int rc = spl_dataset_open_as(path_of(name), &(struct spl_dataset_opening){.kind = &kind}, &dataset, &err);
+    if (rc != code || kind != expected)
+        fail_msg("%s: kind %d, %d %s", name, (int)kind, rc, err.message);
+    spl_dataset_close(dataset);
+}
+
+/* It is told of sound and of broken ones alike. */
+static void test_what_a_file_is(void **state)
+{
+    (void)state;
+    static const char scan[] = "ply\nformat ascii 1.0\nend_header\n";
+    struct spoil tile = spoil_load(path_of("tile-0.spld"));
+    FILE *file = fopen(path_of("scan.spld"), "wb");
+    forge(0, "splat_radius", NULL); // as a former version made it
+    assert_int_equal(fwrite(scan, 1, sizeof scan - 1, file), sizeof scan - 1);
+    assert_int_equal(fclose(file), 0);
+    expect_kind("city.spld", SPL_FILE_COLLECTION, SPL_OK);
+    expect_kind("forged.spld", SPL_FILE_COLLECTION, SPL_E_CORRUPT);
+    expect_kind("tile-0.spld", SPL_FILE_DATASET, SPL_OK);
+    tile.size -= 100;
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    tile.size = 50;
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    memcpy(tile.bytes, "SPLD\n", 5); // what text mode makes of it
+    spoil_store(&tile, path_of("spoilt.spld"), false);
+    expect_kind("spoilt.spld", SPL_FILE_DATASET, SPL_E_CORRUPT);
+    expect_kind("scan.spld", SPL_FILE_OTHER, SPL_E_INPUT);
+    expect_kind("nosuch.spld", SPL_FILE_OTHER, SPL_E_NOT_FOUND);
+    free(tile.bytes);
 }
 
 /* What META may not say; each of tile 3 or of the whole list. */
@@ -291,13 +376,11 @@ static void test_forged(void **state)
                 {"pages", "7", "tiles[3].pages"},                {"splat_radius", "0", "tiles[3].splat_radius"},
                 {"splat_radius", "\"1\"", "tiles[3].splat_radius"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        json_t *forged = json_deep_copy(tiles);
-        json_object_set_new(json_array_get(forged, 3), rows[i].key, json_loads(rows[i].value, JSON_DECODE_ANY, NULL));
-        make_city("forged.spld", forged);
-        json_decref(forged);
+        forge(3, rows[i].key, rows[i].value);
         struct spl_dataset *city;
         struct spl_error err = {0};
-        if (spl_dataset_open(path_of("forged.spld"), true, &city, &err) != SPL_E_CORRUPT || strcmp(err.field, rows[i].field))
+        if (spl_dataset_open(path_of("forged.spld"), true, &city, &err) != SPL_E_CORRUPT ||
+            strcmp(err.field, rows[i].field))
             fail_msg("%s %s: %s %s", rows[i].key, rows[i].value, err.field, err.message);
     }
     json_t *fewer = json_deep_copy(tiles), *others[] = {fewer, json_array(), json_string("tiles")};
@@ -323,10 +406,7 @@ static void test_tiles_that_do_not_fit(void **state)
                 {"pages", "[[1,3,300,4096],[1,1,1,4096]]", "another number of pages or levels"},
                 {"version", "\"0123456789abcdef\"", "is another one now"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        json_t *forged = json_deep_copy(tiles);
-        json_object_set_new(json_array_get(forged, 0), rows[i].key, json_loads(rows[i].value, JSON_DECODE_ANY, NULL));
-        make_city("forged.spld", forged);
-        json_decref(forged);
+        forge(0, rows[i].key, rows[i].value);
         struct spl_dataset *city = open_city("forged.spld");
         refuse_page(city, rows[i].said);
         spl_dataset_close(city);
@@ -383,9 +463,14 @@ static void test_few_are_open(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one_dataset),           cmocka_unit_test(test_a_tile_that_is_another),
-        cmocka_unit_test(test_only_beside_a_file),    cmocka_unit_test(test_forged),
-        cmocka_unit_test(test_tiles_that_do_not_fit), cmocka_unit_test(test_few_are_open),
+        cmocka_unit_test(test_one_dataset),
+        cmocka_unit_test(test_a_tile_that_is_another),
+        cmocka_unit_test(test_a_tile_that_is_damaged),
+        cmocka_unit_test(test_only_beside_a_file),
+        cmocka_unit_test(test_what_a_file_is),
+        cmocka_unit_test(test_forged),
+        cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_few_are_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,5 +1,5 @@
-/* Distributions of values: exact of few, near of many, kinds and weights, what a file may not say; and what datasets have
- * of theirs, whole, of two levels, with panels, rewritten and pruned. */
+/* Distributions of values: exact of few, near of many, kinds and weights, what a file may not say; and what datasets
+ * have of theirs, whole, of two levels, with panels, rewritten and pruned. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -75,7 +75,8 @@ static void test_pages(void **state)
     memset(words, 'a', SPL_META_BYTES_MAX); /* what no reader takes is not written */
     json_t *meta = json_pack("{s:s}", "sources", (const char *)words);
     err = (struct spl_error){0};
-    assert_int_equal(spl_dataset_writer_finish(writer, &(struct spl_node){.chunk_count = 1}, 1, &(struct spl_chunk){0}, 1, meta, &err),
+    assert_int_equal(spl_dataset_writer_finish(writer, &(struct spl_node){.chunk_count = 1}, 1, &(struct spl_chunk){0},
+                                               1, meta, &err),
                      SPL_E_LIMIT);
     assert_non_null(strstr(err.message, "describes the dataset"));
     json_decref(meta);

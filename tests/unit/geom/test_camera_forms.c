@@ -74,7 +74,8 @@ static void every_form_hits_the_golden_pixel(void **state)
         /* parallel rays: 1.3 beside the axis and 0.7 below it, of 8 x 6; at 0.0125 a pixel; at 80 pixels a unit */
         {GLTF("\"matrix\":" NODE ",\"orthographic\":{\"xmag\":4,\"ymag\":3,\"znear\":0,\"zfar\":9}"), 424, 296, 0, 9},
         {"{\"camera\":{" POSE ",\"units_per_pixel\":0.0125,\"near\":1}," SIZE "}", 424, 296, 1, INFINITY},
-        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"fx\":80,\"cx\":321.5,\"near\":1}," SIZE "}", 425.5, 296, 1, INFINITY},
+        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"fx\":80,\"cx\":321.5,\"near\":1}," SIZE "}", 425.5,
+         296, 1, INFINITY},
         {GLTF("\"matrix\":" NODE "," LENS), 391.38902114678562, 278.44024215596149, 0.5, INFINITY},
         {"{\"camera\":{\"gltf\":{\"matrix\":" NODE
          "},\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5,\"near\":1}," SIZE "}",
@@ -141,11 +142,13 @@ static void near_of_parallel_rays_is_the_eye(void **state)
 static void lenses_hit_the_golden_pixel(void **state)
 {
     (void)state;
-#define COLMAP(model, params) "{\"camera\":{" POSE ",\"model\":\"" model "\",\"params\":[500,510,331.25,228.5," params "]}," SIZE "}"
-#define BENT_FRAME(members) FRAME("\"w\":640,\"h\":480,\"fl_x\":500,\"fl_y\":510,\"cx\":331.25,\"cy\":228.5," members,          \
-                                  "[[0.78387787227503695,-0.30826946648440512,0.53898554469575628,2.5],"                       \
-                                  "[0.60698607043454015,0.19761352719368059,-0.76975113132005719,-3.5],"                       \
-                                  "[0.13077993598406572,0.93054759679636629,0.34202014332566873,1.75],[0,0,0,1]]")
+#define COLMAP(model, params)                                                                                          \
+    "{\"camera\":{" POSE ",\"model\":\"" model "\",\"params\":[500,510,331.25,228.5," params "]}," SIZE "}"
+#define BENT_FRAME(members)                                                                                            \
+    FRAME("\"w\":640,\"h\":480,\"fl_x\":500,\"fl_y\":510,\"cx\":331.25,\"cy\":228.5," members,                         \
+          "[[0.78387787227503695,-0.30826946648440512,0.53898554469575628,2.5],"                                       \
+          "[0.60698607043454015,0.19761352719368059,-0.76975113132005719,-3.5],"                                       \
+          "[0.13077993598406572,0.93054759679636629,0.34202014332566873,1.75],[0,0,0,1]]")
 #define PROJECTION(rest) "{\"camera\":{" POSE ",\"projection\":" rest "}"
     static const struct {
         const char *text;
@@ -155,27 +158,34 @@ static void lenses_hit_the_golden_pixel(void **state)
         {COLMAP("OPENCV", "-0.3,0.1,0.01,-0.02"), 640, 480, 410.952591125488, 272.635915914307},
         {COLMAP("FULL_OPENCV", "-0.3,0.1,0.01,-0.02,0.05,0.2,-0.1,0.04"), 640, 480, 410.417616041725, 272.342091137532},
         {COLMAP("OPENCV_FISHEYE", "0.1,-0.2,0.3,-0.4"), 640, 480, 411.846525439661, 272.766091664552},
-        {ROS("\"k\":" K ",\"distortion_model\":\"plumb_bob\",\"d\":[-0.3,0.1,0.01,-0.02,0.05]"), 640, 480, 410.952751680155,
+        {ROS("\"k\":" K ",\"distortion_model\":\"plumb_bob\",\"d\":[-0.3,0.1,0.01,-0.02,0.05]"), 640, 480,
+         410.952751680155,
          272.636004095870},
-        {ROS("\"k\":" K ",\"distortion_model\":\"rational_polynomial\",\"d\":[-0.3,0.1,0.01,-0.02,0.05,0.2,-0.1,0.04]"), 640, 480,
+        {ROS("\"k\":" K ",\"distortion_model\":\"rational_polynomial\",\"d\":[-0.3,0.1,0.01,-0.02,0.05,0.2,-0.1,0.04]"),
+         640, 480,
          410.417616041725, 272.342091137532},
         {ROS("\"k\":" K ",\"distortion_model\":\"equidistant\",\"d\":[0.1,-0.2,0.3,-0.4]"), 640, 480, 411.846525439661,
          272.766091664552},
-        {BENT_FRAME("\"k1\":-0.3,\"k2\":0.1,\"p1\":0.01,\"p2\":-0.02,\"k3\":0.05"), 640, 480, 410.952751680155, 272.636004095870},
+        {BENT_FRAME("\"k1\":-0.3,\"k2\":0.1,\"p1\":0.01,\"p2\":-0.02,\"k3\":0.05"), 640, 480, 410.952751680155,
+         272.636004095870},
         {BENT_FRAME("\"camera_model\":\"OPENCV_FISHEYE\""), 640, 480, 411.595881180571, 272.628430125329},
         {BENT_FRAME("\"camera_model\":\"EQUIRECTANGULAR\""), 640, 480, 336.408686655516, 253.163258412386},
         {PROJECTION("\"equirectangular\"") "," SIZE "}", 640, 480, 336.408686655516, 253.163258412386},
         {PROJECTION("\"fisheye\"") "," SIZE "}", 640, 480, 344.551892762167, 253.220249948859},
-        {PROJECTION("\"fisheye\",\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5") "," SIZE "}", 640, 480, 411.595881180571,
+        {PROJECTION("\"fisheye\",\"fx\":500,\"fy\":510,\"cx\":331.25,\"cy\":228.5") "," SIZE "}", 640, 480,
+         411.595881180571,
          272.628430125329},
         {PROJECTION("\"cube\"") ",\"height\":640}", 3840, 640, 2932, 348},
         {PROJECTION("\"cube\"") ",\"width\":3840}", 3840, 640, 2932, 348},
         {PROJECTION("\"equirectangular\"") ",\"width\":640}", 640, 320, 336.408686655516, 168.775505608257},
         {PROJECTION("\"fisheye\"") ",\"height\":480}", 480, 480, 264.551892762167, 253.220249948859},
-        /* 9.2299 degrees to the right and 4.9362 below: rays every half degree, from the left and from above, and the other way */
-        {PROJECTION("\"equirectangular\",\"azimuth\":[-30,20,101],\"elevation\":[10,-20,61]") "}", 101, 61, 78.959772487455,
+        /* 9.2299 degrees to the right and 4.9362 below: rays every half degree, from the left and from above, and the
+         * other way */
+        {PROJECTION("\"equirectangular\",\"azimuth\":[-30,20,101],\"elevation\":[10,-20,61]") "}", 101, 61,
+         78.959772487455,
          30.372443809289},
-        {PROJECTION("\"equirectangular\",\"azimuth\":[180,-180,720],\"elevation\":[-20,10,61]") "}", 720, 61, 342.040227512545,
+        {PROJECTION("\"equirectangular\",\"azimuth\":[180,-180,720],\"elevation\":[-20,10,61]") "}", 720, 61,
+         342.040227512545,
          30.627556190711},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -270,13 +280,16 @@ static void faults_carry_the_members_name(void **state)
         {"{\"camera\":{" POSE ",\"projection\":\"panorama\"}," SIZE "}", "projection"},
         {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"fov\":361}," SIZE "}", "fov"},
         {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"fov\":90,\"fx\":50}," SIZE "}", "fov"},
-        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"model\":\"OPENCV\",\"params\":[9,9,9,9,0.1,0,0,0]}," SIZE "}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"model\":\"OPENCV\",\"params\":[9,9,9,9,0.1,0,0,0]}," SIZE
+         "}",
+         "projection"},
         {"{\"camera\":{" POSE ",\"projection\":\"equirectangular\",\"fov\":90}," SIZE "}", "fov"},
         {"{\"camera\":{" POSE ",\"projection\":\"equirectangular\",\"cx\":9}," SIZE "}", "cx"},
         {"{\"camera\":{" POSE ",\"projection\":\"cube\"}," SIZE "}", "width"},
         {"{\"camera\":{" POSE ",\"projection\":\"cube\",\"view_height\":4}," SIZE "}", "view_height"},
         {"{\"camera\":{\"eye\":[0,0,1],\"target\":[0,0,9],\"projection\":\"equirectangular\"}}", "up"},
-#define SCAN(azimuth, elevation, rest) "{\"camera\":{" POSE ",\"azimuth\":" azimuth ",\"elevation\":" elevation rest "}}"
+#define SCAN(azimuth, elevation, rest)                                                                                 \
+    "{\"camera\":{" POSE ",\"azimuth\":" azimuth ",\"elevation\":" elevation rest "}}"
         {SCAN("[0,9,10]", "[0,9,10]", ""), "azimuth"},
         {SCAN("[0,9,10]", "[0,9,10]", ",\"projection\":\"fisheye\""), "azimuth"},
         {SCAN("[0,9,10]", "[0,9,10]", ",\"projection\":\"equirectangular\",\"width\":9"), "width"},
@@ -294,13 +307,18 @@ static void faults_carry_the_members_name(void **state)
 #define ROS_K "\"ros\":{\"k\":[500,0,320,0,510,240,0,0,1],\"width\":640,\"height\":480}"
         {"{\"camera\":{" POSE ",\"projection\":\"fisheye\"," ROS_K "}}", "projection"}, /* k is a pinhole's */
         {"{\"camera\":{" POSE "," ROS_K ",\"projection\":\"orthographic\"}}", "projection"},
-        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"gltf\":{\"perspective\":{\"yfov\":1,\"znear\":0.1}}}," SIZE "}", "projection"},
-        {"{\"camera\":{\"projection\":\"orthographic\",\"nerfstudio\":{\"w\":640,\"h\":480,\"fl_x\":500,\"transform_matrix\":" I16 "}}}", "projection"},
+        {"{\"camera\":{" POSE ",\"projection\":\"fisheye\",\"gltf\":{\"perspective\":{\"yfov\":1,\"znear\":0.1}}}," SIZE
+         "}",
+         "projection"},
+        {"{\"camera\":{\"projection\":\"orthographic\",\"nerfstudio\":{\"w\":640,\"h\":480,\"fl_x\":500,"
+         "\"transform_matrix\":" I16 "}}}",
+         "projection"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"units_per_pixel\":4}," SIZE "}", "units_per_pixel"},
         {"{\"camera\":{" POSE ",\"view_height\":4,\"fx\":4}," SIZE "}", "fx"},
         {"{\"camera\":{" POSE ",\"view_height\":0}," SIZE "}", "view_height"},
         {"{\"camera\":{" POSE ",\"units_per_pixel\":-1}," SIZE "}", "units_per_pixel"},
-        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"model\":\"PINHOLE\",\"params\":[9,9,9,9]}," SIZE "}", "model"},
+        {"{\"camera\":{" POSE ",\"projection\":\"orthographic\",\"model\":\"PINHOLE\",\"params\":[9,9,9,9]}," SIZE "}",
+         "model"},
         {GLTF("\"translation\":[1,2,3]," LENS), "gltf.translation"},
         {PERSPECTIVE("\"yfov\":1,\"znear\":1,\"xfov\":1"), "gltf.perspective.xfov"},
         {PERSPECTIVE("\"znear\":1"), "gltf.perspective.yfov"},

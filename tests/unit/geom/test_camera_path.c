@@ -293,7 +293,8 @@ static void test_add_refuses(void **state)
         camera.eye[0] = i % 2 ? 1e12 : -1e12;
         assert_int_equal(spl_camera_path_add(&far, &camera, extremes[i], NULL), 0);
     }
-    assert_int_equal(spl_camera_path_sample(&far, &(struct spl_path_motion){.positions = SPL_POSITIONS_LINEAR}, 9, frames, NULL), 0);
+    assert_int_equal(
+        spl_camera_path_sample(&far, &(struct spl_path_motion){.positions = SPL_POSITIONS_LINEAR}, 9, frames, NULL), 0);
     spl_camera_path_finish(&far);
     assert_int_equal(
         spl_camera_path_sample(&(struct spl_camera_path){0}, &(struct spl_path_motion){0}, 1, &camera, NULL),

@@ -40,8 +40,9 @@ static void corners_are_right_far_away(void **state)
         }
         char text[SPL_WORLD_FILE_BYTES];
         if (u == 0)
-            assert_string_equal(spl_ground_print_world_file(&ground, text),
-                                "0.10000000000000001\n0\n0\n-0.10000000000000001\n405960.17499999999\n5405032.0125000002\n");
+            assert_string_equal(
+                spl_ground_print_world_file(&ground, text),
+                "0.10000000000000001\n0\n0\n-0.10000000000000001\n405960.17499999999\n5405032.0125000002\n");
     }
 }
 

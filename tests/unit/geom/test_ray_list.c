@@ -37,7 +37,8 @@ static void what_points_nowhere_is_named(void **state)
     struct spl_error err = {0};
     struct spl_rays *rays;
     assert_int_equal(spl_rays_create(NULL, 0, &rays, &err), SPL_E_INPUT);
-    assert_int_equal(spl_rays_create((double[3]){0, 0, 1}, SPL_RAYS_MAX + 1, &rays, &err), SPL_E_INPUT); // which reads none
+    // which reads none
+    assert_int_equal(spl_rays_create((double[3]){0, 0, 1}, SPL_RAYS_MAX + 1, &rays, &err), SPL_E_INPUT);
     spl_rays_destroy(NULL);
 }
 
@@ -119,7 +120,8 @@ static void faces_hold_their_rays(void **state)
         for (int k = 0; k < 2; k++)
             assert_true(pixel[k] >= SPL_FACE_MARGIN && pixel[k] <= (k ? face->height : face->width) - SPL_FACE_MARGIN);
     }
-    assert_true(!faces.cameras[1].width && !faces.cameras[2].width && !faces.cameras[3].width && faces.cameras[5].width);
+    assert_true(!faces.cameras[1].width && !faces.cameras[2].width && !faces.cameras[3].width &&
+                faces.cameras[5].width);
     assert_true(spl_faces_get_pixels(&faces) < 20000);
     struct spl_error err = {0};
     assert_int_equal(spl_faces_init_of(&faces, &camera, rays, 60, &err), SPL_E_LIMIT);

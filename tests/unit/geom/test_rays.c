@@ -1,6 +1,6 @@
-/* Rays of cameras that see further around than a pinhole, or through a lens, and the faces that they are drawn from: there
- * and back for every pixel of each, in which direction which pixel looks, that faces hold what pixels ask for, and no more
- * of them, as finely; and that two faces have the same rays where they meet. */
+/* Rays of cameras that see further around than a pinhole, or through a lens, and the faces that they are drawn from:
+ * there and back for every pixel of each, in which direction which pixel looks, that faces hold what pixels ask for,
+ * and no more of them, as finely; and that two faces have the same rays where they meet. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -50,7 +50,9 @@ enum { CAMERAS = 10 };
 
 static struct spl_camera make(int i)
 {
-    static const struct spl_distortion barrel = {.kind = SPL_DISTORTION_RADIAL, .k = {-0.28, 0.07, 0, 0, 0, 0}, .p = {0.001, -0.002}},
+    static const struct spl_distortion barrel = {.kind = SPL_DISTORTION_RADIAL,
+                                                 .k = {-0.28, 0.07, 0, 0, 0, 0},
+                                                 .p = {0.001, -0.002}},
                                        pincushion = {.kind = SPL_DISTORTION_RADIAL, .k = {0.2, 0, 0.01, 0.1}},
                                        wide = {.kind = SPL_DISTORTION_FISHEYE, .k = {0.04, -0.01, 0.002, -0.0003}};
     switch (i) {
@@ -155,7 +157,8 @@ static void only_what_is_asked_for_is_drawn(void **state)
 {
     (void)state;
     static const unsigned asked[CAMERAS] = {63, 63, 63, 63, 31, 63, 16, 31, 31, 31};
-    static const double most[CAMERAS] = {2.3, 6.1, 1.95, 1.95, 5, 3.4, 1.8, 3, 2.2, 2.3}; /* of the image's pixels, margins included */
+    /* of the image's pixels, margins included */
+    static const double most[CAMERAS] = {2.3, 6.1, 1.95, 1.95, 5, 3.4, 1.8, 3, 2.2, 2.3};
     for (int i = 0; i < CAMERAS; i++) {
         const struct spl_camera camera = make(i);
         struct spl_faces faces;
@@ -175,7 +178,8 @@ static void only_what_is_asked_for_is_drawn(void **state)
     assert_true(spl_faces_get_pixels(&faces) < 1.3 * 2048 * 1024);
     assert_int_equal(faces.cameras[4].fx, 326);
     assert_int_equal(spl_faces_init(&faces, &high, 4096, NULL), 0);
-    assert_true(faces.cameras[0].width < 0.56 * faces.cameras[4].width && faces.cameras[0].height == faces.cameras[4].height);
+    assert_true(faces.cameras[0].width < 0.56 * faces.cameras[4].width &&
+                faces.cameras[0].height == faces.cameras[4].height);
     struct spl_error err = {0};
     assert_int_equal(spl_faces_init(&faces, &large, 600, &err), SPL_E_LIMIT);
     assert_string_equal(err.field, "width");
@@ -239,7 +243,8 @@ static void a_scans_rays_are_on_their_faces(void **state)
     (void)state;
     uint64_t random = 7;
     for (int i = 0; i < 60; i++) {
-        static const double known[][4] = {{-10, 10, 60, 90}, {-175, 185, 60, 80}, {20, -160, -90, 30}, {0, 350, 89, -89}};
+        static const double known[][4] = {
+            {-10, 10, 60, 90}, {-175, 185, 60, 80}, {20, -160, -90, 30}, {0, 350, 89, -89}};
         double scan[4];
         for (int k = 0; k < 4; k++) {
             random = random * 6364136223846793005u + 1442695040888963407u;
@@ -261,10 +266,12 @@ static void a_scans_rays_are_on_their_faces(void **state)
                 if (!spl_camera_get_ray(&camera, x + 0.5, y + 0.5, ray))
                     continue;
                 const struct spl_camera *face = &faces.cameras[spl_faces_place(&faces, ray, place, &along)];
-                if (!(place[0] >= 2 && place[0] <= face->width - 2.0 && place[1] >= 2 && place[1] <= face->height - 2.0))
-                    fail_msg("azimuth %g to %g, elevation %g to %g: ray %u, %u of %u x %u is at %g, %g of a face of %u x %u",
-                             scan[0], scan[1], scan[2], scan[3], x, y, camera.width, camera.height, place[0], place[1],
-                             face->width, face->height);
+                if (!(place[0] >= 2 && place[0] <= face->width - 2.0 && place[1] >= 2 &&
+                      place[1] <= face->height - 2.0))
+                    fail_msg(
+                        "azimuth %g to %g, elevation %g to %g: ray %u, %u of %u x %u is at %g, %g of a face of %u x %u",
+                        scan[0], scan[1], scan[2], scan[3], x, y, camera.width, camera.height, place[0], place[1],
+                        face->width, face->height);
             }
     }
 }

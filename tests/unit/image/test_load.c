@@ -106,7 +106,8 @@ static void broken_npy_is_refused_by_field(void **state)
         {SHAPE("()"), SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "(height, width)"},
         {SHAPE("(1, 2, 1, 1, 1)"), SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "(height, width)"},
         {SHAPE("(1, -2)"), SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "(height, width)"},
-        {SHAPE("(1, 99999999999999999999999)"), SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "not (1, 99999999999999999999999)"},
+        {SHAPE("(1, 99999999999999999999999)"), SPL_LAYER_DEPTH, SPL_E_INPUT, "shape",
+         "not (1, 99999999999999999999999)"},
         {SHAPE("(4611686018427387905, 4)"), SPL_LAYER_DEPTH, SPL_E_LIMIT, "height", "4 x 4611686018427387905 pixels"},
         {SHAPE("(4, 18446744073709551615)"), SPL_LAYER_DEPTH, SPL_E_LIMIT, "width", "18446744073709551615 x 4 pixels"},
         {SHAPE("(4294967296, 4294967296)"), SPL_LAYER_DEPTH, SPL_E_LIMIT, "height", "limit"},
@@ -118,8 +119,10 @@ static void broken_npy_is_refused_by_field(void **state)
          "'('"},
         {"{'descr': '<f4', 'shape': (1, 2), }", SPL_LAYER_DEPTH, SPL_E_INPUT, "fortran_order", ""},
         {"{'descr': '<f4', 'fortran_order': False}", SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", ""},
-        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'shape' : (2, 1), }", SPL_LAYER_DEPTH, SPL_E_INPUT, "shape", "twice"},
-        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'descr': '<f4'}", SPL_LAYER_DEPTH, SPL_E_INPUT, "descr", "twice"},
+        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'shape' : (2, 1), }", SPL_LAYER_DEPTH, SPL_E_INPUT,
+         "shape", "twice"},
+        {"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), 'descr': '<f4'}", SPL_LAYER_DEPTH, SPL_E_INPUT,
+         "descr", "twice"},
         {"", SPL_LAYER_DEPTH, SPL_E_INPUT, "version", ""},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

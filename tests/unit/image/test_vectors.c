@@ -87,7 +87,8 @@ static void others_are_refused(void **state)
         {"{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999, 3), }", "(count, 3)"},
         {"{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }", "need"},
         {"{'descr': '<f8', 'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", "'descr' is there twice"},
-        {"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), 'fortran_order': True}", "'fortran_order' is there twice"},
+        {"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), 'fortran_order': True}",
+         "'fortran_order' is there twice"},
         {"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", "need"},
     };
     for (size_t i = 0; i < sizeof headers / sizeof *headers; i++) {
@@ -125,8 +126,10 @@ static void layers_are_lists(void **state)
         spl_encoded_finish(&encoded);
         for (int list = 0; list < 2; list++) {
             char header[128];
-            assert_int_equal(spl_image_encode(&rows[i].image, &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_NPY, .list = list),
-                                              &encoded, NULL), SPL_OK);
+            assert_int_equal(spl_image_encode(&rows[i].image,
+                                              &SPL_SIZED(spl_encode_options, .format = SPL_FORMAT_NPY, .list = list),
+                                              &encoded, NULL),
+                             SPL_OK);
             memcpy(header, encoded.bytes, 127);
             for (int k = 0; k < 127; k++)
                 header[k] = header[k] ? header[k] : ' ';

@@ -274,8 +274,8 @@ static double promise_cold(const struct spl_planner *planner, const struct spl_s
     return choice.ms;
 }
 
-/* Frames of scans on the machine of the methods' guesses (tests/bench/RESULTS.md, "What a first guess promises"): nobody
- * is promised less than three quarters of what they took, and hardly ten times as much. */
+/* Frames of scans on the machine of the methods' guesses (tests/bench/RESULTS.md, "What a first guess promises"):
+ * nobody is promised less than three quarters of what they took, and hardly ten times as much. */
 static void test_a_first_guess_is_no_promise_too_much(void **state)
 {
     (void)state;

@@ -150,11 +150,12 @@ static void test_what_cannot_be_loaded_is_not_saved(void **state)
     "1, "                                                                                                              \
     "\"ms_per_mpx\": 7}"
 #define MAPPED(maps, atoms)                                                                                            \
-    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"atoms\": " atoms ", \"maps\": \"" maps "\", \"ms\": 8, "     \
+    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"atoms\": " atoms ", \"maps\": \"" maps                  \
+    "\", \"ms\": 8, "                                                                                                  \
     "\"ms_q90\": 9, \"fixed_ms\": 1, \"ms_per_mpx\": 7}"
 #define SOFT(terms, opacity) "\"soft\": {\"terms\": \"" terms "\", \"opacity\": " opacity ", \"blend\": 0.5}"
 #define SOFTENED(model)                                                                                                \
-    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"soft_model\": \"" model "\", \"ms\": 95, "               \
+    "{\"method\": \"splat\", \"lod\": 1, \"supersample\": 1, \"soft_model\": \"" model "\", \"ms\": 95, "              \
     "\"ms_q90\": 99, \"soft_ms\": 20, \"fixed_ms\": 1, \"ms_per_mpx\": 7, \"psnr\": 20}"
 #define GOOD                                                                                                           \
     "{\"format\": \"splatd-profile\", \"format_version\": 1, \"splatd\": \"0.1.0\", \"dataset\": {\"id\": \"hall\", "  \

@@ -23,6 +23,7 @@
 #include "support/make_maps.h"
 #include "support/make_textures.h"
 #include "support/sanitised.h"
+#include "support/spoil.h"
 
 enum { tiles = 11, points = 9000, on_wire = 1000, side = 10 }; /* 11 of them are two levels above the tiles' own */
 
@@ -38,7 +39,8 @@ static uint8_t color_of(int tile, int channel)
     return (uint8_t)(20 + 20 * (channel == 1 ? tiles - tile : tile));
 }
 
-/* A square of ground with a step in it and a wire above: one colour, one class; intensities around a hundred times the tile. */
+/* A square of ground with a step in it and a wire above: one colour, one class; intensities around a hundred times the
+ * tile. */
 static void write_scan(const char *path, int tile, bool fractions)
 {
     uint64_t random = (uint64_t)tile * 77 + 5;
@@ -134,8 +136,8 @@ static uint64_t number_of(const json_t *entry, const char *key)
     return (uint64_t)json_integer_value(json_object_get(entry, key));
 }
 
-/* Splats of the tile's leaf: where the tile is, with its colour and values. `cell`: how far those of panels stand over its
- * edges. Returns how many. */
+/* Splats of the tile's leaf: where the tile is, with its colour and values. `cell`: how far those of panels stand over
+ * its edges. Returns how many. */
 static uint32_t check_leaf(const struct spl_dataset *city, const struct spl_tables *tables, const struct spl_node *leaf,
                            const struct spl_dataset_info *tile, int number, double cell)
 {
@@ -214,7 +216,8 @@ static void check_entry(const json_t *entry, const struct spl_dataset *tile)
 static void check_streams(const struct spl_dataset *city, const struct spl_dataset *tile)
 {
     uint32_t count[2];
-    const struct spl_stream *a = spl_dataset_get_streams(city, &count[0]), *b = spl_dataset_get_streams(tile, &count[1]);
+    const struct spl_stream *a = spl_dataset_get_streams(city, &count[0]),
+                            *b = spl_dataset_get_streams(tile, &count[1]);
     assert_int_equal(count[0], count[1]);
     for (uint32_t s = 0; s < count[0]; s++) {
         assert_string_equal(a[s].name, b[s].name);
@@ -262,7 +265,8 @@ static void test_a_tree_above_the_tiles(void **state)
             splats += spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS ? chunks[c].count : 0;
         uint32_t own = check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), i, 0);
         assert_in_range(own, splats / 6, splats / 3);
-        assert_true(tables->nodes[node].spacing > 1.5f * root.spacing && tables->nodes[node].spacing < 3 * root.spacing);
+        assert_true(tables->nodes[node].spacing > 1.5f * root.spacing &&
+                    tables->nodes[node].spacing < 3 * root.spacing);
         check_entry(entry, tile);
         check_streams(city, tile);
         spl_dataset_close(tile);
@@ -393,8 +397,10 @@ static void test_what_is_no_city_is_refused(void **state)
         {{.up = {0, 1, 0}}, false, "up is 0, 1, 0 there, and 0, 0, 1 in a.spld"},
         {{.points_only = true}, false, "has bare points, and a.spld has normals"},
         {{.keep = "none"}, false, "attribute \"class\" is missing, unlike in a.spld; --keep none"},
-        {{.keep = "none,class"}, false, "attribute \"intensity\" is missing, unlike in a.spld; pack the one without it again with "
-                                  "--keep intensity"},
+        {{.keep = "none,class"},
+         false,
+         "attribute \"intensity\" is missing, unlike in a.spld; pack the one without it again with "
+         "--keep intensity"},
         {{.keep = "scan"}, false, "attribute \"scan\" is there, but not in a.spld"},
         {{0}, true, "attribute \"intensity\" (steps from"},
     };
@@ -405,7 +411,8 @@ static void test_what_is_no_city_is_refused(void **state)
         refuse(SPL_E_INPUT, "a.spld", "other.spld", others[i].says);
     }
     pack_tile(4, "steps.spld", &(struct spl_pack_options){0}, true); /* the same steps, from another first */
-    refuse(SPL_E_INPUT, "other.spld", "steps.spld", "steps.spld: attribute \"intensity\" (steps from 40025 in 100 a unit)");
+    refuse(SPL_E_INPUT, "other.spld", "steps.spld",
+           "steps.spld: attribute \"intensity\" (steps from 40025 in 100 a unit)");
     unlink(in_folder("steps.spld"));
     unlink(in_folder("other.spld"));
     struct spl_dataset *plain = open_dataset("a.spld");
@@ -449,6 +456,51 @@ static void test_what_is_no_city_is_refused(void **state)
     assert_int_equal(spl_collect(&SPL_SIZED(spl_collect_options, .inputs = &tile, .input_count = 1, .title = "a\nb",
                                             .output = in_folder("refused.spld")), &err), SPL_E_USAGE);
     assert_string_equal(err.field, "title");
+}
+
+static void note(void *context, const struct spl_error *why)
+{
+    char *names = context, *name = strrchr(why->message, '/');
+    assert_int_equal(why->code, SPL_E_INPUT);
+    assert_non_null(strstr(why->message, ".spld: it is a collection itself"));
+    snprintf(names + strlen(names), 100 - strlen(names), "%.*s", (int)strcspn(name, ":"), name);
+}
+
+/* What lies in a folder beside its tiles: the collection that is made anew, others, and one that opens no more. */
+static void test_collections_in_a_folder_are_no_tiles(void **state)
+{
+    (void)state;
+    char left_out[100] = "";
+    const char *inputs[] = {test_folder, NULL};
+    struct spl_error err = {0};
+    collect_all("city.spld");
+    collect_all("older.spld");
+    struct spoil file = spoil_load(in_folder("city.spld"));
+    memcpy(strstr(spoil_at(&file, SPL_SECTION_META), "\"mesh_points\""), "\"mesh_poinds\"", 13);
+    spoil_store(&file, in_folder("former.spld"), true);
+    free(file.bytes);
+    struct spl_collect_options options = SPL_SIZED(spl_collect_options, .inputs = inputs, .input_count = 1,
+                                                   .output = in_folder("anew.spld"), .title = "A city",
+                                                   .left_out = note, .progress_context = left_out);
+    for (int again = 0; again < 2; again++) {
+        left_out[0] = 0;
+        if (spl_collect(&options, &err))
+            fail_msg("%s", err.message);
+        assert_string_equal(left_out, "/city.spld/former.spld/older.spld");
+        assert_same("city.spld", "anew.spld");
+    }
+    refuse(SPL_E_INPUT, "former.spld", tile_name(1),
+           "former.spld: it is a collection itself (\"tiles\"); name its tiles");
+    assert_int_equal(mkdir(in_folder("none"), 0777), 0);
+    assert_int_equal(rename(in_folder("older.spld"), in_folder("none/older.spld")), 0);
+    inputs[0] = in_folder("none");
+    options.output = in_folder("none/all.spld");
+    assert_int_equal(spl_collect(&options, &err), SPL_E_NOT_FOUND);
+    assert_non_null(strstr(err.message, "collections alone"));
+    unlink(in_folder("none/older.spld"));
+    assert_int_equal(rmdir(in_folder("none")), 0);
+    unlink(in_folder("former.spld"));
+    unlink(in_folder("anew.spld"));
 }
 
 static void test_more_tiles_than_there_may_be(void **state)
@@ -501,6 +553,7 @@ int main(void)
         cmocka_unit_test(test_order_and_threads_change_nothing),
         cmocka_unit_test(test_other_kinds_of_tiles),
         cmocka_unit_test(test_what_is_no_city_is_refused),
+        cmocka_unit_test(test_collections_in_a_folder_are_no_tiles),
         cmocka_unit_test(test_more_tiles_than_there_may_be),
         cmocka_unit_test(test_nothing_is_left_of_what_fails),
     };

@@ -59,7 +59,9 @@ static int pack_with(const struct cloud *cloud, bool normals, struct spl_pack_op
 {
     FILE *f = fopen(scan, "wb");
     assert_non_null(f);
-    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\n%send_header\n",
+    fprintf(f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty "
+            "float z\n%send_header\n",
             cloud->count, normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "");
     for (size_t i = 0; i < cloud->count; i++)
         fwrite(cloud->at[i], sizeof(float), normals ? 6 : 3, f);
@@ -225,7 +227,8 @@ static void what_is_said_wrongly_is_refused_by_name(void **state)
     memset(long_title, 'a', sizeof long_title - 1);
     static const struct spl_saved_view blind = {.eye = {1, 2, 3}, .target = {1, 2, 3}},
                                        wide = {.eye = {1, 0, 0}, .fov = 180}, turned = {.eye = {1, 0, 0}, .fov = -1},
-                                       nameless = {.eye = {1, 0, 0}}, unsettled = {.name = "a", .eye = {1, 0, 0}, .settings = "[]"},
+                                       nameless = {.eye = {1, 0, 0}},
+                                       unsettled = {.name = "a", .eye = {1, 0, 0}, .settings = "[]"},
                                        hidden = {.name = ".a", .eye = {1, 0, 0}}, far = {.eye = {NAN, 0, 0}};
     static const struct spl_saved_view twice[] = {{.name = "a", .eye = {1, 0, 0}}, {.name = "a", .eye = {2, 0, 0}}};
     const struct {

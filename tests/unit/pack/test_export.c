@@ -726,7 +726,8 @@ static void test_failures_give_nothing(void **state)
     char *text = folder;
     add_wires(s, nowhere);
     stage.cancelled = &cancelled;
-    int rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
+    int rc =
+        spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
     assert_int_equal(rc, SPL_E_CANCELLED);
     assert_null(text);
     stage.cancelled = NULL;
@@ -735,7 +736,8 @@ static void test_failures_give_nothing(void **state)
         assert_null(text);
         err = (struct spl_error){0};
         spl_memory_fail_after(n);
-        rc = spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
+        rc =
+            spl_export_primitives("a.ply", &s->points, &s->planes, &s->wires, 1, &stage, &text, &length, &report, &err);
         spl_memory_fail_after(0);
         assert_true(rc == 0 || (rc == SPL_E_NOMEM && err.message[0]));
         failures += rc != 0;

@@ -128,8 +128,8 @@ static const char *write_places(const double (*positions)[3], int count)
     return list;
 }
 
-/* Points all over a room, whose discs are as large as their distances: hundreds of texels each. Drawn texel by texel this
- * would take minutes. */
+/* Points all over a room, whose discs are as large as their distances: hundreds of texels each. Drawn texel by texel
+ * this would take minutes. */
 static void a_loose_cloud_costs_by_its_points(void **state)
 {
     enum { stations = 24, points = 2000 };
@@ -176,8 +176,8 @@ static void write_stations(const char *path)
     assert_int_equal(fclose(f), 0);
 }
 
-/* A place in other coordinates sees all of the scan from afar, one that hardly scanned anything next to nothing: both are
- * told by name. */
+/* A place in other coordinates sees all of the scan from afar, one that hardly scanned anything next to nothing: both
+ * are told by name. */
 static void a_station_that_cannot_be_right_is_told(void **state)
 {
     static const double places[2][3] = {{-1, 0.1, 0.2}, {1, 0.3, -0.2}}, far[2][3] = {{-1, 0.1, 0.2}, {1e6, 5e5, 3}};

@@ -318,7 +318,8 @@ static void few_hits_make_a_map_all_the_same(void **state)
 /* Brightness with edges of 5 to 30 degrees all over, not the same mirrored or turned. */
 static double pattern(const double d[3])
 {
-    return 130 + 45 * sin(11 * d[0] + 3 * d[1]) + 35 * sin(17 * d[1] * d[2] + 5 * d[0]) + 20 * sin(40 * d[2] + 7 * d[1]);
+    return 130 + 45 * sin(11 * d[0] + 3 * d[1]) + 35 * sin(17 * d[1] * d[2] + 5 * d[0]) +
+           20 * sin(40 * d[2] + 7 * d[1]);
 }
 
 static double unit(const double p[3], double d[3])
@@ -373,7 +374,8 @@ static void make_scene(struct scene *s, const double shift[3], double turn, bool
         seen[0] = c * e[0] - q * (mirrored ? -e[1] : e[1]);
         seen[1] = q * e[0] + c * (mirrored ? -e[1] : e[1]);
         seen[2] = e[2];
-        double noise = i % 20 ? 10 * (random_real() - 0.5) : 120 * (random_real() - 0.5); /* one in 20 is something else */
+        /* one in 20 is something else */
+        double noise = i % 20 ? 10 * (random_real() - 0.5) : 120 * (random_real() - 0.5);
         for (int k = 0; k < 3; k++)
             sample->color[k] = (uint8_t)fmin(fmax(0.8 * pattern(seen) + 20 + noise, 0), 255);
         sample->radius = 0.05f;
@@ -496,8 +498,8 @@ static void write_room(const char *path)
 {
     FILE *f = fopen(path, "w");
     assert_non_null(f);
-    fprintf(f, "%d\n%d\n%g %g %g\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n%g %g %g 1\n", columns, rows, place[0],
-            place[1], place[2], place[0], place[1], place[2]);
+    fprintf(f, "%d\n%d\n%g %g %g\n0 1 0\n-1 0 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n%g %g %g 1\n", columns, rows,
+            place[0], place[1], place[2], place[0], place[1], place[2]);
     for (int column = 0; column < columns; column++)
         for (int row = 0; row < rows; row++) {
             double d[3];
@@ -628,8 +630,8 @@ static void colors_of_the_map_are_those_of_the_points(void **state)
             if (range_of(d) <= 0)
                 continue;
             spl_polar_place(row->side >> level, SPL_MAP_APRON, d, at);
-            spl_map_get_color(words + spl_map_level_word(row, level), row->side >> level, (uint32_t)at[0], (uint32_t)at[1],
-                              color);
+            spl_map_get_color(words + spl_map_level_word(row, level), row->side >> level, (uint32_t)at[0],
+                              (uint32_t)at[1], color);
             color_of(d, truth);
             for (int c = 0; c < 3; c++)
                 worst = fmax(worst, fabs((double)color[c] - truth[c]));

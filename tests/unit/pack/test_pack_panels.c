@@ -351,9 +351,14 @@ static void a_bound_is_held_against_the_scan(void **state)
     const char *input = strcpy(scan, write_corner("bound.csv", walls, 0));
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        const struct spl_pack_options options = {.size = sizeof options, .inputs = &input, .input_count = 1, .unit = "m",
-                                                 .output = path_of("bound.spld"), .primitives = SPL_PRIMITIVES_ALL,
-                                                 .error = rows[i].error, .warn = warn};
+        const struct spl_pack_options options = {.size = sizeof options,
+                                                 .inputs = &input,
+                                                 .input_count = 1,
+                                                 .unit = "m",
+                                                 .output = path_of("bound.spld"),
+                                                 .primitives = SPL_PRIMITIVES_ALL,
+                                                 .error = rows[i].error,
+                                                 .warn = warn};
         struct spl_error err = {0};
         warnings[0] = 0;
         int rc = spl_pack(&options, NULL, &err);

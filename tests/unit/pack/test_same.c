@@ -1,5 +1,5 @@
-/* A dataset depends on what is in the scans alone: not on threads, on memory, on the order of files and of the points in
- * them, nor on how many files they lie in. */
+/* A dataset depends on what is in the scans alone: not on threads, on memory, on the order of files and of the points
+ * in them, nor on how many files they lie in. */
 #include <glob.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -337,7 +337,8 @@ static void test_coordinate_systems(void **state)
         {{GRID, 2994, 0, NULL, REST}, {0}, NULL, NULL, "ft | EPSG:2994", NULL},
         {{GRID, 0, 9003, NULL, REST}, {0}, NULL, NULL, "us-ft | null", NULL},
         {{GRID, 0, 9098, NULL, REST}, {0}, NULL, NULL, "0.201168 m | null", NULL},
-        {{GRID, 0, 0, here, REST}, {GRID, 0, 0, here, REST}, NULL, NULL, "m | PROJCS[\"Here\",UNIT[\"metre\",1]]", NULL},
+        {{GRID, 0, 0, here, REST}, {GRID, 0, 0, here, REST}, NULL, NULL, "m | PROJCS[\"Here\",UNIT[\"metre\",1]]",
+         NULL},
         /* different ones */
         {{GRID, 25832, 0, NULL, REST}, {GRID, 25833, 0, NULL, REST}, NULL, NULL, "-",
          "a.las and /tmp/splatd"},
@@ -435,12 +436,14 @@ static void test_strays(void **state)
 static void test_uncounted_points(void **state)
 {
     (void)state;
-    const char *text = pack_two(write_las("stopped.las", &(struct las){.scale = 0.001, .red = 1, .count = 200, .uncounted = 80}),
-                                NULL, false, NULL);
+    const char *text =
+        pack_two(write_las("stopped.las", &(struct las){.scale = 0.001, .red = 1, .count = 200, .uncounted = 80}), NULL,
+                 false, NULL);
     assert_non_null(strstr(text, "in stopped.las: 80 more could lie there and are not read"));
-    assert_string_equal(pack_two(write_las("padded.las", &(struct las){.scale = 0.001, .red = 1, .count = 201, .uncounted = 1}),
-                                 NULL, false, NULL),
-                        "");
+    assert_string_equal(
+        pack_two(write_las("padded.las", &(struct las){.scale = 0.001, .red = 1, .count = 201, .uncounted = 1}), NULL,
+                 false, NULL),
+        "");
 }
 
 enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */

@@ -1,5 +1,5 @@
-/* What is said to be left: from the plan at first, from measured speed once something is done. A clock of the test's own
- * is put into the stage, so that no machine is too slow. */
+/* What is said to be left: from the plan at first, from measured speed once something is done. A clock of the test's
+ * own is put into the stage, so that no machine is too slow. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

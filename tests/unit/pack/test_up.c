@@ -179,7 +179,8 @@ static void datasets_follow_it(void **state)
         assert_true(100 * upward >= 99 * info->splats);
         spl_dataset_close(dataset);
     }
-    struct spl_pack_options odd = {.size = sizeof odd, .inputs = inputs, .input_count = 1, .output = output, .up = {NAN}};
+    struct spl_pack_options odd = {
+        .size = sizeof odd, .inputs = inputs, .input_count = 1, .output = output, .up = {NAN}};
     struct spl_error err = {0};
     assert_int_equal(spl_pack(&odd, NULL, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "up");

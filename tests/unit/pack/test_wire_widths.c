@@ -105,8 +105,8 @@ static void finish(struct cloud *c)
     spl_points_finish(&c->points);
 }
 
-/* Within two fifths, of wires of 4 to 30 mm with points a few centimetres apart, from one side and from all; axes lie on
- * the side that was seen, and do not zigzag. */
+/* Within two fifths, of wires of 4 to 30 mm with points a few centimetres apart, from one side and from all; axes lie
+ * on the side that was seen, and do not zigzag. */
 static void widths_are_those_of_the_wires(void **state)
 {
     (void)state;
@@ -228,7 +228,8 @@ static double off_line(const double at[3], const struct spl_node_lines *lines)
     return least;
 }
 
-/* Leaves keep the vertices that the bound needs: fewer the larger it is, and none of those left out lies farther off. */
+/* Leaves keep the vertices that the bound needs: fewer the larger it is, and none of those left out lies farther
+ * off. */
 static void leaves_keep_to_the_bound(void **state)
 {
     (void)state;

@@ -417,7 +417,8 @@ static void a_node_has_so_many_vertices_at_most(void **state)
     struct spl_node_lines lines = {0};
     make_cloud(&c, count);
     for (int i = 0; i < count; i++) /* of 1 m and of 2 m, 30 m apart */
-        set_point(&c, (size_t)i, (i / each % 80) * 40 + i % each * (i / each % 2 ? 0.2 : 0.4), i / each / 80 * 30, 0, 0);
+        set_point(&c, (size_t)i, (i / each % 80) * 40 + i % each * (i / each % 2 ? 0.2 : 0.4), i / each / 80 * 30, 0,
+                  0);
     for (int i = 0; i < count; i++)
         c.points.radius[i] = 0.15f;
     join_cloud(&c);

@@ -1,5 +1,5 @@
-/* Children in tables that are read by page: those of all their pages are asked for at once, and each is held against its
- * parent, which opening has not done. */
+/* Children in tables that are read by page: those of all their pages are asked for at once, and each is held against
+ * its parent, which opening has not done. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -159,6 +159,8 @@ static void test_what_is_degenerate_is_refused(void **state)
         {"box:0,0,0,1,0,1", "empty box"},
         {"box:0,0,0,1,-1,1", "before it begins"},
         {"box:0,0,0,1,1,1,400", "400 degrees"},
+        {"box:-1e308,0,0,1e308,1,1", "from -1e+308 to 1e+308, wider than numbers go"},
+        {"polygon:-1e160,-1e160,1e160,-1e160,0,1e160", "a corner at -1e+160, beyond 1e+150"},
         {"box:0,0,0,1,1,1,10,20", "by three"},
         {"plane:0,0,0,0,0,0>0", "without length"},
         {"z", "no <, >"},
@@ -195,8 +197,8 @@ static void test_corners_that_are_shared_count_for_each(void **state)
     struct spl_error err = {0};
     enum { corners = SPL_TERMS_CORNERS_MAX / 2 };
     for (int i = 0; i < corners; i++)
-        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%.6f,%.6f", i ? "," : "", cos(i * 2 * M_PI / corners),
-                 sin(i * 2 * M_PI / corners));
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%s%.6f,%.6f", i ? "," : "",
+                 cos(i * 2 * M_PI / corners), sin(i * 2 * M_PI / corners));
     memset(&terms, 0, sizeof terms);
     assert_int_equal(spl_terms_parse(text, "clip", &terms, &err), SPL_OK);
     for (uint32_t i = 1; i < 3; i++) {

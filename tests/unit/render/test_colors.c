@@ -1,5 +1,6 @@
 /* What colours show and how they are shaded: what each form means, that what is printed reads as the same, what is
  * refused with which field, and what a palette says of values. */
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -73,13 +74,15 @@ static void test_what_is_shaded_by_itself(void **state)
     (void)state;
     struct spl_dataset_info plain = {.has_color = false}, colored = {.has_color = true};
     struct spl_dataset_info grey = {.has_surface = true}, scan = {.has_color = true, .has_surface = true};
-    const struct spl_shade_params by_itself = {0}, none = {.kinds = SPL_SHADE_NONE}, lit = {.kinds = SPL_SHADE_HEADLIGHT};
+    const struct spl_shade_params by_itself = {0}, none = {.kinds = SPL_SHADE_NONE},
+                                  lit = {.kinds = SPL_SHADE_HEADLIGHT};
     static const struct {
         const char *color;
         bool even; /* shows no shape, though the dataset has colours */
         bool one;  /* nor though it shows its own colours, of which there are none */
-    } rows[] = {{"rgb", false, true},     {"class", true, false},  {"rgb+class", false, false}, {"flat:red", true, true},
-                {"height", false, false}, {"classy", false, false}, {"normal", false, false},    {"intensity", false, false}};
+    } rows[] = {{"rgb", false, true},     {"class", true, false},     {"rgb+class", false, false},
+                {"flat:red", true, true}, {"height", false, false},   {"classy", false, false},
+                {"normal", false, false}, {"intensity", false, false}};
     const uint32_t both = SPL_SHADE_EDL | SPL_SHADE_HEADLIGHT;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_color_params color = {0};
@@ -223,9 +226,18 @@ static void test_values_find_their_place(void **state)
     assert_true(paint.low == 10 && paint.high == 20);
     spl_paint_see(&paint, &camera, words);
     /* 3 up from an eye at 12 is y = -3 of a camera that looks along y: 15, in the middle */
-    const double place = -3.0 * (double)float_at(words, SPL_PALETTE_AXIS + 1) * (double)float_at(words, SPL_PALETTE_SCALE) +
-                         (double)float_at(words, SPL_PALETTE_OFFSET);
+    const double place =
+        -3.0 * (double)float_at(words, SPL_PALETTE_AXIS + 1) * (double)float_at(words, SPL_PALETTE_SCALE) +
+        (double)float_at(words, SPL_PALETTE_OFFSET);
     assert_true(fabs(place - 128) < 1e-3);
+    static const double wide[2][2] = {{-1e308, 1e308}, {DBL_MAX, DBL_MAX}}; /* of a width beyond numbers */
+    for (int i = 0; i < 2; i++) {
+        struct spl_error err = {0};
+        color =
+            (struct spl_color_params){.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {wide[i][0], wide[i][1]}};
+        assert_int_equal(spl_paint_init(&paint, &color, &info, &err), SPL_E_INPUT);
+        assert_string_equal(err.field, "range");
+    }
     color = (struct spl_color_params){.by = SPL_COLOR_BY_ATTRIBUTE, .name = "class"};
     assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
     assert_true(paint.classes && paint.colors[2] == 0x0055aa && paint.colors[5] == 0x00aa00);
@@ -248,7 +260,8 @@ static void test_strays_do_not_take_the_colours_of_heights(void **state)
     heights.quantiles[SPL_VALUES_QUANTILES] = info.bounds_max[2] = 20.5;
     assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
     assert_true(paint.low > -1000 && paint.low < 10 && paint.high == 20.5);
-    color = (struct spl_color_params){.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0.25, 0.75}, .shares = {true, true}};
+    color = (struct spl_color_params){
+        .by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0.25, 0.75}, .shares = {true, true}};
     assert_int_equal(spl_paint_init(&paint, &color, &info, NULL), 0);
     assert_true(fabs(paint.low - 12.5) < 1e-9 && fabs(paint.high - 17.5) < 1e-9);
 }
@@ -265,9 +278,11 @@ static void test_what_a_dataset_lacks_is_refused(void **state)
         {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "class", .ramp = SPL_RAMP_GREY}, "range", "give a range"},
         {{.by = SPL_COLOR_BY_HEIGHT, .has_range = true, .range = {0, 1}, .shares = {true, true}}, "range",
          "values of 'height'"},
-        {{.by = SPL_COLOR_BY_PLANE, .plane = {0, 0, 0, 0, 0, 1}, .has_range = true, .range = {0, 1}, .shares = {true, true}},
+        {{.by = SPL_COLOR_BY_PLANE, .plane = {0, 0, 0, 0, 0, 1}, .has_range = true, .range = {0, 1},
+          .shares = {true, true}},
          "range", "give values"},
-        {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "intensity", .has_range = true, .range = {950, 0.5}, .shares = {false, true}},
+        {{.by = SPL_COLOR_BY_ATTRIBUTE, .name = "intensity", .has_range = true, .range = {950, 0.5},
+          .shares = {false, true}},
          "range", "950"},
         {{.by = SPL_COLOR_BY_NORMAL}, "color_by", "--points-only"},
     };

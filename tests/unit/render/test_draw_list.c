@@ -280,7 +280,8 @@ static void panels_count_as_much_work(void **state)
     assert_int_equal(list.first_back_chunk, 2);
     assert_int_equal(list.batches[1].key.kind, SPL_CHUNK_MESHES);
     assert_int_equal(list.batches[1].entries, 2);
-    assert_true(spl_draw_list_has(&list, SPL_CHUNK_PANELS, SPL_ROLE_SOLID) && spl_draw_list_has(&list, SPL_CHUNK_DISCS, SPL_ROLE_SOLID));
+    assert_true(spl_draw_list_has(&list, SPL_CHUNK_PANELS, SPL_ROLE_SOLID) &&
+                spl_draw_list_has(&list, SPL_CHUNK_DISCS, SPL_ROLE_SOLID));
     assert_true(spl_draw_list_has(&list, SPL_CHUNK_MESHES, SPL_ROLE_SOLID));
     assert_false(spl_draw_list_has(&list, SPL_CHUNK_LINES, SPL_ROLE_SOLID));
     spl_draw_list_finish(&list);

@@ -294,7 +294,8 @@ static void a_read_that_hangs_is_left_behind(void **state)
     assert_int_equal(atomic_load(&wakes), 1);
 }
 
-/* Of pages that are as large, while there are others to read; nothing once there are none, and never beyond the bound. */
+/* Of pages that are as large, while there are others to read; nothing once there are none, and never beyond the
+ * bound. */
 static void memory_serves_the_next_read(void **state)
 {
     (void)state;
@@ -384,8 +385,14 @@ static void a_file_from_afar_is_read_by_several(void **state)
     (void)state;
     enum { at_once = 3, count = 8 };
     struct spl_io *io = start();
-    struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .source = &files[0], .bytes = 8, .owner = &files[0],
-                               .get_moved_ns = get_sign_ns, .at_once = at_once};
+    struct spl_io_what what = {.read = read_gated,
+                               .hold = hold,
+                               .let_go = let_go,
+                               .source = &files[0],
+                               .bytes = 8,
+                               .owner = &files[0],
+                               .get_moved_ns = get_sign_ns,
+                               .at_once = at_once};
     atomic_store(&sign_ns, spl_now_ns());
     for (what.index = 0; what.index < count; what.index++)
         assert_non_null(spl_io_try_begin(io, &what, (struct spl_io_rank){.awaited = true, .walk = 1}));

@@ -31,7 +31,8 @@ static void random_unit(float n[3])
         n[c] = (float)(v[c] / sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
 }
 
-/* Clumps of discs of a chunk each, over three decades of size; planes flat and with relief of every level, up to as steep as walls. */
+/* Clumps of discs of a chunk each, over three decades of size; planes flat and with relief of every level, up to as
+ * steep as walls. */
 static struct spl_dataset *make_scene(void)
 {
     static struct make_splat splats[discs];

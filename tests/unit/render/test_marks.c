@@ -107,7 +107,8 @@ static uint32_t mark_of(const struct spl_marks_chunk *judged, const struct codes
     return mark;
 }
 
-/* Any type, any range, alone: what is said of a chunk holds for each of its splats, and its tests give each its mark. */
+/* Any type, any range, alone: what is said of a chunk holds for each of its splats, and its tests give each its
+ * mark. */
 static void numbers_are_as_they_decode(void **state)
 {
     struct spl_dataset_info info = describe();
@@ -155,8 +156,8 @@ static void numbers_are_as_they_decode(void **state)
             double share = reference_share(&soft.what.terms[0], used, value);
             uint32_t mark = mark_of(&judged, &c, i, (float[3]){0});
             if ((share >= 0) != (mark > 0) || (mark && fabs(share * SPL_MARK_MOST - (mark - 1.0)) > 0.6))
-                fail_msg("round %d, %s, base %u, width %u: value %.17g, of %.17g%s to %.17g%s, is %g and has mark %u", round,
-                         streams[s].type, c.base, c.width, value, soft.what.terms[0].least,
+                fail_msg("round %d, %s, base %u, width %u: value %.17g, of %.17g%s to %.17g%s, is %g and has mark %u",
+                         round, streams[s].type, c.base, c.width, value, soft.what.terms[0].least,
                          soft.what.terms[0].with_least ? " (with it)" : "", soft.what.terms[0].most,
                          soft.what.terms[0].with_most ? " (with it)" : "", share, mark);
             assert_true(judged.soft || share < 0);

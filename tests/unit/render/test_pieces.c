@@ -52,6 +52,7 @@ static void a_pixel_is_never_cut(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pieces_cover_a_tile_once), cmocka_unit_test(a_pixel_is_never_cut)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pieces_cover_a_tile_once),
+                                       cmocka_unit_test(a_pixel_is_never_cut)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -86,7 +86,8 @@ static int read_gated(const void *source, uint32_t index, void *out, struct spl_
     return 0;
 }
 
-/* As many reads as can be under way: one that is not awaited finds no place, and gives up its room unless a frame waits. */
+/* As many reads as can be under way: one that is not awaited finds no place, and gives up its room unless a frame
+ * waits. */
 static void who_does_not_wait_leaves_what_others_hold(void **state)
 {
     (void)state;

@@ -104,8 +104,8 @@ static void more_shells_look_the_same(void **state)
     assert_true(with_15 > 0.12 && without > 0.18);
 }
 
-/* What has a share of the others' opacity hides that share of what they hide over their disc, of a model that adds depths,
- * too: nearly so, where it is neither all nor nothing. */
+/* What has a share of the others' opacity hides that share of what they hide over their disc, of a model that adds
+ * depths, too: nearly so, where it is neither all nor nothing. */
 static void thin_ones_hide_their_share(void **state)
 {
     (void)state;

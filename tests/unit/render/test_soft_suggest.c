@@ -81,9 +81,11 @@ static void test_shares_are_those_of_the_file(void **state)
         const char *terms;
         double share;
     } rows[] = {
-        {"class:5", 0.2}, {"class:3-5", 0.2005}, {"class:77", 0}, {"class:4", 0}, {"class>5", 0.1995}, {"class>=5", 0.3995},
+        {"class:5", 0.2}, {"class:3-5", 0.2005}, {"class:77", 0}, {"class:4", 0}, {"class>5", 0.1995},
+        {"class>=5", 0.3995},
         {"class:*", 1}, {"intensity>128", 0.5}, {"intensity>256", 0}, {"intensity>=256", 0.5 / 64}, {"intensity<0", 0},
-        {"intensity:64..128", 0.25}, {"uncertainty>q0.75", 0.25}, {"uncertainty>0.5", 1 - 0.495}, {"uncertainty>1.02", 0},
+        {"intensity:64..128", 0.25}, {"uncertainty>q0.75", 0.25}, {"uncertainty>0.5", 1 - 0.495},
+        {"uncertainty>1.02", 0},
         {"plane:640000,0,111,0,0,1>0", 0}, {"plane:640000,0,111,0,0,1<0", 1}, {"plane:640000,0,105,0,0,3>0", NAN},
         {"plane:640000,0,111,0,0,1>-2", NAN}, {"box:0,0,0,1,1,1", 0}, {"box:640010,0,100,640011,1,101", NAN},
         {"box:640010,30,100,640011,31,101", 0}, {"box:640010,30,100,640011,31,101<11", NAN},
@@ -146,7 +148,8 @@ static void test_what_stands_before_others_comes_first(void **state)
     (void)state;
     struct spl_dataset_info info = make_hall();
     expect(&info, "class:5 | class:18 | " SHAPES " | intensity>q0.95 | uncertainty>q0.95");
-    static const int flown[][2] = {{1, 30000}, {3, 10000}, {4, 10000}, {5, 10000}, {7, 100}, {13, 20000}, {14, 19000}, {64, 900}},
+    static const int flown[][2] = {{1, 30000}, {3, 10000},  {4, 10000},  {5, 10000},
+                                   {7, 100},   {13, 20000}, {14, 19000}, {64, 900}},
                      returns[][2] = {{1, 80000}, {2, 19000}, {4, 1000}};
     info = begin();
     add_kinds(&info, "number_of_returns", 3, returns);
@@ -158,8 +161,8 @@ static void test_what_stands_before_others_comes_first(void **state)
 static void test_what_most_or_next_to_none_have_is_no_beginning(void **state)
 {
     (void)state;
-    static const int wood[][2] = {{5, 99950}, {7, 50}}, nothing[][2] = {{0, points}}, faint[][2] = {{0, 99000}, {1, 1000}},
-                     both[][2] = {{3, 40000}, {5, 60000}};
+    static const int wood[][2] = {{5, 99950}, {7, 50}}, nothing[][2] = {{0, points}},
+                     faint[][2] = {{0, 99000}, {1, 1000}}, both[][2] = {{3, 40000}, {5, 60000}};
     struct spl_dataset_info info = begin();
     add_kinds(&info, "class", 2, wood);
     add_kinds(&info, "intensity", 2, faint); /* no quantity: two values */

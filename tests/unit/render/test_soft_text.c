@@ -156,7 +156,8 @@ static void test_ranges_are_checked(void **state)
         double opacity, cover, blend;
         const char *field; /* NULL = all is well */
     } cases[] = {
-        {0, 0, 0, NULL}, {1, 1, 1e9, NULL}, {0.3, 0.5, 0, NULL}, {1.1, 1, 0, "soft_opacity"}, {NAN, 1, 0, "soft_opacity"},
+        {0, 0, 0, NULL}, {1, 1, 1e9, NULL}, {0.3, 0.5, 0, NULL}, {1.1, 1, 0, "soft_opacity"},
+        {NAN, 1, 0, "soft_opacity"},
         {0.3, 1.001, 0, "soft_cover"}, {0.3, -0.001, 0, "soft_cover"}, {0.3, NAN, 0, "soft_cover"},
         {0.3, INFINITY, 0, "soft_cover"}, {0.3, 1, -1, "soft_blend"}, {0.3, 1, INFINITY, "soft_blend"},
     };

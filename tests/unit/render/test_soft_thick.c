@@ -1,6 +1,6 @@
-/* Windows of depth that overlap: each holds every sphere that overlaps it, and no more than there is room for; they follow
- * one another without a gap to the end, none thinner than asked for; where too much overlaps that is said; what fits is
- * one window, and rooms are filled. */
+/* Windows of depth that overlap: each holds every sphere that overlaps it, and no more than there is room for; they
+ * follow one another without a gap to the end, none thinner than asked for; where too much overlaps that is said; what
+ * fits is one window, and rooms are filled. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
-/* Views of a tree of many small pages under any memory limit, without a device: each ends its wait, whatever was there before,
- * and what it draws depends on the view and the limit alone. */
+/* Views of a tree of many small pages under any memory limit, without a device: each ends its wait, whatever was there
+ * before, and what it draws depends on the view and the limit alone. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -87,7 +87,8 @@ static bool draw(struct spl_renderer *renderer, const struct spl_dataset *datase
         }
         assert_int_equal(job.hold.fruitless, 0);
         spl_hold_release(&job.hold);
-        assert_in_range(waits, 0, 2 * job.resident->slot_count); // a wait ends a walk, or finds the tables of one more page
+        // a wait ends a walk, or finds the tables of one more page
+        assert_in_range(waits, 0, 2 * job.resident->slot_count);
     }
     if (job.page_error.code)
         fail_msg("%s", job.page_error.message);

@@ -133,7 +133,8 @@ enum { expires = 2000000000 };
  */
 #define SIG "2XBn4JAxAIJXdgiOaQIWbDoR9Qvc7eY8dFymrv6PWI0"
 
-static int check(const struct spl_sign_key *key, const char *url, int64_t now, struct spl_signed *found, struct spl_error *err)
+static int check(const struct spl_sign_key *key, const char *url, int64_t now, struct spl_signed *found,
+                 struct spl_error *err)
 {
     char path[400];
     snprintf(path, sizeof path, "%s", url);
@@ -196,7 +197,8 @@ static void urls_are_signed_with_or_without_host_and_query(void **state)
     assert_int_equal(check(&key, whole, 0, &found, &err), 0);
     free(whole);
     /* as a browser asks for it */
-    assert_int_equal(spl_sign_url(&key, "/v1/datasets/x/view?clip='z'<2.5>\"&title=\xc3\xa4~%20+", expires, &whole, &err), 0);
+    assert_int_equal(
+        spl_sign_url(&key, "/v1/datasets/x/view?clip='z'<2.5>\"&title=\xc3\xa4~%20+", expires, &whole, &err), 0);
     assert_non_null(strstr(whole, "?clip=%27z%27%3C2.5%3E%22&title=%C3%A4~%20+&exp="));
     assert_int_equal(check(&key, whole, 0, &found, &err), 0);
     free(whole);
@@ -250,7 +252,8 @@ static void a_signed_page_passes_its_signature_on(void **state)
     spl_sign_key_finish(&key);
 }
 
-/* printf '/v1/datasets/wall/tiles/?class=2&exp=2000000000' | openssl dgst -sha256 -hmac KEY -binary | basenc --base64url */
+/* printf '/v1/datasets/wall/tiles/?class=2&exp=2000000000' | openssl dgst -sha256 -hmac KEY -binary | basenc
+ * --base64url */
 #define TILES_SIG "yrkxvyh_BaSnOvUxw7sTyeVgNJe8ZJxTatgjUQt5iMI"
 
 /* One signature holds for every tile with these parameters, and for nothing that is written otherwise. */
@@ -262,7 +265,8 @@ static void all_tiles_are_signed_together(void **state)
     struct spl_signed found = {0};
     char *url = NULL, path[200];
     static const char grant[] = "?class=2&exp=2000000000&sig=" TILES_SIG;
-    static const char *const templates[] = {"{z}/{x}/{y}.png", "{z}/{x}/{y}{r}.png", "{z}/{x}/{y}@2x.webp", "{z}/{x}/{y}.webp"};
+    static const char *const templates[] = {"{z}/{x}/{y}.png", "{z}/{x}/{y}{r}.png", "{z}/{x}/{y}@2x.webp",
+                                            "{z}/{x}/{y}.webp"};
     for (size_t i = 0; i < sizeof templates / sizeof *templates; i++) {
         snprintf(path, sizeof path, "https://h/v1/datasets/wall/tiles/%s?class=2", templates[i]);
         assert_int_equal(spl_sign_url(&key, path, expires, &url, &err), 0);
@@ -272,7 +276,8 @@ static void all_tiles_are_signed_together(void **state)
     assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles.json?class=2", expires, &url, &err), 0);
     assert_string_equal(strchr(url, '?'), grant);
     free(url);
-    static const char *const good[] = {"/tiles/0/0/0.png", "/tiles/30/1073741823/0.webp", "/tiles/3/1/2@2x.png", "/tiles.json"};
+    static const char *const good[] = {"/tiles/0/0/0.png", "/tiles/30/1073741823/0.webp", "/tiles/3/1/2@2x.png",
+                                       "/tiles.json"};
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         snprintf(path, sizeof path, "/v1/datasets/wall%s", good[i]);
         assert_true(spl_sign_covers(path, strlen(path)));
@@ -288,7 +293,8 @@ static void all_tiles_are_signed_together(void **state)
                                         "/v1/datasets/wall/tiles/0/0/0", "/v1/datasets/wall/tiles/0/0/.png",
                                         "/v1/datasets/wall/tiles//0/0/0.png", "/v1/datasets/wall//tiles/0/0/0.png",
                                         "/v1/datasets/wall/tiles/-1/0/0.png", "/v1/datasets/wall/tiles/../0/0.png",
-                                        "/v1/datasets/wall/tiles/%2e%2e/0/0.png", "/v1/datasets/wall/tiles/0/0/0.png%00",
+                                        "/v1/datasets/wall/tiles/%2e%2e/0/0.png",
+                                        "/v1/datasets/wall/tiles/0/0/0.png%00",
                                         "/v1/datasets/wall/tiles/0%2f0/0/0.png", "/v1/datasets/wall/tiles/%30/0/0.png",
                                         "/v1/datasets/wall/tiles/0/0/0@3x.png", "/v1/datasets/wall/tiles/0/0/0@2x",
                                         "/v1/datasets//tiles/0/0/0.png", "/v1/datasets/wall/tiles.json/"};
@@ -304,7 +310,8 @@ static void all_tiles_are_signed_together(void **state)
                                       "/v1/datasets/wall?class=2&exp=2000000000&sig=" TILES_SIG};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(check(&key, bad[i], 0, &found, &err), SPL_E_INPUT);
-    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles/3/1/2.png", expires, &url, &err), 0); /* this one alone */
+    /* this one alone */
+    assert_int_equal(spl_sign_url(&key, "/v1/datasets/wall/tiles/3/1/2.png", expires, &url, &err), 0);
     assert_int_equal(check(&key, url, 0, &found, &err), 0);
     url[strlen("/v1/datasets/wall/tiles/")] = '4';
     assert_int_equal(check(&key, url, 0, &found, &err), SPL_E_INPUT);
@@ -429,7 +436,8 @@ static void a_host_is_an_address_or_a_name_that_is_listed(void **state)
     assert_true(spl_host_is_name("a.b-c_d") && spl_host_is_name("[::1]") && spl_host_is_name("10.0.0.1"));
     assert_false(spl_host_is_name("a:80") || spl_host_is_name("[::1]:80"));
 
-    assert_true(spl_origin_is_ours("https://a:1", "A:1", &none) && spl_origin_is_ours("http://[::1]:8", "[::1]:8", &none));
+    assert_true(spl_origin_is_ours("https://a:1", "A:1", &none) &&
+                spl_origin_is_ours("http://[::1]:8", "[::1]:8", &none));
     assert_true(spl_origin_is_ours("http://scans.example:8443", "127.0.0.1", &some));
     static const char *const foreign[] = {"null", "", "https://b", "https://a:2", "https://a", "a:1", "https://a:1/",
                                           "https://x@a:1", "file://", "https://a:1.evil"};

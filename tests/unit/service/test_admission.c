@@ -1,56 +1,10 @@
 /* Who is let into a full pipeline, on a fake renderer: views that are over make room, once and at once. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
-
-#include "base/clock.h"
-#include "service/view/pipeline.h"
-
-static struct spl_counters counters;
-
-static void no_wake(void *context)
-{
-    (void)context;
-}
-
-static struct spl_pipeline *start(size_t queue)
-{
-    struct spl_pipeline_options options = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake};
-    struct spl_pipeline *pipeline = NULL;
-    struct spl_error err = {0};
-    memset(&counters, 0, sizeof counters);
-    assert_int_equal(spl_pipeline_create(&options, &pipeline, &err), 0);
-    while (spl_pipeline_get_state(pipeline) == SPL_PIPELINE_STARTING)
-        usleep(1000);
-    return pipeline;
-}
+#include "pipelines.h"
 
 /* A large one is a small picture of many samples. */
 static struct spl_job *make_job(bool large)
 {
-    static const struct spl_camera_defaults defaults = {
-        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
-    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
-    const char *query = large ? "width=2048&height=256&supersample=4" : "width=8&height=4&format=raw";
-    struct spl_job *job = calloc(1, sizeof *job);
-    assert_non_null(job);
-    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
-    job->accepted_ns = spl_now_ns();
-    job->deadline_ns = job->accepted_ns + 60 * SPL_NS_PER_S;
-    return job;
-}
-
-static struct spl_job *take(struct spl_pipeline *pipeline)
-{
-    struct spl_job *job;
-    while (!(job = spl_pipeline_take(pipeline)))
-        usleep(500);
-    return job;
+    return make_view(large ? "width=2048&height=256&supersample=4" : "width=8&height=4&format=raw", 60000);
 }
 
 static size_t get_waiting(struct spl_pipeline *pipeline, size_t *large)
@@ -66,7 +20,7 @@ static size_t get_waiting(struct spl_pipeline *pipeline, size_t *large)
 static void check_room(bool large)
 {
     setenv("FAKE_FRAME_MS", "30000", 1);
-    struct spl_pipeline *pipeline = start(2);
+    struct spl_pipeline *pipeline = start_pipeline((struct spl_pipeline_options){.queue = 2});
     struct spl_job *drawn = make_job(false), *next[5], *job;
     size_t counted;
     for (int i = 0; i < 5; i++)

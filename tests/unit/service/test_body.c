@@ -85,8 +85,9 @@ static void texts_are_no_longer_than_was_said(void **state)
     char text[128];
     for (int length = 100; length <= 101; length++)
         for (int name = 0; name < 2; name++) { /* with an escape, which counts as it is written */
-            snprintf(text, sizeof text, name ? "{\"%.*s\\n\":1}" : "[\"%.*s\\n\"]", length - 2,
-                     "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa");
+            snprintf(
+                text, sizeof text, name ? "{\"%.*s\\n\":1}" : "[\"%.*s\\n\"]", length - 2,
+                "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa");
             assert_int_equal(parse(text, 1000, &err), length == 100 ? 0 : SPL_E_INPUT);
         }
     assert_non_null(strstr(err.message, "a text of 101 bytes"));

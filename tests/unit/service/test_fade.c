@@ -1,4 +1,5 @@
-/* What changes along a tour beside its camera: read from keyframes, straight between those that say it, put into views. */
+/* What changes along a tour beside its camera: read from keyframes, straight between those that say it, put into
+ * views. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -71,15 +72,16 @@ static void a_closed_path_goes_back_to_the_first(void **state)
     (void)state;
     expect("{\"keyframes\":[" KEY(0, ",\"soft_opacity\":1") "," KEY(1, ",\"soft_opacity\":0") "],\"closed\":true}",
            ",\"frames\":4,\"interpolation\":{\"positions\":\"uniform\"}", (double[]){1, 0.5, 0, 0.5});
-    expect("{\"keyframes\":[" KEY(0, "") "," KEY(1, ",\"soft_opacity\":0") "," KEY(2, ",\"soft_opacity\":0.6") "," KEY(3, "")
-           "],\"closed\":true}", ",\"frames\":4,\"interpolation\":{\"positions\":\"uniform\"}",
-           (double[]){0.2, 0, 0.6, 0.4});
+    expect("{\"keyframes\":[" KEY(0, "") "," KEY(1, ",\"soft_opacity\":0") "," KEY(2, ",\"soft_opacity\":0.6") "," KEY(
+               3, "") "],\"closed\":true}",
+           ",\"frames\":4,\"interpolation\":{\"positions\":\"uniform\"}", (double[]){0.2, 0, 0.6, 0.4});
 }
 
 static void frames_of_a_whole_path_have_their_own(void **state)
 {
     (void)state;
-    expect("{\"frames\":[" KEY(0, ",\"soft_opacity\":1") "," KEY(9, ",\"soft_opacity\":0.5") "," KEY(10, ",\"soft_opacity\":0") "]}",
+    expect("{\"frames\":[" KEY(0, ",\"soft_opacity\":1") "," KEY(9, ",\"soft_opacity\":0.5") "," KEY(
+               10, ",\"soft_opacity\":0") "]}",
            "", (double[]){1, 0.5, 0});
     expect("{\"keyframes\":[" KEY(0, ",\"soft_opacity\":0.5") "]}", ",\"frames\":2", (double[]){0.5, 0.5});
 }
@@ -91,11 +93,14 @@ static void what_no_key_says_is_of_the_settings(void **state)
     struct spl_error err;
     expect("{\"keyframes\":[" KEY(0, "") "," KEY(1, "") "]}", ",\"frames\":2", (double[]){0.3, 0.3});
     expect("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2") "," KEY(1, "") "]}", ",\"frames\":2", (double[]){0.3, 0.3});
-    assert_int_equal(read_spec("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2,\"soft_cover\":1") "," KEY(1, ",\"soft_blend\":4,\"soft_cover\":0.5") "]}",
-                               ",\"frames\":3", &spec, &err), 0);
+    assert_int_equal(read_spec("{\"keyframes\":[" KEY(0, ",\"soft_blend\":2,\"soft_cover\":1") "," KEY(
+                                   1, ",\"soft_blend\":4,\"soft_cover\":0.5") "]}",
+                               ",\"frames\":3", &spec, &err),
+                     0);
     struct spl_view view = spec.view.view;
     spl_fade_apply(spec.fades[1], &view);
-    assert_true(view.soft.blend == 3 && view.soft.cover == 0.75 && view.soft.opacity == 0.3 && view.soft.what.count == 1);
+    assert_true(view.soft.blend == 3 && view.soft.cover == 0.75 && view.soft.opacity == 0.3 &&
+                view.soft.what.count == 1);
     spl_tour_spec_finish(&spec);
 }
 
@@ -116,8 +121,8 @@ static void what_is_out_of_range_is_named(void **state)
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         struct spl_tour_spec spec;
         struct spl_error err;
-        if (read_spec(wrong[i].path, ",\"frames\":2", &spec, &err) != SPL_E_INPUT || strcmp(err.field, wrong[i].field) ||
-            !strstr(err.message, wrong[i].says))
+        if (read_spec(wrong[i].path, ",\"frames\":2", &spec, &err) != SPL_E_INPUT ||
+            strcmp(err.field, wrong[i].field) || !strstr(err.message, wrong[i].says))
             fail_msg("%s: %s: %s", wrong[i].path, err.field, err.message);
     }
 }

@@ -1,26 +1,10 @@
 /* Devices side by side, on fake renderers: versions of datasets come and go on all of them, each view goes to one, and
  * those that are lost leave the others serving. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
-
-#include "base/clock.h"
 #include "dataset/dataset.h"
+#include "pipelines.h"
 #include "service/view/device_list.h"
 #include "service/view/fleet.h"
 #include "support/make_dataset.h"
-
-static struct spl_counters counters;
-
-static void no_wake(void *context)
-{
-    (void)context;
-}
 
 static struct spl_fleet *start_on(const char *devices, size_t queue)
 {
@@ -41,18 +25,10 @@ static struct spl_fleet *start(size_t queue)
 
 static struct spl_job *make_job(unsigned deadline_ms)
 {
-    static const struct spl_camera_defaults defaults = {
-        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
-    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
-    static const char query[] = "width=8&height=4&format=raw";
-    struct spl_job *job = calloc(1, sizeof *job);
-    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
-    job->accepted_ns = spl_now_ns();
-    job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
-    return job;
+    return make_view("width=8&height=4&format=raw", deadline_ms);
 }
 
-static struct spl_job *take(struct spl_fleet *fleet)
+static struct spl_job *take_job(struct spl_fleet *fleet)
 {
     struct spl_job *job;
     while (!(job = spl_fleet_take(fleet)))
@@ -69,7 +45,8 @@ static struct spl_catalog_entry *open_entry(void)
     make_folder(path);
     strcat(path, "/one.spld");
     make_dataset_file(path, &splat, 1, 1);
-    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL), 0);
+    assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL),
+                     0);
     unlink(path);
     *strrchr(path, '/') = '\0';
     rmdir(path);
@@ -97,7 +74,7 @@ static int view_of(struct spl_fleet *fleet, struct spl_catalog_entry *entry)
     job->entry = entry ? spl_catalog_entry_ref(entry) : NULL;
     job->dataset = entry ? entry->dataset : NULL;
     assert_int_equal(spl_fleet_submit(fleet, job, NULL), 0);
-    assert_ptr_equal(take(fleet), job);
+    assert_ptr_equal(take_job(fleet), job);
     int code = job->err.code;
     spl_job_destroy(job);
     return code;
@@ -179,7 +156,7 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
         assert_ptr_equal(take_change(fleet), entry);
         assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
         if (!job)
-            spl_job_destroy(take(fleet));
+            spl_job_destroy(take_job(fleet));
         spl_job_destroy(job);
         job = make_job(10000);
         job->entry = spl_catalog_entry_ref(entry);
@@ -187,7 +164,7 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
         spl_catalog_entry_unref(entry); // the job's reference is the last
         assert_null(spl_fleet_take_change(fleet));
         if (!spl_fleet_submit(fleet, job, NULL)) {
-            back = take(fleet);
+            back = take_job(fleet);
             assert_ptr_equal(back, job);
         }
         spl_job_destroy(job);
@@ -236,7 +213,7 @@ static struct spl_pipeline_status look(struct spl_fleet *fleet, size_t device)
 static void finish_all(struct spl_fleet *fleet, int jobs)
 {
     for (int i = 0; i < jobs; i++) {
-        struct spl_job *job = take(fleet);
+        struct spl_job *job = take_job(fleet);
         assert_int_equal(job->err.code, 0);
         spl_job_destroy(job);
     }
@@ -348,7 +325,7 @@ static void a_device_that_is_gone_is_given_up(void **state)
     for (struct spl_job *job; spl_fleet_get_state(fleet) != SPL_PIPELINE_FAILED; spl_job_destroy(job)) {
         job = make_job_of(later);
         if (!spl_fleet_submit(fleet, job, NULL))
-            assert_ptr_equal(take(fleet), job);
+            assert_ptr_equal(take_job(fleet), job);
     }
     assert_int_equal(spl_fleet_get_failure(fleet)->code, SPL_E_DEVICE_LOST);
     spl_catalog_entry_unref(later);

@@ -229,7 +229,8 @@ static void what_changes_a_byte_has_a_key_of_its_own(void **state)
 static void rays_are_part_of_it(void **state)
 {
     (void)state;
-    const double lists[4][2][3] = {{{0, 0, 1}, {1, 0, 1}}, {{0, 0, 3}, {2, 0, 2}}, {{0, 0, 1}, {1, 0, 1.0000001}}, {{1, 0, 1}, {0, 0, 1}}};
+    const double lists[4][2][3] = {
+        {{0, 0, 1}, {1, 0, 1}}, {{0, 0, 3}, {2, 0, 2}}, {{0, 0, 1}, {1, 0, 1.0000001}}, {{1, 0, 1}, {0, 0, 1}}};
     struct spl_view_request request = {.encode.quality = 90};
     struct spl_key keys[4];
     spl_view_init(&request.view);

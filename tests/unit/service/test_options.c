@@ -162,7 +162,8 @@ static void values_that_contradict_each_other_are_refused(void **state)
     char where[300];
     set_flag(SPL_PARAMETER_rate_limit, "1");
     for (int i = 0; i < 3; i++) { // of a flag, a default, no parameter
-        spl_service_options_locate(&options, ((const char *[]){"rate-limit", "queue", "frobnicate"})[i], where, sizeof where);
+        spl_service_options_locate(&options, ((const char *[]){"rate-limit", "queue", "frobnicate"})[i], where,
+                                   sizeof where);
         assert_string_equal(where, "");
     }
 }

@@ -1,26 +1,10 @@
 /* The pipeline without HTTP, on a fake renderer: every job comes back once, with bytes or a reason. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
 
-#include "base/clock.h"
 #include "dataset/dataset.h"
 #include "dataset/source.h"
-#include "service/view/pipeline.h"
+#include "pipelines.h"
 #include "support/make_dataset.h"
-
-static struct spl_counters counters;
-
-static void no_wake(void *context)
-{
-    (void)context;
-}
 
 static uint64_t samples_max, frame_bytes_max;
 
@@ -28,32 +12,10 @@ static uint64_t turn_ns; /* of the pipelines that are started */
 
 static struct spl_pipeline *start(size_t queue)
 {
-    struct spl_pipeline_options options = {.queue = queue,
-                                           .encoders = 2,
-                                           .samples_max = samples_max,
-                                           .frame_bytes_max = frame_bytes_max,
-                                           .turn_ns = turn_ns,
-                                           .counters = &counters,
-                                           .wake = no_wake};
-    struct spl_pipeline *pipeline = NULL;
-    struct spl_error err = {0};
-    memset(&counters, 0, sizeof counters);
-    assert_int_equal(spl_pipeline_create(&options, &pipeline, &err), 0);
-    while (spl_pipeline_get_state(pipeline) == SPL_PIPELINE_STARTING)
-        usleep(1000);
-    return pipeline;
-}
-
-static struct spl_job *make_view(const char *query, unsigned deadline_ms)
-{
-    static const struct spl_camera_defaults defaults = {
-        .eye = {10, 0, 0}, .up = {0, 0, 1}, .fov = 60, .near = 1, .far = 100};
-    static const struct spl_camera_limits limits = {.side_px = 8192, .pixels = 64 << 20};
-    struct spl_job *job = calloc(1, sizeof *job);
-    assert_int_equal(spl_view_request_from_query(query, strlen(query), &defaults, &limits, &job->request, NULL), 0);
-    job->accepted_ns = spl_now_ns();
-    job->deadline_ns = job->accepted_ns + deadline_ms * SPL_NS_PER_MS;
-    return job;
+    return start_pipeline((struct spl_pipeline_options){.queue = queue,
+                                                        .samples_max = samples_max,
+                                                        .frame_bytes_max = frame_bytes_max,
+                                                        .turn_ns = turn_ns});
 }
 
 static struct spl_job *make_job(unsigned deadline_ms)
@@ -67,14 +29,6 @@ static struct spl_job *make_large(unsigned tiles)
     char query[64];
     snprintf(query, sizeof query, "width=2048&height=%u&supersample=4", 128 * tiles);
     return make_view(query, 60000);
-}
-
-static struct spl_job *take(struct spl_pipeline *pipeline)
-{
-    struct spl_job *job;
-    while (!(job = spl_pipeline_take(pipeline)))
-        usleep(500);
-    return job;
 }
 
 static void jobs_come_back_with_bytes(void **state)
@@ -181,7 +135,8 @@ static void a_large_view_ends_between_tiles_when_nobody_waits(void **state)
     setenv("FAKE_MPX_MS", "20", 1);
     struct spl_pipeline *pipeline = start(8);
     struct spl_job *left = make_large(64), *late = make_large(64), *job;
-    late->deadline_ns = spl_now_ns() + 600 * SPL_NS_PER_MS; /* half of what it takes; the small one is long done by then */
+    /* half of what it takes; the small one is long done by then */
+    late->deadline_ns = spl_now_ns() + 600 * SPL_NS_PER_MS;
     assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
     assert_int_equal(spl_pipeline_submit(pipeline, late, NULL), 0);
     struct spl_job *small = make_job(60000);
@@ -329,7 +284,8 @@ static void views_that_wait_for_pages_end(void **state)
     assert_int_equal(counters.frames, 1);
 }
 
-/* Many pages have been read and no more will wake anybody: they are put on the device one after the other, without rests. */
+/* Many pages have been read and no more will wake anybody: they are put on the device one after the other, without
+ * rests. */
 static void what_was_read_is_uploaded_without_rests(void **state)
 {
     (void)state;
@@ -484,7 +440,8 @@ static bool has_changed(void *context)
 static struct spl_dataset *open_far(void)
 {
     static const struct spl_source_far far = {fetch, expect_or_forget, expect_or_forget, get_moved_ns, has_changed};
-    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1, .classification = 6}, {.position = {1, 0, 0}, .normal = {1, 0, 0}, .radius = 1}};
+    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1, .classification = 6},
+                                         {.position = {1, 0, 0}, .normal = {1, 0, 0}, .radius = 1}};
     char path[256] = "";
     struct spl_dataset *dataset = NULL;
     struct spl_dataset_opening how = {.verify = true, .tables_bytes = SPL_TABLES_BYTES};
@@ -536,7 +493,8 @@ static void picks_of_a_server_that_hangs_hold_up_nobody(void **state)
     atomic_store(&server.hangs, true);
     server.asked = 0;
     for (int i = 0; i < picks; i++)
-        assert_int_equal(spl_pipeline_submit(pipeline, make_pick(far, i + 1, i >= 2 && i < 2 + late ? 100 : 60000), NULL), 0);
+        assert_int_equal(
+            spl_pipeline_submit(pipeline, make_pick(far, i + 1, i >= 2 && i < 2 + late ? 100 : 60000), NULL), 0);
     while (server.asked < 2)
         usleep(500);
     for (int i = 0, ended[3] = {0}; i < picks - 16 + late + 4; i++) { // what is refused, late, or of other datasets

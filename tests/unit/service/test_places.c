@@ -133,7 +133,8 @@ static void who_may_not_wait_is_told_what_is_missing(void **state)
     assert_int_equal(ask(&patient, 4269, NULL, NULL, &err), 0);
     assert_int_equal(spl_places_from_world(places, 4269, false, (double[3]){500000, 194305, 0}, out, &err), 0);
     assert_true(fabs(out[0] + 75) < 1e-9 && fabs(out[1] - 1.758) < 0.01);
-    assert_int_equal(spl_places_from_world(places, 4269, false, (double[3]){500000, 4500000, 0}, out, &err), SPL_E_INPUT);
+    assert_int_equal(spl_places_from_world(places, 4269, false, (double[3]){500000, 4500000, 0}, out, &err),
+                     SPL_E_INPUT);
     assert_string_equal(err.field, "world"); // 4306 km from the dataset
     // one request makes a few
     for (uint32_t zone = 0; zone < 3; zone++)

@@ -157,7 +157,8 @@ static void a_view_by_name_stands_for_what_is_left_out(void **state)
     struct spl_view_request r, other;
     struct spl_error err = {0};
     named.names = &plain.names;
-    const char *door = "view=door&width=300&height=200", *body = "{\"view\": \"door\", \"width\": 300, \"height\": 200}";
+    const char *door = "view=door&width=300&height=200",
+               *body = "{\"view\": \"door\", \"width\": 300, \"height\": 200}";
     assert_int_equal(spl_view_request_from_query(door, strlen(door), &named, &limits, &r, &err), 0);
     assert_int_equal(spl_view_request_from_json(body, strlen(body), &named, &limits, &other, &err), 0);
     assert_memory_equal(&r.view.camera, &other.view.camera, sizeof r.view.camera);
@@ -170,10 +171,12 @@ static void a_view_by_name_stands_for_what_is_left_out(void **state)
     assert_int_equal(spl_views_request_from_json(list, strlen(list), &named, &limits, &views, &err), 0);
     assert_true(views.views[0].view.camera.eye[0] == 7 && views.views[1].view.camera.eye[0] == 3);
     spl_views_request_finish(&views);
-    static const char *const wrong[] = {"view=window", "view=", "view=.a", "view=a/b", "view=door&view=door", "view=a%20b"};
+    static const char *const wrong[] = {"view=window",         "view=",     "view=.a", "view=a/b",
+                                        "view=door&view=door", "view=a%20b"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         err = (struct spl_error){0};
-        assert_int_equal(spl_view_request_from_query(wrong[i], strlen(wrong[i]), &named, &limits, &r, &err), SPL_E_INPUT);
+        assert_int_equal(spl_view_request_from_query(wrong[i], strlen(wrong[i]), &named, &limits, &r, &err),
+                         SPL_E_INPUT);
         assert_string_equal(err.field, "view");
     }
     assert_int_equal(query("view=door", &r, &err), SPL_E_INPUT); // nobody here knows any
@@ -192,8 +195,10 @@ static void assert_clip(const struct spl_view_request *r, const char *text)
 static void what_a_view_shows_stands_for_what_is_left_out(void **state)
 {
     (void)state;
-    struct door door = {{find_door}, "{\"clip\":[\"z<2\",\"x>1\"],\"class\":\"!7\",\"color_by\":\"height\",\"range\":\"0..3\",\"shade\":\"edl\","
-                                     "\"edl_radius\":4,\"soft\":\"z>5\",\"soft_opacity\":0.5,\"background\":\"white\"}"};
+    struct door door = {
+        {find_door},
+        "{\"clip\":[\"z<2\",\"x>1\"],\"class\":\"!7\",\"color_by\":\"height\",\"range\":\"0..3\",\"shade\":\"edl\","
+        "\"edl_radius\":4,\"soft\":\"z>5\",\"soft_opacity\":0.5,\"background\":\"white\"}"};
     struct spl_camera_defaults named = defaults;
     const struct spl_camera_places places = {move};
     struct spl_view_request r;
@@ -246,12 +251,14 @@ static void a_thumbnail_is_small(void **state)
     assert_clip(&r, "z<2 and class:2 or class:6");
     static const struct {
         const char *text, *field;
-    } wrong[] = {{"width=15", "width"}, {"clip=q", "clip"}, {"class=q", "class"}, {"color_by=class", "color_by"}, {"width=1281", "width"}, {"width=1.5", "width"}, {"height=90", "height"},
+    } wrong[] = {{"width=15", "width"}, {"clip=q", "clip"}, {"class=q", "class"}, {"color_by=class", "color_by"},
+                 {"width=1281", "width"}, {"width=1.5", "width"}, {"height=90", "height"},
                  {"eye=1,2,3", "eye"},  {"v=5", "v"},            {"shade=1", "shade"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         err = (struct spl_error){0};
-        assert_int_equal(spl_thumbnail_request_from_query(wrong[i].text, strlen(wrong[i].text), &defaults, &limits, &r, &err),
-                         SPL_E_INPUT);
+        assert_int_equal(
+            spl_thumbnail_request_from_query(wrong[i].text, strlen(wrong[i].text), &defaults, &limits, &r, &err),
+            SPL_E_INPUT);
         assert_string_equal(err.field, wrong[i].field);
     }
 }
@@ -722,7 +729,8 @@ static void refusals_of_bodies_say_what_to_write(void **state)
     static const char *const rows[][2] = {
         {"{\"camera\":{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}",
          "'convention' is needed where 'matrix' is given: opengl or opencv"},
-        {"{\"camera\":{\"matrix\":[[1,0,0,0]],\"convention\":\"opengl\"}}", "3 or 4 rows of 4; it is an array of 1 rows"},
+        {"{\"camera\":{\"matrix\":[[1,0,0,0]],\"convention\":\"opengl\"}}",
+         "3 or 4 rows of 4; it is an array of 1 rows"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_view_request r;

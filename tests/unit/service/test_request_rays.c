@@ -1,5 +1,5 @@
-/* Requests that are views by their own rules: lists of rays, whose frames and refusals are theirs; map tiles; plans that were
- * saved under a name. */
+/* Requests that are views by their own rules: lists of rays, whose frames and refusals are theirs; map tiles; plans
+ * that were saved under a name. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -33,7 +33,8 @@ static void rays_look_along_their_frame(void **state)
         struct spl_view_request r;
         struct spl_error err = {0};
         assert_int_equal(spl_rays_create(list[i], 1, &rays, NULL), 0);
-        assert_int_equal(spl_rays_request_from(NULL, rows[i].query, strlen(rows[i].query), rays, &defaults, &limits, &r, &err), 0);
+        assert_int_equal(
+            spl_rays_request_from(NULL, rows[i].query, strlen(rows[i].query), rays, &defaults, &limits, &r, &err), 0);
         for (int k = 0; k < 3; k++) {
             const double *m = r.view.camera.rotation + k, *d = rays->directions[0];
             assert_true(fabs(m[0] * d[0] + m[3] * d[1] + m[6] * d[2] - rows[i].hit[k]) < 1e-12);
@@ -42,7 +43,9 @@ static void rays_look_along_their_frame(void **state)
         static const char *const lenses[] = {"fov=50", "width=9", "projection=cube", "fx=100", "elevation=1,2,3"};
         for (size_t k = 0; k < sizeof lenses / sizeof *lenses; k++) {
             struct spl_error why = {0};
-            assert_int_equal(spl_rays_request_from(NULL, lenses[k], strlen(lenses[k]), rays, &defaults, &limits, &r, &why), SPL_E_INPUT);
+            assert_int_equal(
+                spl_rays_request_from(NULL, lenses[k], strlen(lenses[k]), rays, &defaults, &limits, &r, &why),
+                SPL_E_INPUT);
             assert_int_equal(strncmp(lenses[k], why.field, strlen(why.field)), 0);
         }
         spl_rays_destroy(rays);
@@ -52,7 +55,8 @@ static void rays_look_along_their_frame(void **state)
 static void a_tile_lies_among_others(void **state)
 {
     (void)state;
-    const struct spl_tile_view tile = {.eye = {1, 2, 30}, .up = {0, 1}, .scale = {4, 4}, .side = 256, .format = SPL_FORMAT_PNG};
+    const struct spl_tile_view tile = {
+        .eye = {1, 2, 30}, .up = {0, 1}, .scale = {4, 4}, .side = 256, .format = SPL_FORMAT_PNG};
     struct spl_view_request r;
     struct spl_error err = {0};
     assert_int_equal(spl_tile_request_from_query("shade=edl", 9, &tile, &defaults, &limits, &r, &err), 0);
@@ -67,7 +71,8 @@ static void a_tile_lies_among_others(void **state)
     assert_false(r.view.surrounded);
 }
 
-static int find_plan(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out, struct spl_error *err)
+static int find_plan(const struct spl_camera_names *names, const char *name, struct spl_camera_defaults *out,
+                     struct spl_error *err)
 {
     (void)names;
     (void)name;

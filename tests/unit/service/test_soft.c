@@ -54,10 +54,13 @@ static void every_way_of_asking_means_the_same(void **state)
     static const char *const ways[] = {
         "soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_cover=0.25&soft_blend=2",
         "soft=class:3..5&soft_opacity=0.7&soft_cover=0.25&soft=uncertainty%3Eq0.9&soft_model=base&soft_blend=2",
-        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,\"soft_blend\":2}",
-        "{\"soft\":\"class:3-5 or uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,\"soft_blend\":2}",
+        "{\"soft\":[\"class:3-5\",\"uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0."
+        "25,\"soft_blend\":2}",
+        "{\"soft\":\"class:3-5 or "
+        "uncertainty>q0.9\",\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,\"soft_blend\":2}",
         "@x=1&y=1&soft=class:3-5+or+uncertainty>q0.9&soft_model=base&soft_opacity=0.7&soft_cover=0.25&soft_blend=2",
-        ("@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,"
+        ("@{\"x\":1,\"y\":1,\"soft\":[\"class:3-5 or "
+         "uncertainty>q0.9\"],\"soft_model\":\"base\",\"soft_opacity\":0.7,\"soft_cover\":0.25,"
          "\"soft_blend\":2}"),
     };
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
@@ -76,7 +79,8 @@ static void nothing_is_soft_by_itself(void **state)
     static const char *const ways[] = {"", "{}", "{\"soft\":[]}", "@x=1&y=1"};
     for (size_t i = 0; i < sizeof ways / sizeof *ways; i++) {
         struct spl_soft_params soft = soft_asked(ways[i]);
-        assert_true(!soft.what.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 && soft.cover == 1 && !soft.blend);
+        assert_true(!soft.what.count && soft.model == SPL_SOFT_MODEL_EXPRESS && soft.opacity == 0.3 &&
+                    soft.cover == 1 && !soft.blend);
     }
 }
 

@@ -32,7 +32,8 @@ static int find_door(const struct spl_camera_names *names, const char *name, str
 /* A scanner that leans, turned to +y, and a camera that looks along -x and down. */
 static const double poses[2][16] = {{0, -1, 0, 5, 0.8, 0, -0.6, 6, 0.6, 0, 0.8, 7, 0, 0, 0, 1},
                                     {0, 0.6, -0.8, 1e6, 1, 0, 0, 2e6, 0, -0.8, -0.6, 3, 0, 0, 0, 1}};
-static const struct spl_dataset_info scanned = {.id = "hall", .default_up = {0, 0, 2}, .station_count = 2, .stations = poses};
+static const struct spl_dataset_info scanned = {
+    .id = "hall", .default_up = {0, 0, 2}, .station_count = 2, .stations = poses};
 
 static int at_station(const char *text, struct spl_view_request *r, struct spl_error *err)
 {

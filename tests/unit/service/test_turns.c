@@ -32,7 +32,8 @@ static void who_waits_for_pages_has_no_turn(void **state)
 {
     (void)state;
     struct spl_turns turns;
-    struct spl_job jobs[2] = {{.accepted_ns = 1, .samples_left = 10, .waits = true}, {.accepted_ns = 2, .samples_left = 20}};
+    struct spl_job jobs[2] = {{.accepted_ns = 1, .samples_left = 10, .waits = true},
+                              {.accepted_ns = 2, .samples_left = 20}};
     spl_turns_init(&turns);
     spl_turns_add(&turns, &jobs[0]);
     for (int i = 0; i < 4 * SPL_TURNS_EVERY; i++) // nor does it count as one

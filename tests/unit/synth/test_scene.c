@@ -467,9 +467,10 @@ static void objects_have_classes(void **state)
     static const struct {
         const char *object;
         int class;
-    } rows[] = {{"leaves", 5},        {"oak-branches", 5}, {"ground", 2},     {"ground-wire", 13}, {"contact-wires", 14},
-                {"facade-north", 6},  {"field-rape", 2},   {"sphere", 1},     {"underground", 1},  {"wallpaper", 1},
-                {"study-ceiling", 64}, {"chair-2", 65},    {"study-walls", 6}, {"pylon-1", 15},    {"", 1}};
+    } rows[] = {
+        {"leaves", 5},         {"oak-branches", 5}, {"ground", 2},      {"ground-wire", 13}, {"contact-wires", 14},
+        {"facade-north", 6},   {"field-rape", 2},   {"sphere", 1},      {"underground", 1},  {"wallpaper", 1},
+        {"study-ceiling", 64}, {"chair-2", 65},     {"study-walls", 6}, {"pylon-1", 15},     {"", 1}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         if (spl_scene_class(rows[i].object) != rows[i].class)
             fail_msg("%s is of class %d", rows[i].object, spl_scene_class(rows[i].object));
