@@ -200,18 +200,18 @@ void spl_pipeline_close_render(struct spl_pipeline *pipeline)
 
 void spl_pipeline_stop(struct spl_pipeline *pipeline)
 {
+    if (pipeline->stopped)
+        return;
+    pipeline->stopped = true;
     spl_pipeline_close_render(pipeline);
     if (pipeline->gpu_started)
         pthread_join(pipeline->gpu_thread, NULL);
-    pipeline->gpu_started = false;
     close_queue(pipeline->encode);
     close_queue(pipeline->encode_large);
     for (size_t i = 0; i < pipeline->encode_started; i++)
         pthread_join(pipeline->encode_threads[i], NULL);
-    pipeline->encode_started = 0;
     if (pipeline->large_started)
         pthread_join(pipeline->large_thread, NULL);
-    pipeline->large_started = false;
     spl_far_picks_finish(&pipeline->far);
     if (pipeline->done)
         for (struct spl_job *job; (job = spl_pipeline_take(pipeline));)
@@ -267,7 +267,7 @@ enum spl_pipeline_state spl_pipeline_get_state(struct spl_pipeline *pipeline)
 
 bool spl_pipeline_has_ended(struct spl_pipeline *pipeline)
 {
-    return !pipeline->gpu_started || atomic_load(&pipeline->ended);
+    return pipeline->stopped || atomic_load(&pipeline->ended);
 }
 
 uint64_t spl_pipeline_get_renderer(struct spl_pipeline *pipeline)

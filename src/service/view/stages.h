@@ -37,7 +37,7 @@ struct spl_pipeline {
     pthread_t gpu_thread, encode_threads[ENCODERS_MAX], large_thread;
     size_t encode_started;
     struct spl_far_picks far;
-    bool gpu_started, large_started;
+    bool gpu_started, large_started, stopped;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
     _Atomic uint64_t device_bytes, device_limit_bytes, pages_pending, renderer;
     _Atomic uint64_t frame_ns, turn_ns; /* moving means: of a frame, and of a turn, a tile at most */
