@@ -7,4 +7,7 @@
 /* Entry count / 2 of `values` (at least one), which are sorted in place. Pure. */
 float spl_median(float *values, size_t count);
 
+/* The `nth` smallest, which comes to stand at its place, smaller ones before it and greater ones behind. None is NaN. */
+double spl_nth(double *values, size_t count, size_t nth);
+
 #endif
