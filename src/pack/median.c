@@ -1,9 +1,11 @@
-/* Medians of a few hundred radii, by sorting: samples are so small that nothing cleverer pays; quantiles of many by
- * dividing the part that they lie in. An even count gives the upper of its two middle values, so a median is always a
+/* Medians of a few hundred radii, by sorting where somebody reads them in order, else, as quantiles of many, by dividing
+ * the part that they lie in. An even count gives the upper of its two middle values, so a median is always a
  * value of the sample. */
 #include "pack/median.h"
 
 #include <stdlib.h>
+
+#include "base/memory.h"
 
 static int compare(const void *a, const void *b)
 {
@@ -45,4 +47,13 @@ double spl_nth(double *values, size_t count, size_t nth)
             break;
     }
     return values[nth];
+}
+
+float spl_middle(const float *values, size_t count)
+{
+    double copy[SPL_MIDDLE_MAX];
+    spl_assert(count <= SPL_MIDDLE_MAX);
+    for (size_t i = 0; i < count; i++)
+        copy[i] = (double)values[i];
+    return (float)spl_nth(copy, count, count / 2);
 }

@@ -298,6 +298,10 @@ static void a_quantile_is_that_of_sorted_values(void **state)
                     values[i] = sorted[i] = kinds == 14 ? (double)i : (double)((random >> 33) % (unsigned)kinds);
                 }
                 qsort(sorted, count, sizeof *sorted, compare_doubles);
+                float singles[most];
+                for (size_t i = 0; i < count; i++)
+                    singles[i] = (float)values[i];
+                assert_true((double)spl_middle(singles, count) == sorted[count / 2]);
                 assert_true(spl_nth(values, count, nth) == sorted[nth]);
                 for (size_t i = 0; i < count; i++)
                     assert_true(i < nth ? values[i] <= sorted[nth] : values[i] >= sorted[nth]);
