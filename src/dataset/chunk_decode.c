@@ -96,17 +96,22 @@ static uint8_t clamp_byte(int32_t value)
     return (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
 }
 
-void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat)
+uint32_t spl_discs_decode_position(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, float position[3])
 {
     uint32_t bits = chunk->geometry_bits;
     const uint32_t *words = page + chunk->geometry_word;
     uint32_t bit = i * spl_chunk_geometry_width(chunk);
-    splat->position[0] =
-        chunk->origin[0] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_X, 5));
-    splat->position[1] =
-        chunk->origin[1] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Y, 5));
-    splat->position[2] =
-        chunk->origin[2] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Z, 5));
+    position[0] = chunk->origin[0] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_X, 5));
+    position[1] = chunk->origin[1] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Y, 5));
+    position[2] = chunk->origin[2] + chunk->step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_Z, 5));
+    return bit;
+}
+
+void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat)
+{
+    uint32_t bits = chunk->geometry_bits;
+    const uint32_t *words = page + chunk->geometry_word;
+    uint32_t bit = spl_discs_decode_position(chunk, page, i, splat->position);
     float u = chunk->normal_u + chunk->normal_step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_U, 4));
     float v = chunk->normal_v + chunk->normal_step * (float)take(words, &bit, spl_bits_part(bits, SPL_GEOMETRY_V, 4));
     splat->radius =

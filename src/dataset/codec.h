@@ -29,6 +29,8 @@ uint32_t spl_discs_encode(const struct spl_splat *splats, const double (*positio
                           const struct spl_chunk_options *options, struct spl_chunk *chunk, uint32_t *words,
                           struct spl_chunk_error *error);
 void spl_discs_decode(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, struct spl_splat *splat);
+/* Its position alone; returns the bit behind it, counted from the chunk's first word. */
+uint32_t spl_discs_decode_position(const struct spl_chunk *chunk, const uint32_t *page, uint32_t i, float position[3]);
 void spl_discs_add_bits(const struct spl_chunk *chunk, uint64_t bits[SPL_ATTRIBUTE_COUNT]);
 const char *spl_discs_judge(const struct spl_chunk *chunk);
 

@@ -47,8 +47,8 @@ int spl_values_add(struct spl_values *v, double value, uint64_t weight, struct s
         return SPL_OK;
     if (!v->samples && !(v->samples = spl_alloc_raw(SPL_VALUES_SAMPLES, sizeof *v->samples, err)))
         return SPL_E_NOMEM;
-    v->least = v->count ? fmin(v->least, value) : value;
-    v->most = v->count ? fmax(v->most, value) : value;
+    v->least = v->count && v->least < value ? v->least : value;
+    v->most = v->count && v->most > value ? v->most : value;
     v->count += weight;
     if (!v->too_many_kinds)
         count_kind(v, value, weight);

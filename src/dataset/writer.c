@@ -75,6 +75,7 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
         return SPL_E_NOMEM;
     writer->offset = sizeof(struct spl_file_header);
     writer->page_limit = SPL_PAGE_BYTES;
+    writer->threads = 1;
     int rc = reserve(&writer->page, SPL_PAGE_BYTES / sizeof(uint32_t) - SPL_PAGE_TAIL_WORDS, err);
     if (!rc)
         rc = spl_part_file_init(&writer->file, path, err);
@@ -89,6 +90,11 @@ void spl_dataset_writer_set_page_bytes(struct spl_dataset_writer *writer, size_t
 {
     spl_assert(bytes <= SPL_PAGE_BYTES_MAX);
     writer->page_limit = bytes;
+}
+
+void spl_dataset_writer_set_threads(struct spl_dataset_writer *writer, unsigned threads)
+{
+    writer->threads = threads;
 }
 
 int spl_dataset_writer_set_dictionary(struct spl_dataset_writer *writer, const struct spl_dictionary *dictionary,

@@ -20,6 +20,9 @@ int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out,
 /* Pages of about so many bytes, instead of SPL_PAGE_BYTES: for tests that want many of them. */
 void spl_dataset_writer_set_page_bytes(struct spl_dataset_writer *writer, size_t bytes);
 
+/* How many threads finishing may take, 1 where nobody says it. The file is the same. */
+void spl_dataset_writer_set_threads(struct spl_dataset_writer *writer, unsigned threads);
+
 /* Appends the data of one node: `words` of all its chunks, whose geometry_word is relative to words[0]. Starts a new
  * page when the node, or what describes it, does not fit the current one; sets *page, and adds the node's place in the
  * page to each chunks[].geometry_word. A node above SPL_PAGE_BYTES_MAX is refused with SPL_E_LIMIT. */

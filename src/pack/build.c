@@ -53,8 +53,9 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
 {
     struct spl_default_view view;
     double radius;
-    int rc = p->options->default_view ? SPL_OK
-                                      : spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, &view, err);
+    int rc = p->options->default_view
+                 ? SPL_OK
+                 : spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, p->stage->threads, &view, err);
     if (p->options->default_view)
         spl_said_view(p->options->default_view, p->points.up, &view);
     if (!rc)
@@ -70,6 +71,8 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
     spl_stage_begin(p->stage, "writing", NULL, 0);
     rc = spl_said_add(p->options, p->points.up, meta, err);
+    if (!rc)
+        spl_dataset_writer_set_threads(p->writer, p->stage->threads);
     if (!rc)
         rc = spl_dataset_writer_finish(p->writer, p->emitted.nodes, p->tree.count, p->emitted.chunks,
                                    p->emitted.chunk_count, meta, err);

@@ -7,19 +7,23 @@
 
 #include "shared.h"
 
+/* Four floats: an item as a whole, of which the last means nothing. */
+typedef float spl_floats __attribute__((vector_size(16), may_alias));
+typedef int32_t spl_marks __attribute__((vector_size(16)));
+_Static_assert(sizeof(struct spl_cut) == sizeof(spl_floats), "an item is three floats and an index");
+
 static unsigned longest_axis(const struct spl_cut *items, size_t count)
 {
-    float low[3], high[3];
-    for (int c = 0; c < 3; c++)
-        low[c] = high[c] = items[0].position[c];
-    for (size_t i = 1; i < count; i++)
-        for (int c = 0; c < 3; c++) {
-            float v = items[i].position[c];
-            low[c] = v < low[c] ? v : low[c];
-            high[c] = v > high[c] ? v : high[c];
-        }
-    unsigned axis = high[1] - low[1] > high[0] - low[0];
-    return high[2] - low[2] > high[axis] - low[axis] ? 2 : axis;
+    spl_floats low = *(const spl_floats *)items, high = low;
+    for (size_t i = 1; i < count; i++) {
+        spl_floats v = *(const spl_floats *)&items[i];
+        spl_marks less = v<low, more = v> high;
+        low = (spl_floats)(((spl_marks)v & less) | ((spl_marks)low & ~less));
+        high = (spl_floats)(((spl_marks)v & more) | ((spl_marks)high & ~more));
+    }
+    spl_floats size = high - low;
+    unsigned axis = size[1] > size[0];
+    return size[2] > size[axis] ? 2 : axis;
 }
 
 static void swap(struct spl_cut *a, struct spl_cut *b)
@@ -27,6 +31,42 @@ static void swap(struct spl_cut *a, struct spl_cut *b)
     struct spl_cut t = *a;
     *a = *b;
     *b = t;
+}
+
+/* What a run of items has on the wrong side of a pivot: where, counted from its end towards the middle. */
+enum { run_items = 16 };
+struct misplaced {
+    uint8_t at[run_items];
+    unsigned count, next;
+};
+
+/* Swaps what both ends have on the wrong side, pair by pair from outside, until the ends are near each other: as the
+ * loops of select_nth() would, but without a branch that depends on values. [begin, *i) and [*j + 1, end) are done. */
+static void swap_runs(struct spl_cut *items, size_t *i, size_t *j, unsigned axis, float pivot)
+{
+    struct misplaced left = {.count = 0}, right = {.count = 0};
+    while (*j - *i >= 2 * run_items) {
+        if (left.next == left.count) {
+            left.next = left.count = 0;
+            for (unsigned k = 0; k < run_items; k++) {
+                left.at[left.count] = (uint8_t)k;
+                left.count += !(items[*i + k].position[axis] < pivot);
+            }
+        }
+        if (right.next == right.count) {
+            right.next = right.count = 0;
+            for (unsigned k = 0; k < run_items; k++) {
+                right.at[right.count] = (uint8_t)k;
+                right.count += !(items[*j - k].position[axis] > pivot);
+            }
+        }
+        while (left.next < left.count && right.next < right.count)
+            swap(&items[*i + left.at[left.next++]], &items[*j - right.at[right.next++]]);
+        *i += left.next == left.count ? run_items : 0;
+        *j -= right.next == right.count ? run_items : 0;
+    }
+    *i += left.next < left.count ? left.at[left.next] : 0;
+    *j -= right.next < right.count ? right.at[right.next] : 0;
 }
 
 /* Puts the `nth` smallest along `axis` in its place, smaller ones before it. Stops at equal values, so runs of them
@@ -39,6 +79,7 @@ static void select_nth(struct spl_cut *items, size_t count, size_t nth, unsigned
         float c = items[end - 1].position[axis];
         float pivot = a < b ? (b < c ? b : a < c ? c : a) : (a < c ? a : b < c ? c : b);
         size_t i = begin, j = end - 1;
+        swap_runs(items, &i, &j, axis, pivot);
         for (;;) {
             while (items[i].position[axis] < pivot)
                 i++;

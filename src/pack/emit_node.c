@@ -12,6 +12,7 @@
 #include "pack/median.h"
 
 enum { spacing_sample = 1023 };
+_Static_assert((int)spacing_sample <= (int)SPL_MIDDLE_MAX, "a sample has a middle");
 static const float width_most = 1.4f; /* of a chunk's lines, as a multiple of the least */
 enum { widths_most = 36 };            /* chunks that begin for another width: lines are sorted by theirs */
 
@@ -274,7 +275,7 @@ bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *nod
     for (uint32_t i = 0; i < sample; i++)
         w->radii[i] = w->radii[(uint64_t)i * count / sample];
     header->spacing =
-        (node->panels ? median_with_panels(w, sample, count, node->panels) : spl_median(w->radii, sample)) /
+        (node->panels ? median_with_panels(w, sample, count, node->panels) : spl_middle(w->radii, sample)) /
         SPL_RADIUS_SPACING;
 
     const uint32_t linear = w->wires->with_widths ? put_linear_first(w, node, count) : 0;

@@ -123,7 +123,7 @@ static double median_radius(const struct spl_inner_splat *splats, size_t count, 
     size_t sample = count < 255 ? count : 255;
     for (size_t i = 0; i < sample; i++)
         radii[i] = splats[i * count / sample].radius;
-    return spl_median(radii, sample);
+    return spl_middle(radii, sample);
 }
 
 static uint64_t cell_of(const struct spl_inner_splat *s, double inverse)

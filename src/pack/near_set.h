@@ -1,7 +1,8 @@
 /* Collecting the nearest of many points: what lies within a bound is added, and the bound tightened whenever
  * SPL_NEAR_SET_SPARE more than the wanted ones are there, so that a dense cluster costs a search no more than its
  * surroundings. Loops are written to vectorise, and inline, so that they are compiled for whatever processor the search
- * that uses them is. */
+ * that uses them is: a file that includes this defines SPL_NEAR_AVX2 or SPL_NEAR_AVX512 before, or neither. All give
+ * the same, in the same order. */
 #ifndef SPL_PACK_NEAR_SET_H
 #define SPL_PACK_NEAR_SET_H
 
@@ -9,36 +10,106 @@
 
 #include "pack/points.h"
 
-#define SPL_INLINE static inline __attribute__((always_inline))
-
-/* Four doubles, unaligned in memory; comparisons give masks. */
+#if defined(SPL_NEAR_AVX512)
+#include <immintrin.h>
+#define SPL_NEAR_TARGET __attribute__((target("avx512f,avx512vl,avx512dq,bmi,popcnt")))
+enum { SPL_LANES = 8 };
+#elif defined(SPL_NEAR_AVX2)
+#define SPL_NEAR_TARGET __attribute__((target("avx2,bmi,popcnt")))
 enum { SPL_LANES = 4 };
-typedef double spl_vec __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t spl_mask __attribute__((vector_size(32), aligned(8), may_alias));
-#define SPL_VEC(v) ((spl_vec){v, v, v, v})
+#else
+#define SPL_NEAR_TARGET
+enum { SPL_LANES = 2 };
+#endif
+#define SPL_INLINE SPL_NEAR_TARGET static inline __attribute__((always_inline))
+
+/* A few doubles, unaligned in memory; comparisons give masks. */
+typedef double spl_vec __attribute__((vector_size(SPL_LANES * 8), aligned(8), may_alias));
+typedef int64_t spl_mask __attribute__((vector_size(SPL_LANES * 8), aligned(8), may_alias));
+#define SPL_VEC(v) ((v) - (spl_vec){0}) /* of -0 too */
 
 enum {
     SPL_NEAR_SET_SPARE = 40, /* points beyond the wanted ones that wait for a reduction */
     SPL_NEAR_SET_RUN = 16,   /* a search adds at most before it reduces again */
-    SPL_NEAR_SET_MAX =
-        (SPL_NEIGHBOURS_MAX + 1 + SPL_NEAR_SET_SPARE + SPL_NEAR_SET_RUN + SPL_LANES - 1) / SPL_LANES * SPL_LANES
+    SPL_NEAR_SET_MAX = (SPL_NEIGHBOURS_MAX + 1 + SPL_NEAR_SET_SPARE + SPL_NEAR_SET_RUN + 7) / 8 * 8
 };
 
 struct spl_near_set {
-    unsigned count, wanted; /* of which SPL_NEIGHBOURS_MAX + 1 at most */
-    double bound;           /* squared; `wanted` points lie within it */
-    double squared[SPL_NEAR_SET_MAX];
-    uint32_t index[SPL_NEAR_SET_MAX];
+    unsigned count, wanted;                       /* of which SPL_NEIGHBOURS_MAX + 1 at most */
+    double bound;                                 /* squared; `wanted` points lie within it */
+    double squared[SPL_NEAR_SET_MAX + SPL_LANES]; /* and room for a vector that is stored at the end */
+    uint32_t index[SPL_NEAR_SET_MAX + SPL_LANES];
 };
+
+SPL_INLINE spl_vec spl_select(spl_mask which, spl_vec yes, spl_vec no)
+{
+    return (spl_vec)(((spl_mask)yes & which) | ((spl_mask)no & ~which));
+}
+
+SPL_INLINE spl_vec spl_greater(spl_vec a, spl_vec b)
+{
+#if defined(SPL_NEAR_AVX512)
+    return (spl_vec)_mm512_max_pd((__m512d)a, (__m512d)b);
+#else
+    return spl_select(a > b, a, b);
+#endif
+}
+
+SPL_INLINE spl_vec spl_lesser(spl_vec a, spl_vec b)
+{
+#if defined(SPL_NEAR_AVX512)
+    return (spl_vec)_mm512_min_pd((__m512d)a, (__m512d)b);
+#else
+    return spl_select(a < b, a, b);
+#endif
+}
+
+/* Bit k: whether value k of SPL_LANES is at most `limit`. */
+SPL_INLINE unsigned spl_bits_within(spl_vec values, double limit)
+{
+#if defined(SPL_NEAR_AVX512)
+    return _mm512_cmp_pd_mask((__m512d)values, _mm512_set1_pd(limit), _CMP_LE_OQ);
+#else
+    unsigned bits = 0;
+    for (unsigned k = 0; k < SPL_LANES; k++)
+        bits |= (unsigned)(values[k] <= limit) << k;
+    return bits;
+#endif
+}
+
+/* Bit k: whether index k of the first `n` of SPL_LANES is another than `other`. */
+SPL_INLINE unsigned spl_bits_other(const uint32_t *index, unsigned n, uint32_t other)
+{
+    unsigned used = n < SPL_LANES ? (1u << n) - 1 : (1u << SPL_LANES) - 1;
+#if defined(SPL_NEAR_AVX512)
+    __m256i all = _mm256_loadu_si256((const __m256i *)index);
+    return used & _mm256_cmpneq_epi32_mask(all, _mm256_set1_epi32((int)other));
+#else
+    unsigned bits = 0;
+    for (unsigned k = 0; k < SPL_LANES; k++)
+        bits |= (unsigned)(index[k] != other) << k;
+    return used & bits;
+#endif
+}
 
 /* How many of `n` values, padded with infinity to whole SPL_LANES, are at most `limit`. */
 SPL_INLINE unsigned spl_count_within(const double *values, unsigned n, double limit)
 {
+#if defined(SPL_NEAR_AVX512)
+    unsigned count = 0;
+    for (unsigned i = 0; i < n; i += SPL_LANES)
+        count += (unsigned)__builtin_popcount(spl_bits_within(*(const spl_vec *)(values + i), limit));
+    return count;
+#else
     spl_vec most = SPL_VEC(limit);
     spl_mask sum = {0};
     for (unsigned i = 0; i < n; i += SPL_LANES)
         sum -= *(const spl_vec *)(values + i) <= most;
-    return (unsigned)(sum[0] + sum[1] + sum[2] + sum[3]);
+    unsigned count = 0;
+    for (int k = 0; k < SPL_LANES; k++)
+        count += (unsigned)sum[k];
+    return count;
+#endif
 }
 
 /* The least of `n` values, padded like these, above `limit`. */
@@ -47,11 +118,32 @@ SPL_INLINE double spl_next_above(const double *values, unsigned n, double limit)
     spl_vec floor = SPL_VEC(limit), least = SPL_VEC(INFINITY);
     for (unsigned i = 0; i < n; i += SPL_LANES) {
         spl_vec v = *(const spl_vec *)(values + i);
-        spl_mask less = (v > floor) & (v < least);
-        least = (spl_vec)(((spl_mask)v & less) | ((spl_mask)least & ~less));
+        least = spl_select((v > floor) & (v < least), v, least);
     }
-    double a = least[0] < least[1] ? least[0] : least[1], b = least[2] < least[3] ? least[2] : least[3];
-    return a < b ? a : b;
+    double found = least[0];
+    for (int k = 1; k < SPL_LANES; k++)
+        found = least[k] < found ? least[k] : found;
+    return found;
+}
+
+/* Appends those of SPL_LANES points whose bits are set, in their order; returns the end. Writes up to SPL_LANES. */
+SPL_INLINE unsigned spl_near_put(double *squared, uint32_t *index, unsigned at, unsigned bits,
+                                 const double *from_squared, const uint32_t *from_index)
+{
+#if defined(SPL_NEAR_AVX512)
+    __m512d d = _mm512_loadu_pd(from_squared);
+    __m256i i = _mm256_loadu_si256((const __m256i *)from_index);
+    _mm512_storeu_pd(squared + at, _mm512_maskz_compress_pd((__mmask8)bits, d));
+    _mm256_storeu_si256((__m256i *)(index + at), _mm256_maskz_compress_epi32((__mmask8)bits, i));
+    return at + (unsigned)__builtin_popcount(bits);
+#else
+    for (unsigned k = 0; k < SPL_LANES; k++) {
+        squared[at] = from_squared[k];
+        index[at] = from_index[k];
+        at += bits >> k & 1;
+    }
+    return at;
+#endif
 }
 
 /* Keeps the `wanted` nearest candidates and tightens the bound to just them. The threshold that counts just `wanted`
@@ -62,8 +154,7 @@ SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
     unsigned n = c->count, low_count = 0, high_count = n, wanted = c->wanted, ties = 0;
     if (n <= wanted)
         return;
-    for (unsigned i = n; i % SPL_LANES; i++)
-        c->squared[i] = INFINITY;
+    *(spl_vec *)(c->squared + n) = SPL_VEC(INFINITY);
     double low = -1, high = c->bound, at_tie = INFINITY;
     for (int step = 0; low_count < wanted && ties == 0; step++) {
         bool by_value = step >= 6;
@@ -84,12 +175,15 @@ SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
         }
     }
     unsigned kept = 0;
-    for (unsigned i = 0; i < n; i++) {
+    for (unsigned i = 0; !ties && i < n; i += SPL_LANES)
+        kept = spl_near_put(c->squared, c->index, kept, spl_bits_within(*(const spl_vec *)(c->squared + i), low),
+                            c->squared + i, c->index + i);
+    for (unsigned i = 0, left = ties; ties && i < n; i++) {
         double d = c->squared[i];
         c->squared[kept] = d;
         c->index[kept] = c->index[i];
-        unsigned tie = ties > 0 && d == at_tie;
-        ties -= tie;
+        unsigned tie = left > 0 && d == at_tie;
+        left -= tie;
         kept += (d <= low) | tie;
     }
     c->count = wanted;

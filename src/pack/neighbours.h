@@ -6,21 +6,22 @@
 
 struct spl_neighbours;
 
-enum { SPL_NEAR_LEAVES = 64 };
+enum { SPL_NEAR_LEAVES = 64, SPL_NEAR_ROOM = SPL_NEIGHBOURS_MAX + 8 }; /* vectors are stored whole */
 
 /* What a search found, unsorted, and what the searches for the points beside it in order share: spl_nearest_init() it,
  * then reuse it. */
 struct spl_nearest {
     unsigned count;
-    uint32_t index[SPL_NEIGHBOURS_MAX + 1];
-    double squared[SPL_NEIGHBOURS_MAX + 1]; /* distances, squared */
-    double farthest;                        /* distance of the farthest one */
-    /* Private: the leaf of the last point, bounds for its points, and the leaves around it where they are few. */
+    uint32_t index[SPL_NEAR_ROOM];
+    double squared[SPL_NEAR_ROOM]; /* distances, squared */
+    double farthest;               /* distance of the farthest one */
+    /* Private: the leaf of the last point, squared bounds for its points, and the leaves around it where they are few.
+     */
     size_t leaf;
     unsigned leaves;
     bool crowded;
     uint32_t leaf_index[SPL_NEAR_LEAVES];
-    double bound[SPL_BOXES_LEAF];
+    double bound[SPL_BOXES_LEAF], found[SPL_BOXES_LEAF]; /* what `farthest` was of each, infinite where not asked for */
     double low[3][SPL_NEAR_LEAVES], high[3][SPL_NEAR_LEAVES];
 };
 
@@ -37,5 +38,11 @@ void spl_neighbours_find(const struct spl_neighbours *neighbours, size_t i, unsi
 
 /* NULL-safe. */
 void spl_neighbours_destroy(struct spl_neighbours *neighbours);
+
+/* What searches are compiled for; they find the same. */
+enum spl_neighbours_set { SPL_NEIGHBOURS_BASE, SPL_NEIGHBOURS_AVX2, SPL_NEIGHBOURS_AVX512 };
+
+/* From now on searches made take this at most; says what this processor has of it. Tests only. */
+enum spl_neighbours_set spl_neighbours_limit(enum spl_neighbours_set most);
 
 #endif

@@ -33,6 +33,7 @@ struct order {
     struct spl_points *points;
     uint64_t *key, *key_to; /* of the run at work, as all below */
     uint32_t *index, *index_to;
+    void *spare_of_8, *spare_of_4; /* arrays that are left over, by the size of their elements */
     size_t begin, count, piece;
     double origin[3], size; /* of its cube */
     struct run *runs;       /* long ones that wait: room for all that there can be */
@@ -414,17 +415,24 @@ static void permute_piece(void *context, size_t begin, size_t end, unsigned work
     }
 }
 
+/* What an array is permuted into: one that was left over, of elements as large, or a new one. What the array was is
+ * left over then. So the kernel need not clear new memory for each. */
 static int permute(struct order *o, void **array, size_t size, struct spl_error *err)
 {
+    struct spl_spill *spill = o->points->spill;
+    void **spare = size == sizeof *o->key ? &o->spare_of_8 : size == sizeof *o->index ? &o->spare_of_4 : NULL;
     if (!*array)
         return 0;
-    struct permutation p = {.spill = o->points->spill, .index = o->index, .from = *array, .size = size};
-    p.to = spl_spill_alloc_raw(o->points->spill, o->count + SPL_POINTS_PAD, size, err);
+    struct permutation p = {.spill = spill, .index = o->index, .from = *array, .size = size};
+    p.to = spare && *spare ? *spare : spl_spill_alloc_raw(spill, o->count + SPL_POINTS_PAD, size, err);
     if (!p.to)
         return SPL_E_NOMEM;
-    spl_parallel_for(o->stage->threads, o->count, o->points->spill ? random_grain : grain, permute_piece, &p);
+    spl_parallel_for(o->stage->threads, o->count, spill ? random_grain : grain, permute_piece, &p);
     memset(p.to + o->count * size, 0, SPL_POINTS_PAD * size);
-    spl_spill_free(o->points->spill, *array);
+    if (spare)
+        *spare = *array;
+    else
+        spl_spill_free(spill, *array);
     *array = p.to;
     spl_stage_add(o->stage, o->count / 32, 0);
     return 0;
@@ -445,10 +453,10 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     struct order o = {.points = points, .count = points->count, .stage = stage};
     int rc = SPL_E_NOMEM;
     spl_stage_begin(stage, "ordering", "points", o.count);
-    o.key = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
+    o.key = spl_spill_alloc_raw(points->spill, o.count + SPL_POINTS_PAD, sizeof *o.key, err);
     o.key_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.key, err);
     o.index = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
-    o.index_to = spl_spill_alloc_raw(points->spill, o.count, sizeof *o.index, err);
+    o.index_to = spl_spill_alloc_raw(points->spill, o.count + SPL_POINTS_PAD, sizeof *o.index, err);
     o.leads = spl_alloc_raw(stage->threads, sizeof *o.leads, err);
     o.at = spl_alloc_raw(stage->threads, sizeof *o.at, err);
     o.part_of = spl_alloc_raw(leads, sizeof *o.part_of, err);
@@ -461,9 +469,9 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
         goto done;
     }
     drop_duplicates(&o);
-    spl_spill_free(points->spill, o.key);
     spl_spill_free(points->spill, o.key_to);
-    spl_spill_free(points->spill, o.index_to);
+    o.spare_of_8 = o.key;
+    o.spare_of_4 = o.index_to;
     o.key = o.key_to = NULL;
     o.index_to = NULL;
     rc = 0;
@@ -484,6 +492,8 @@ done:
     spl_spill_free(points->spill, o.key_to);
     spl_spill_free(points->spill, o.index);
     spl_spill_free(points->spill, o.index_to);
+    spl_spill_free(points->spill, o.spare_of_8);
+    spl_spill_free(points->spill, o.spare_of_4);
     free(o.leads);
     free(o.at);
     free(o.part_of);

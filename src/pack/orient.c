@@ -18,6 +18,8 @@
 
 #include "base/memory.h"
 
+#define SPL_INLINE static inline __attribute__((always_inline))
+
 static const float certain = 0.8f; /* agreement of an edge */
 #define ORIENT_VOTE (1 << 20)      /* of an edge whose normals agree */
 
@@ -26,7 +28,8 @@ struct forest {
     uint32_t *parent;
     uint8_t *flip;     /* sign relative to the parent */
     uint8_t *anchored; /* of roots: the tree is never turned */
-    uint32_t *best;    /* scratch: the edge of each root that has most votes; counts of a sort */
+    uint32_t *best;    /* scratch: the edge of each root that has most votes */
+    uint32_t *place;   /* scratch: where the edges of each root lie */
     uint32_t count;    /* of all of these */
 };
 
@@ -36,8 +39,10 @@ int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, stru
     orient->flip = spl_alloc_raw(capacity, sizeof *orient->flip, err);
     orient->label = spl_alloc_raw(capacity, sizeof *orient->label, err);
     orient->anchored = spl_alloc_raw(capacity, sizeof *orient->anchored, err);
+    orient->place = spl_alloc_raw(capacity, sizeof *orient->place, err);
     orient->edges = spl_alloc_raw(2 * capacity * k, sizeof *orient->edges, err);
-    return orient->parent && orient->flip && orient->label && orient->anchored && orient->edges ? 0 : SPL_E_NOMEM;
+    bool enough = orient->parent && orient->flip && orient->label && orient->anchored && orient->place && orient->edges;
+    return enough ? 0 : SPL_E_NOMEM;
 }
 
 void spl_orient_finish(struct spl_orient *orient)
@@ -46,22 +51,46 @@ void spl_orient_finish(struct spl_orient *orient)
     free(orient->flip);
     free(orient->label);
     free(orient->anchored);
+    free(orient->place);
     free(orient->edges);
+}
+
+/* Points beside another: how far off, and their normals. Eight at once, however many there are. */
+enum { eight = 8 };
+typedef float spl_floats __attribute__((vector_size(eight * sizeof(float))));
+typedef int32_t spl_marks __attribute__((vector_size(eight * sizeof(float))));
+struct beside {
+    spl_floats apart[3], normal[3];
+    spl_marks counts; /* -1; 0: agrees by 0 */
+};
+
+SPL_INLINE void agree(const float a[3], const struct beside *b, spl_floats *agreement)
+{
+    const spl_floats *e = b->apart;
+    spl_floats ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2], ea = e[0] * a[0] + e[1] * a[1] + e[2] * a[2];
+    spl_floats eb = e[0] * b->normal[0] + e[1] * b->normal[1] + e[2] * b->normal[2];
+    spl_floats ab = a[0] * b->normal[0] + a[1] * b->normal[1] + a[2] * b->normal[2];
+    spl_floats behind = (spl_floats)((spl_marks)(ea * eb / ee) & (ee > 0));
+    spl_floats size = (spl_floats)((spl_marks)behind & INT32_MAX);
+    *agreement = (spl_floats)((spl_marks)((ab - 2 * behind) * (1 - size)) & b->counts);
+}
+
+SPL_INLINE void set_beside(struct beside *b, unsigned a, const struct spl_points *p, size_t i, size_t j, bool counts)
+{
+    for (int c = 0; c < 3; c++) {
+        b->apart[c][a] = (float)(p->axis[c][j] - p->axis[c][i]);
+        b->normal[c][a] = p->normal[j][c];
+    }
+    b->counts[a] = counts ? -1 : 0;
 }
 
 float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j)
 {
-    const float *a = points->normal[i], *b = points->normal[j];
-    float e[3], ee = 0, ea = 0, eb = 0, ab = 0;
-    for (int c = 0; c < 3; c++) {
-        e[c] = (float)(points->axis[c][j] - points->axis[c][i]);
-        ee += e[c] * e[c];
-        ea += e[c] * a[c];
-        eb += e[c] * b[c];
-        ab += a[c] * b[c];
-    }
-    float behind = ee > 0 ? ea * eb / ee : 0;
-    return (ab - 2 * behind) * (1 - fabsf(behind));
+    struct beside b = {0};
+    spl_floats agreement;
+    set_beside(&b, 0, points, i, j, true);
+    agree(points->normal[i], &b, &agreement);
+    return agreement[0];
 }
 
 size_t spl_orient_add_edge(struct spl_orient_edge *edges, size_t count, uint32_t a, uint32_t b, float agreement)
@@ -108,43 +137,68 @@ static void join(struct forest *f, uint32_t a, uint32_t b, bool opposed)
     f->flip[rb] = sa ^ sb ^ opposed;
 }
 
-/* A stable counting sort by one of the ends. */
-static void sort_by(struct forest *f, const struct spl_orient_edge *from, struct spl_orient_edge *to, size_t count,
-                    bool second)
+static int compare_edges(const void *a, const void *b)
 {
-    uint32_t *place = f->best, sum = 0;
-    memset(place, 0, f->count * sizeof *place);
-    for (size_t e = 0; e < count; e++)
-        place[second ? from[e].b : from[e].a]++;
-    for (uint32_t i = 0; i < f->count; i++) {
-        uint32_t here = place[i];
-        place[i] = sum;
-        sum += here;
-    }
-    for (size_t e = 0; e < count; e++)
-        to[place[second ? from[e].b : from[e].a]++] = from[e];
+    const struct spl_orient_edge *x = a, *y = b;
+    return (x->b > y->b) - (x->b < y->b);
 }
 
-/* Moves the edges to the roots of their ends, one for all of the same two, and leaves out those that can't join.
- * `spare` has room for as many. */
+/* Makes one of all edges that have the same second end; those that are left are in its order. Returns how many. `at`
+ * tells of each end where its edge may be. */
+static size_t unite_run(struct spl_orient_edge *edges, size_t count, uint32_t *at)
+{
+    enum { few = 32 };
+    size_t kept = 0;
+    for (size_t e = 0; e < count; e++) {
+        struct spl_orient_edge edge = edges[e];
+        uint32_t to = at[edge.b];
+        if (to < kept && edges[to].b == edge.b) {
+            edges[to].votes += edge.votes;
+        } else {
+            at[edge.b] = (uint32_t)kept;
+            edges[kept++] = edge;
+        }
+    }
+    if (kept > few)
+        qsort(edges, kept, sizeof *edges, compare_edges);
+    for (size_t e = 1; kept <= few && e < kept; e++) {
+        struct spl_orient_edge edge = edges[e];
+        size_t to = e;
+        for (; to > 0 && edges[to - 1].b > edge.b; to--)
+            edges[to] = edges[to - 1];
+        edges[to] = edge;
+    }
+    return kept;
+}
+
+/* Moves the edges to the roots of their ends, one for all of the same two, and leaves out those that can't join. Leaves
+ * them by their ends. `spare` has room for as many. */
 static size_t unite(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
 {
+    uint32_t *place = f->place, sum = 0;
     size_t moved = 0, kept = 0;
+    memset(place, 0, f->count * sizeof *place);
     for (size_t i = 0; i < count; i++) {
         uint8_t sa, sb;
         uint32_t a = find_root(f, edges[i].a, &sa), b = find_root(f, edges[i].b, &sb);
         if (a == b || (f->anchored[a] && f->anchored[b]))
             continue;
-        edges[moved++] =
+        edges[moved] =
             (struct spl_orient_edge){a < b ? a : b, a < b ? b : a, sa == sb ? edges[i].votes : -edges[i].votes};
+        place[edges[moved++].a]++;
     }
-    sort_by(f, edges, spare, moved, true);
-    sort_by(f, spare, edges, moved, false);
-    for (size_t i = 0; i < moved; i++) {
-        if (kept > 0 && edges[kept - 1].a == edges[i].a && edges[kept - 1].b == edges[i].b)
-            edges[kept - 1].votes += edges[i].votes;
-        else
-            edges[kept++] = edges[i];
+    for (uint32_t i = 0; i < f->count; i++) {
+        uint32_t here = place[i];
+        place[i] = sum;
+        sum += here;
+    }
+    for (size_t e = 0; e < moved; e++)
+        spare[place[edges[e].a]++] = edges[e];
+    for (size_t begin = 0, end; begin < moved; begin = end) {
+        end = place[spare[begin].a];
+        size_t run = unite_run(spare + begin, end - begin, f->best);
+        memcpy(edges + kept, spare + begin, run * sizeof *edges);
+        kept += run;
     }
     return kept;
 }
@@ -178,28 +232,62 @@ struct graph {
     size_t begin;
     uint32_t count;
     const uint32_t *neighbours;
+    float *agreement; /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
     unsigned k;
 };
 
 /* The a-th neighbour of i, both counted from the block's first; false when it lies in another block. */
-static bool get_neighbour(const struct graph *g, uint32_t i, unsigned a, uint32_t *j)
+SPL_INLINE bool get_neighbour(const struct graph *g, uint32_t i, unsigned a, uint32_t *j)
 {
     size_t index = g->neighbours[(size_t)i * g->k + a];
     *j = (uint32_t)(index - g->begin);
     return index >= g->begin && index - g->begin < g->count;
 }
 
-static bool lies_on_surface(const struct graph *g, uint32_t i)
+/* Fills in how normals agree, and in `surface` of each point whether it lies on one. */
+SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
 {
-    unsigned edges = 0, agreed = 0;
-    for (unsigned a = 0; a < g->k; a++) {
-        uint32_t j;
-        if (!get_neighbour(g, i, a, &j))
-            continue;
-        edges++;
-        agreed += fabsf(spl_orient_agreement(g->points, g->begin + i, g->begin + j)) >= certain;
+    for (uint32_t i = 0; i < g->count; i++) {
+        float *agreement = g->agreement + (size_t)i * g->k;
+        unsigned edges = 0, agreed = 0;
+        for (unsigned first = 0; first < g->k; first += eight) {
+            struct beside beside;
+            spl_floats agreements;
+            unsigned count = g->k - first < eight ? g->k - first : eight;
+            for (unsigned a = 0; a < eight; a++) {
+                uint32_t j = i;
+                bool is_inside = a < count && get_neighbour(g, i, first + a, &j);
+                set_beside(&beside, a, g->points, g->begin + i, g->begin + (is_inside ? j : i), is_inside);
+                edges += is_inside;
+            }
+            agree(g->points->normal[g->begin + i], &beside, &agreements);
+            spl_marks certainly = (agreements >= certain) | (agreements <= -certain);
+            for (unsigned a = 0; a < count; a++) {
+                agreement[first + a] = agreements[a];
+                agreed -= (unsigned)certainly[a];
+            }
+        }
+        surface[i] = 2 * agreed > edges;
     }
-    return 2 * agreed > edges;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void agree_all_avx2(const struct graph *g, uint32_t *surface)
+{
+    agree_all(g, surface);
+}
+#endif
+
+/* Compiled twice; contraction is off, so both give the same bits. */
+static void find_agreements(const struct graph *g, uint32_t *surface)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        agree_all_avx2(g, surface);
+        return;
+    }
+#endif
+    agree_all(g, surface);
 }
 
 /* Joins what lies on surfaces; `surface` says of each point whether it does. */
@@ -209,25 +297,31 @@ static void join_surfaces(const struct graph *g, struct forest *f, const uint32_
         for (unsigned a = 0; surface[i] && a < g->k; a++) {
             uint32_t j;
             uint8_t sign;
-            if (!get_neighbour(g, i, a, &j) || !surface[j] || find_root(f, i, &sign) == find_root(f, j, &sign))
-                continue;
-            float agreement = spl_orient_agreement(g->points, g->begin + i, g->begin + j);
-            if (fabsf(agreement) >= certain)
+            float agreement = g->agreement[(size_t)i * g->k + a];
+            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] &&
+                find_root(f, i, &sign) != find_root(f, j, &sign))
                 join(f, i, j, agreement < 0);
         }
 }
 
-/* The edges between different trees. */
+/* The edges between different trees, by their roots. */
 static size_t find_edges(const struct graph *g, struct forest *f, struct spl_orient_edge *edges)
 {
+    uint32_t *top = f->best; /* of each point: twice its root, and 1 where it has the other sign */
     size_t count = 0;
+    for (uint32_t i = 0; i < g->count; i++) {
+        uint8_t sign;
+        top[i] = 2 * find_root(f, i, &sign);
+        top[i] += sign;
+    }
     for (uint32_t i = 0; i < g->count; i++)
         for (unsigned a = 0; a < g->k; a++) {
             uint32_t j;
-            uint8_t sign;
-            if (get_neighbour(g, i, a, &j) && find_root(f, i, &sign) != find_root(f, j, &sign))
-                count = spl_orient_add_edge(edges, count, i, j,
-                                            spl_orient_agreement(g->points, g->begin + i, g->begin + j));
+            if (!get_neighbour(g, i, a, &j) || top[i] / 2 == top[j] / 2)
+                continue;
+            float agreement = g->agreement[(size_t)i * g->k + a];
+            count = spl_orient_add_edge(edges, count, top[i] / 2, top[j] / 2,
+                                        (top[i] ^ top[j]) & 1 ? -agreement : agreement);
         }
     return count;
 }
@@ -236,15 +330,15 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
                           const uint32_t *neighbours, unsigned k)
 {
     uint32_t n = (uint32_t)(end - begin), components = 0, first_anchored = UINT32_MAX;
-    const struct graph graph = {points, begin, n, neighbours, k};
-    struct forest forest = {orient->parent, orient->flip, orient->anchored, orient->label, n};
+    const struct graph graph = {points, begin, n, neighbours, (float *)(orient->edges + (size_t)n * k), k};
+    struct forest forest = {orient->parent, orient->flip, orient->anchored, orient->label, orient->place, n};
     for (uint32_t i = 0; i < n; i++) {
         if (orient->anchored[i] && first_anchored == UINT32_MAX)
             first_anchored = i;
         orient->parent[i] = orient->anchored[i] ? first_anchored : i;
         orient->flip[i] = 0;
-        orient->label[i] = lies_on_surface(&graph, i);
     }
+    find_agreements(&graph, orient->label);
     join_surfaces(&graph, &forest, orient->label);
     vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
     for (uint32_t i = 0; i < n; i++) {
@@ -265,12 +359,15 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
                           size_t edge_count, struct spl_spill *spill, struct spl_error *err)
 {
-    struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err), spl_alloc(count, 1, err),
-                            spl_alloc_raw(count, 1, err), spl_alloc_raw(count, sizeof *forest.best, err),
+    struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err),
+                            spl_alloc(count, 1, err),
+                            spl_alloc_raw(count, 1, err),
+                            spl_alloc(count, sizeof *forest.best, err),
+                            spl_alloc_raw(count, sizeof *forest.place, err),
                             (uint32_t)count};
     struct spl_orient_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
     double *outward = spl_alloc(count, sizeof *outward, err);
-    bool enough = forest.parent && forest.flip && forest.anchored && forest.best && spare && outward;
+    bool enough = forest.parent && forest.flip && forest.anchored && forest.best && forest.place && spare && outward;
     for (size_t i = 0; enough && i < count; i++) {
         forest.parent[i] = (uint32_t)i;
         forest.anchored[i] = components[i].anchored;
@@ -291,6 +388,7 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
     free(forest.flip);
     free(forest.anchored);
     free(forest.best);
+    free(forest.place);
     spl_spill_free(spill, spare);
     free(outward);
     return enough ? SPL_OK : SPL_E_NOMEM;

@@ -27,6 +27,7 @@ struct spl_orient {
     uint8_t *flip;                 /* sign relative to the parent */
     uint32_t *label;               /* out: component of each point, numbered from 0 in the block */
     uint8_t *anchored;             /* in: 1 where the normal's side is known */
+    uint32_t *place;               /* where the edges of each root lie */
     struct spl_orient_edge *edges; /* 2 * capacity * k of them */
 };
 

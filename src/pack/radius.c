@@ -79,22 +79,51 @@ static struct spl_moments widen(const struct spl_vicinity *v, size_t i)
     return wide;
 }
 
-/* How the points around one are spread. */
-struct spread {
-    double sigma[3];            /* ascending */
-    double normal[3], along[3]; /* of the least and of the largest sigma */
-};
-
-static struct spread spread_of(const struct spl_moments *moments)
+static double at_least_0(double v)
 {
-    double m[6], n = moments->count;
-    struct spread spread;
+    return v > 0 ? v : 0;
+}
+
+static struct spl_spread spread_of(const struct spl_moments *moments)
+{
+    double m[6], n = moments->count, most[3];
+    struct spl_spread spread;
     for (int e = 0; e < 6; e++)
         m[e] = moments->square[e] / n - (double)moments->sum[row[e]] * moments->sum[column[e]] / (n * n);
-    spl_eigen_symmetric(m, spread.sigma, spread.normal, spread.along);
+    spl_eigen_symmetric(m, spread.sigma, spread.normal, most);
     for (int c = 0; c < 3; c++)
-        spread.sigma[c] = sqrt(fmax(0, spread.sigma[c]));
+        spread.sigma[c] = sqrt(at_least_0(spread.sigma[c]));
     return spread;
+}
+
+/* The same of up to SPL_EIGEN_LANES moments. */
+static void spread_some(const struct spl_moments *const moments[], unsigned count, struct spl_spread *const spreads[])
+{
+    enum { lanes = SPL_EIGEN_LANES };
+    double m[6][lanes] = {0}, sum[3][lanes] = {0}, n[lanes], sigma[3][lanes], normal[3][lanes];
+    if (count < 3) { /* eight at once take as long as two or three */
+        for (unsigned a = 0; a < count; a++)
+            *spreads[a] = spread_of(moments[a]);
+        return;
+    }
+    for (unsigned a = 0; a < lanes; a++)
+        n[a] = 1;
+    for (unsigned a = 0; a < count; a++) {
+        n[a] = moments[a]->count;
+        for (int c = 0; c < 3; c++)
+            sum[c][a] = moments[a]->sum[c];
+        for (int e = 0; e < 6; e++)
+            m[e][a] = moments[a]->square[e];
+    }
+    for (int e = 0; e < 6; e++)
+        for (unsigned a = 0; a < lanes; a++)
+            m[e][a] = m[e][a] / n[a] - sum[row[e]][a] * sum[column[e]][a] / (n[a] * n[a]);
+    spl_eigen_symmetric_eight((const double(*)[lanes])m, sigma, normal);
+    for (unsigned a = 0; a < count; a++)
+        for (int c = 0; c < 3; c++) {
+            spreads[a]->sigma[c] = sqrt(at_least_0(sigma[c][a]));
+            spreads[a]->normal[c] = normal[c][a];
+        }
 }
 
 /* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none
@@ -159,13 +188,41 @@ static struct place place_of(const double nearest[8])
 }
 
 /* 0 on a surface or a line, 1 in a volume. */
-static double roundness(const struct spread *spread)
+static double roundness(const struct spl_spread *spread)
 {
     if (spread->sigma[1] < linear_below * spread->sigma[2])
         return 0;
     double t = (spread->sigma[0] / spread->sigma[1] - round_from) / (round_to - round_from);
-    t = fmin(1, fmax(0, t));
+    t = at_least_0(t);
+    t = t < 1 ? t : 1;
     return t * t * (3 - 2 * t);
+}
+
+void spl_radius_spread(const struct spl_vicinity *v, size_t begin, size_t end, struct spl_spreads *spreads)
+{
+    struct spl_moments around[SPL_EIGEN_LANES];
+    const struct spl_moments *from[SPL_EIGEN_LANES];
+    struct spl_spread *to[SPL_EIGEN_LANES];
+    unsigned count = 0;
+    for (size_t i = begin; i < end; i++) {
+        from[count] = &v->moments[i - v->begin];
+        to[count++] = &spreads->own[i - begin];
+        if (count == SPL_EIGEN_LANES || i + 1 == end) {
+            spread_some(from, count, to);
+            count = 0;
+        }
+    }
+    for (size_t i = begin; i < end; i++) {
+        if (roundness(&spreads->own[i - begin]) > 0) {
+            around[count] = widen(v, i);
+            from[count] = &around[count];
+            to[count++] = &spreads->wide[i - begin];
+        }
+        if (count == SPL_EIGEN_LANES || i + 1 == end) {
+            spread_some(from, count, to);
+            count = 0;
+        }
+    }
 }
 
 /* Eq. 20 over as few neighbours as two, the least of them all: what points of another leaf or wall do not enlarge. */
@@ -190,25 +247,22 @@ static double least_radius(const struct spl_points *p, size_t i, const uint32_t 
 }
 
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
-double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach, struct spl_nearest *near,
-                           double normal[3], double *round, bool *edge)
+double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
+                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           double *round, bool *edge)
 {
     const struct spl_points *p = v->points;
-    const struct spl_moments *moments = &v->moments[i - v->begin];
-    struct spread spread = spread_of(moments);
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
-    double volume = 0, n = moments->count - 1, radius = 2 * reach / sqrt(n), nearest[8];
-    bool linear = spread.sigma[1] < linear_below * spread.sigma[2];
-    memcpy(normal, spread.normal, sizeof spread.normal);
-    *round = roundness(&spread);
+    double volume = 0, n = v->moments[i - v->begin].count - 1, radius = 2 * reach / sqrt(n), nearest[8];
+    bool linear = spread->sigma[1] < linear_below * spread->sigma[2];
+    memcpy(normal, spread->normal, sizeof spread->normal);
+    *round = roundness(spread);
     bool flat = *round <= 0;
     if (!flat) {
-        struct spl_moments around = widen(v, i);
-        struct spread wide = spread_of(&around);
-        double wide_round = roundness(&wide);
-        double growth = wide.sigma[0] * spread.sigma[1] / fmax(wide.sigma[1] * spread.sigma[0], 1e-300);
+        double wide_round = roundness(around), thick = around->sigma[1] * spread->sigma[0];
+        double growth = around->sigma[0] * spread->sigma[1] / (thick > 1e-300 ? thick : 1e-300);
         if (wide_round < *round) {
-            memcpy(normal, wide.normal, sizeof wide.normal);
+            memcpy(normal, around->normal, sizeof around->normal);
             *round = wide_round;
         }
         volume = fmin(1, *round / volume_from) * fmin(1, fmax(0, (growth - fades) / (lasts - fades)));
@@ -225,12 +279,12 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, double reach,
 
     spl_neighbours_find(v->neighbours, i, v->wide, near);
     if (linear) {
-        struct spl_moments around = spl_moments_of(p, i, near);
-        struct spread wide = spread_of(&around);
+        struct spl_moments moments = spl_moments_of(p, i, near);
+        struct spl_spread wide = spread_of(&moments);
         bool surface = wide.sigma[1] >= linear_below * wide.sigma[2] && roundness(&wide) == 0;
         eighths(p, i, near->index, near->count, wide.normal, coplanar, nearest);
         if (!surface || place_of(nearest).on_line) /* a wire: its points are 2 reach / n apart */
-            return fmin(radius, fmax(1.5 * reach / n, 2 * spread.sigma[1]));
+            return fmin(radius, fmax(1.5 * reach / n, 2 * spread->sigma[1]));
         memcpy(normal, wide.normal, sizeof wide.normal);
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
@@ -248,7 +302,7 @@ bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_ne
     double nearest[8];
     spl_neighbours_find(v->neighbours, i, v->wide, near);
     struct spl_moments around = spl_moments_of(v->points, i, near);
-    struct spread wide = spread_of(&around);
+    struct spl_spread wide = spread_of(&around);
     if (wide.sigma[1] < linear_below * wide.sigma[2] || roundness(&wide) > 0)
         return false;
     eighths(v->points, i, near->index, near->count, wide.normal, coplanar, nearest);

@@ -21,12 +21,26 @@ struct spl_vicinity {
     unsigned k, wide;                  /* neighbours that are listed, and that are asked for where those do not tell */
 };
 
-/* Radius of point i of the run, which has `reach` to its farthest listed neighbour; its normal, of either sign; and how
- * round its surroundings are, from 0 (a surface or a line) to 1 (a volume); `edge` where its surface may end or turn:
- * the points around do not lie flat, or are asked for widely, and a quarter of the plane holds none of them. `near` is
- * scratch for searches in order. */
-double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, double reach, struct spl_nearest *near,
-                           double normal[3], double *round, bool *edge);
+/* How the points around one are spread. */
+struct spl_spread {
+    double sigma[3];  /* ascending */
+    double normal[3]; /* of the least */
+};
+
+/* Of some points in a row: what their neighbours say, and, where that is no plane and no line, theirs too. */
+enum { SPL_SPREADS = 64 };
+struct spl_spreads {
+    struct spl_spread own[SPL_SPREADS], wide[SPL_SPREADS];
+};
+void spl_radius_spread(const struct spl_vicinity *vicinity, size_t begin, size_t end, struct spl_spreads *spreads);
+
+/* Radius of point i of the run, which has `reach` to its farthest listed neighbour, from its two spreads; its normal,
+ * of either sign; and how round its surroundings are, from 0 (a surface or a line) to 1 (a volume); `edge` where its
+ * surface may end or turn: the points around do not lie flat, or are asked for widely, and a quarter of the plane holds
+ * none of them. `near` is scratch for searches in order. */
+double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
+                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           double *round, bool *edge);
 
 /* Whether a wider view of point i shows a surface that goes on all around it. `near` as above. */
 bool spl_radius_on_surface(const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near);

@@ -92,8 +92,8 @@ static void settle(const struct spl_points *p, size_t i, const uint32_t *neighbo
         around[n] = p->radius[neighbours[n]];
         bound += stray_limit * around[n] < most;
     }
-    /* only where more than half of the radii bound this one does their median, and is sorted for */
-    *radius = bound > n / 2 ? stray_limit * spl_median(around, n) : most;
+    /* only where more than half of the radii bound this one does their median */
+    *radius = bound > n / 2 ? stray_limit * spl_middle(around, n) : most;
     *uncertainty = (float)(*radius * sum / n);
 }
 

@@ -56,11 +56,11 @@ struct surface {
 };
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
-static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near,
-                     float *limit, bool *edge)
+static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
+                     const struct spl_spread *around, struct spl_nearest *near, float *limit, bool *edge)
 {
     double least[3], round, side = 1;
-    double radius = spl_radius_estimate(vicinity, i, *limit, near, least, &round, edge);
+    double radius = spl_radius_estimate(vicinity, i, own, around, *limit, near, least, &round, edge);
     p->radius[i] = fmaxf((float)radius, smallest_radius);
     *limit = flat_limit + (float)round * (round_limit - flat_limit);
 
@@ -121,9 +121,14 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         const struct spl_vicinity vicinity = {s->points,  s->neighbours, begin, end,
                                               w->moments, w->neighbours, s->k,  s->wide};
         spl_nearest_init(&near);
+        struct spl_spreads spreads;
         for (size_t i = begin; i < end; i++) {
             bool edge = false;
-            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &near, &w->limit[i - begin], &edge);
+            size_t at = (i - begin) % SPL_SPREADS;
+            if (!at)
+                spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
+            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at],
+                                                     &near, &w->limit[i - begin], &edge);
             if (s->edge)
                 s->edge[i] = edge;
         }

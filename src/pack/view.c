@@ -51,8 +51,8 @@ static bool view_from_camera(const struct spl_points *p, struct spl_default_view
     return true;
 }
 
-int spl_default_view_find(const struct spl_points *p, double unit_m, bool sides, struct spl_default_view *view,
-                          struct spl_error *err)
+int spl_default_view_find(const struct spl_points *p, double unit_m, bool sides, unsigned threads,
+                          struct spl_default_view *view, struct spl_error *err)
 {
     struct spl_view_sample sample = {0};
     bool found = view_from_camera(p, view);
@@ -64,7 +64,7 @@ int spl_default_view_find(const struct spl_points *p, double unit_m, bool sides,
             rc = spl_view_from_inside(&sample, p, view, &found, err);
     }
     if (!rc && !found)
-        rc = spl_view_from_outside(&sample, view, err);
+        rc = spl_view_from_outside(&sample, threads, view, err);
     spl_view_sample_finish(&sample);
     if (!rc)
         view->fov = spl_fit_fov(view->fit, 16, 9);

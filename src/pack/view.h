@@ -14,7 +14,7 @@ struct spl_default_view {
  * to stand; else from outside, from where most is to be seen, fitted to the bulk of the points, so that strays do not
  * matter. `points` are sorted; `unit_m` is metres a unit, 0 = not known; `sides`: normals show to where the scan was
  * taken from. */
-int spl_default_view_find(const struct spl_points *points, double unit_m, bool sides, struct spl_default_view *view,
-                          struct spl_error *err);
+int spl_default_view_find(const struct spl_points *points, double unit_m, bool sides, unsigned threads,
+                          struct spl_default_view *view, struct spl_error *err);
 
 #endif

@@ -103,7 +103,7 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     spl_unit_parse(c->unit, &unit_m);
     int rc = spl_pack_check(said, &neighbours, &chunk, err);
     if (!rc)
-        rc = spl_default_view_find(&c->points, unit_m, c->has_sides, &view, err);
+        rc = spl_default_view_find(&c->points, unit_m, c->has_sides, spl_thread_count(said->threads), &view, err);
     if (rc)
         return rc;
     json_t *meta = spl_collect_describe(c, tree, first, &view);

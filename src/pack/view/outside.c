@@ -1,7 +1,7 @@
 /* Directions round the subject are tried, each on a coarse picture of it: how much of the frame it fills, and how much
  * of its surface one sees there, front sides only where it is known which these are. So a wall is seen from before it,
- * a street along it, and the long side of what is flat lies across. One thread, fixed order: equal points, equal
- * view. */
+ * a street along it, and the long side of what is flat lies across. Pictures are drawn in parallel and
+ * compared in their order: equal points, equal view. */
 #include "pack/view/outside.h"
 
 #include <float.h>
@@ -10,7 +10,9 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "geom/vector.h"
+#include "pack/median.h"
 
 enum { raster = 96, azimuths = 24, elevations = 3, spread_most = 3 };
 static const double aspect = 16.0 / 9, margin = 1.06;
@@ -35,8 +37,8 @@ static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
     for (size_t i = 0; i < s->count; i++)
         for (int c = 0; c < 2; c++) {
             double x = dot3(axes[c], s->at[i]);
-            low[c] = fmin(low[c], x);
-            high[c] = fmax(high[c], x);
+            low[c] = x < low[c] ? x : low[c];
+            high[c] = x > high[c] ? x : high[c];
         }
     double width = fmax(fmax(high[0] - low[0], aspect * (high[1] - low[1])), DBL_MIN);
     struct frame frame = {.cell = width / (raster - 1)};
@@ -47,6 +49,11 @@ static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
 
 enum { rows = raster * 9 / 16 + 2 };
 
+struct picture { /* of one worker */
+    double depth[rows][raster];
+    bool filled[rows][raster];
+};
+
 /* The nearest depth of each cell. */
 static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame,
                  double depth[rows][raster])
@@ -56,7 +63,8 @@ static void draw(const struct spl_view_sample *s, double axes[3][3], const struc
             depth[y][x] = INFINITY;
     for (size_t i = 0; i < s->count; i++) {
         double z = dot3(axes[2], s->at[i]);
-        int spread = (int)fmin(spread_most, 0.7 * sqrt((double)s->area[i]) / frame->cell);
+        double reach = 0.7 * sqrt((double)s->area[i]) / frame->cell;
+        int spread = reach < spread_most ? (int)reach : spread_most;
         int cx = (int)((dot3(axes[0], s->at[i]) - frame->low[0]) / frame->cell),
             cy = (int)((dot3(axes[1], s->at[i]) - frame->low[1]) / frame->cell);
         for (int y = cy - spread; y <= cy + spread; y++)
@@ -67,14 +75,15 @@ static void draw(const struct spl_view_sample *s, double axes[3][3], const struc
 }
 
 /* Share of the frame that is filled, times the share of the surface that is seen. */
-static double judge(const struct spl_view_sample *s, double azimuth, double elevation, double depth[rows][raster])
+static double judge(const struct spl_view_sample *s, double azimuth, double elevation, struct picture *picture)
 {
     double axes[3][3], seen = 0, all = 0;
+    double(*depth)[raster] = picture->depth;
+    bool(*filled)[raster] = picture->filled;
     get_axes(azimuth, elevation, axes);
     struct frame frame = frame_of(s, axes);
     draw(s, axes, &frame, depth);
-    static bool filled[rows][raster];
-    memset(filled, 0, sizeof filled);
+    memset(filled, 0, sizeof picture->filled);
     for (size_t i = 0; i < s->count; i++) {
         int x = (int)((dot3(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
             y = (int)((dot3(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
@@ -97,17 +106,10 @@ static double judge(const struct spl_view_sample *s, double azimuth, double elev
     return all > 0 ? (double)covered * seen / all : 0;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* The value that all but `share` of them do not exceed. */
 static double most_of(double *values, size_t count, double share)
 {
-    qsort(values, count, sizeof *values, compare_doubles);
-    return values[count - 1 - (size_t)(share * (double)count)];
+    return spl_nth(values, count, count - 1 - (size_t)(share * (double)count));
 }
 
 /* Where the eye stands so that a pyramid of these tangents holds the sample: each of its sides is moved up to it, and
@@ -133,8 +135,8 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
 
 /* The angles that the sample takes up around `target` from `eye`, in the frame, but for what `share` of it may lie
  * beyond; with a margin, within [least, most] degrees. SPL_E_NOMEM. */
-static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3],
-                      const double up[3], double share, double least, double most, double fit[2], struct spl_error *err)
+static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
+                      double share, double least, double most, double fit[2], struct spl_error *err)
 {
     struct spl_camera camera = {0};
     int rc = spl_camera_look_at(&camera, eye, target, up, err);
@@ -164,24 +166,43 @@ static double first_elevation(const struct spl_view_sample *s)
     return fmin(32, fmax(10, 36 - 40 * height / fmax(width, DBL_MIN)));
 }
 
-int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_view *view, struct spl_error *err)
+/* All pictures that are looked at. */
+struct trials {
+    const struct spl_view_sample *sample;
+    struct picture *pictures; /* one a worker */
+    double azimuth[azimuths * elevations], elevation[azimuths * elevations], score[azimuths * elevations];
+};
+
+static void judge_some(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct trials *t = context;
+    for (size_t i = begin; i < end; i++)
+        t->score[i] = judge(t->sample, t->azimuth[i], t->elevation[i], &t->pictures[worker]);
+}
+
+int spl_view_from_outside(const struct spl_view_sample *s, unsigned threads, struct spl_default_view *view,
+                          struct spl_error *err)
 {
     static const double tangent[2] = {0.41421356237309503 * 16 / 9, 0.41421356237309503}; /* of 45 degrees upright */
-    double(*depth)[raster] = spl_alloc_raw(rows, sizeof *depth, err),
-    *values = spl_alloc_raw(s->count, sizeof *values, err);
+    struct trials trials = {.sample = s,
+                            .pictures = spl_alloc_raw(spl_thread_count(threads), sizeof *trials.pictures, err)};
+    double *values = spl_alloc_raw(s->count, sizeof *values, err);
     double best = -1, axes[3][3], eye[3], target[3], up[3] = {0, 0, 1};
     double azimuth = 0, elevation = 0;
-    int rc = depth && values ? 0 : SPL_E_NOMEM;
-    for (int e = 0; !rc && e < elevations; e++)
-        for (int a = 0; a < azimuths; a++) {
-            double at = 2 * M_PI * a / azimuths - M_PI / 2, above = (first_elevation(s) + 8 * e) * M_PI / 180;
-            double score = judge(s, at, above, depth);
-            if (score <= 1.02 * best) /* the first of what is about the same */
-                continue;
-            best = score;
-            azimuth = at;
-            elevation = above;
-        }
+    int rc = trials.pictures && values ? 0 : SPL_E_NOMEM;
+    for (int i = 0; i < azimuths * elevations; i++) {
+        trials.azimuth[i] = 2 * M_PI * (i % azimuths) / azimuths - M_PI / 2;
+        trials.elevation[i] = (first_elevation(s) + 8 * (i / azimuths)) * M_PI / 180;
+    }
+    if (!rc)
+        spl_parallel_for(threads, azimuths * elevations, 1, judge_some, &trials);
+    for (int i = 0; !rc && i < azimuths * elevations; i++) {
+        if (trials.score[i] <= 1.02 * best) /* the first of what is about the same */
+            continue;
+        best = trials.score[i];
+        azimuth = trials.azimuth[i];
+        elevation = trials.elevation[i];
+    }
     if (!rc) {
         get_axes(azimuth, elevation, axes);
         find_eye(s, axes, tangent, values, eye);
@@ -201,7 +222,7 @@ int spl_view_from_outside(const struct spl_view_sample *s, struct spl_default_vi
         spl_view_to_world(s, eye, view->eye);
         spl_view_to_world(s, target, view->target);
     }
-    free(depth);
+    free(trials.pictures);
     free(values);
     return rc;
 }

@@ -5,6 +5,7 @@
 #include "pack/view.h"
 #include "pack/view/sample.h"
 
-int spl_view_from_outside(const struct spl_view_sample *sample, struct spl_default_view *view, struct spl_error *err);
+int spl_view_from_outside(const struct spl_view_sample *sample, unsigned threads, struct spl_default_view *view,
+                          struct spl_error *err);
 
 #endif

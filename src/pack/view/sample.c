@@ -9,6 +9,7 @@
 
 #include "base/memory.h"
 #include "geom/vector.h"
+#include "pack/median.h"
 #include "pack/up.h"
 
 enum { sample_max = 200000, tail = 100 };
@@ -64,7 +65,11 @@ static int find_box(struct spl_view_sample *s, const struct spl_points *p, size_
         }
         for (size_t i = 0; i < count; i++)
             sorted[a][i] = s->at[i][a];
-        qsort(sorted[a], count, sizeof **sorted, compare_doubles);
+        /* what lies between is asked for nothing */
+        spl_nth(sorted[a], count, first);
+        spl_nth(sorted[a] + first, count - first, last - first);
+        qsort(sorted[a], first, sizeof **sorted, compare_doubles);
+        qsort(sorted[a] + last, count - last, sizeof **sorted, compare_doubles);
         extent = fmax(extent, sorted[a][last] - sorted[a][first]);
     }
     for (int a = 0; !rc && a < 3; a++) {

@@ -55,6 +55,36 @@ static void test_random_matrices(void **state)
     }
 }
 
+/* Eight at once are each what it is alone, whatever stands beside it: also where nothing is simple. */
+static void test_eight_at_once(void **state)
+{
+    (void)state;
+    enum { lanes = SPL_EIGEN_LANES };
+    uint64_t random = 3;
+    for (int i = 0; i < 20000; i++) {
+        double m[6][lanes], values[3][lanes], least[3][lanes];
+        for (int k = 0; k < lanes; k++) {
+            double size = pow(10, 12 * uniform(&random)), a[3], own[6];
+            int kind = (int)(8 * fabs(uniform(&random))), e = 0;
+            for (int c = 0; c < 3; c++)
+                a[c] = uniform(&random);
+            for (int r = 0; r < 3; r++)
+                for (int c = r; c < 3; c++, e++)
+                    own[e] = kind == 0 ? 0 : kind == 1 ? a[r] * a[c] : kind == 2 ? r == c : size * uniform(&random);
+            for (e = 0; e < 6; e++)
+                m[e][k] = own[e];
+        }
+        spl_eigen_symmetric_eight((const double(*)[lanes])m, values, least);
+        for (int k = 0; k < lanes; k++) {
+            double own[3], normal[3], most[3];
+            const double one[6] = {m[0][k], m[1][k], m[2][k], m[3][k], m[4][k], m[5][k]};
+            spl_eigen_symmetric(one, own, normal, most);
+            for (int c = 0; c < 3; c++)
+                assert_true(values[c][k] == own[c] && least[c][k] == normal[c]);
+        }
+    }
+}
+
 /* Covariances of planes, lines and points: one or two eigenvalues vanish, or all are equal. */
 static void test_degenerate_matrices(void **state)
 {
@@ -112,7 +142,7 @@ static void test_morton(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_matrices),
+        cmocka_unit_test(test_random_matrices), cmocka_unit_test(test_eight_at_once),
         cmocka_unit_test(test_degenerate_matrices),
         cmocka_unit_test(test_line_looks_up),
         cmocka_unit_test(test_morton),

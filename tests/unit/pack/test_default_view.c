@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -12,6 +13,7 @@
 
 #include "clouds.h"
 #include "dataset/dataset.h"
+#include "pack/median.h"
 
 static char folder[] = "/tmp/splatd-view-XXXXXX";
 static char scan[64], packed[64];
@@ -278,6 +280,39 @@ static int tear_down(void **state)
     return rmdir(folder);
 }
 
+static int compare_doubles(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of few and many, of all kinds and of two alone, rising and at random. */
+static void a_quantile_is_that_of_sorted_values(void **state)
+{
+    (void)state;
+    enum { most = 1000 };
+    uint64_t random = 5;
+    for (size_t count = 1; count <= most; count += count < 40 ? 1 : 160)
+        for (int kinds = 1; kinds < 100; kinds += 13)
+            for (size_t nth = 0; nth < count; nth += 1 + count / 17) {
+                double values[most], sorted[most];
+                for (size_t i = 0; i < count; i++) {
+                    random = random * 6364136223846793005u + 1442695040888963407u;
+                    values[i] = sorted[i] = kinds == 14 ? (double)i : (double)((random >> 33) % (unsigned)kinds);
+                }
+                qsort(sorted, count, sizeof *sorted, compare_doubles);
+                float singles[most];
+                for (size_t i = 0; i < count; i++)
+                    singles[i] = (float)values[i];
+                assert_true((double)spl_middle(singles, count) == sorted[count / 2]);
+                assert_true(spl_nth(values, count, nth) == sorted[nth]);
+                for (size_t i = 0; i < count; i++)
+                    assert_true(i < nth ? values[i] <= sorted[nth] : values[i] >= sorted[nth]);
+                qsort(values, count, sizeof *values, compare_doubles);
+                assert_memory_equal(values, sorted, count * sizeof *values);
+            }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -285,6 +320,7 @@ int main(void)
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
+        cmocka_unit_test(a_quantile_is_that_of_sorted_values),
         cmocka_unit_test(what_is_said_stands),
         cmocka_unit_test(what_is_said_wrongly_is_refused_by_name),
     };

@@ -305,6 +305,48 @@ static void test_neighbours_against_brute_force(void **state)
         }
 }
 
+/* The lists of all points with the instructions of a set. */
+static uint32_t *find_all(const struct spl_points *p, unsigned k, enum spl_neighbours_set set)
+{
+    spl_neighbours_limit(set);
+    struct spl_neighbours *n = spl_neighbours_create(p, 1, NULL);
+    uint32_t *all = calloc(p->count, k * sizeof *all);
+    struct spl_nearest nearest;
+    spl_nearest_init(&nearest);
+    for (size_t i = 0; i < p->count; i++) {
+        spl_neighbours_find(n, i, k, &nearest);
+        memcpy(all + i * k, nearest.index, nearest.count * sizeof *all);
+    }
+    spl_neighbours_destroy(n);
+    return all;
+}
+
+/* Normals are sums over these lists: whatever the processor has, they name the same points in the same order, also
+ * where several are equally far, as on a grid. */
+static void test_neighbours_of_every_set(void **state)
+{
+    (void)state;
+    enum { count = 20000 };
+    static const unsigned ks[] = {3, 12, 36, SPL_NEIGHBOURS_MAX};
+    const enum spl_neighbours_set most = spl_neighbours_limit(SPL_NEIGHBOURS_AVX512);
+    for (int shape = 0; shape < SHAPES; shape++) {
+        double(*position)[3] = shape_points((enum shape)shape, count, 5);
+        struct spl_points p = sorted((const double(*)[3])position, count, 1);
+        for (size_t k = 0; k < sizeof ks / sizeof *ks; k++) {
+            uint32_t *base = find_all(&p, ks[k], SPL_NEIGHBOURS_BASE);
+            for (int set = SPL_NEIGHBOURS_AVX2; set <= (int)most; set++) {
+                uint32_t *other = find_all(&p, ks[k], (enum spl_neighbours_set)set);
+                assert_memory_equal(base, other, p.count * ks[k] * sizeof *base);
+                free(other);
+            }
+            free(base);
+        }
+        free(position);
+        spl_points_finish(&p);
+    }
+    spl_neighbours_limit(SPL_NEIGHBOURS_AVX512);
+}
+
 static void surface(struct spl_points *p, unsigned threads)
 {
     struct spl_stage stage = quiet_stage(threads);
@@ -687,6 +729,7 @@ int main(void)
         cmocka_unit_test(test_order_sorts_and_drops),        cmocka_unit_test(test_few_points_in_many_threads),
         cmocka_unit_test(test_the_same_duplicate_stays),
         cmocka_unit_test(test_order_below_key_resolution),   cmocka_unit_test(test_neighbours_against_brute_force),
+        cmocka_unit_test(test_neighbours_of_every_set),
         cmocka_unit_test(test_order_beside_a_stray_takes_no_heap),
         cmocka_unit_test(test_sides_of_many_blocks_take_no_heap),
         cmocka_unit_test(test_threads_order_long_runs_alike),
