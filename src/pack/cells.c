@@ -92,7 +92,7 @@ static void key_points(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     spl_spill_keep_bound(b->points->spill);
     for (size_t i = begin; i < end; i++)
-        b->key[i] = spl_points_key(b->points, i, b->points->bounds_min, b->points->cube_size);
+        b->key[i] = spl_points_key(b->points, i, b->points->cube_min, b->points->cube_size);
 }
 
 static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
@@ -107,7 +107,7 @@ static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
         double middle[3], inverse = 1 / b->cells->edge;
         spl_cells_place(b->cells, (uint32_t)k, at);
         for (int c = 0; c < 3; c++)
-            middle[c] = p->bounds_min[c] + ((double)at[c] + 0.5) * b->cells->edge;
+            middle[c] = p->cube_min[c] + ((double)at[c] + 0.5) * b->cells->edge;
         for (size_t i = cell->begin; i < cell[1].begin; i++) {
             float d[3];
             for (int c = 0; c < 3; c++)

@@ -1,0 +1,24 @@
+/* Space cut into parts of about as many points each. */
+#ifndef SPL_PACK_JOB_CUT_H
+#define SPL_PACK_JOB_CUT_H
+
+#include <stdint.h>
+
+#include "pack/job/job.h"
+
+/* So many points, spread evenly over a box; which may be flat. */
+struct spl_job_cell {
+    double min[3], max[3], points;
+};
+
+/* Fills `parts` (`part_count` of them, >= 1) with boxes that together are all of space and do not overlap, each found by
+ * halving along the longest side of what most of the points lie in; says of each how many points are expected in it and,
+ * within `halo`, around it. Depends on the cells alone, in their order. SPL_E_NOMEM. */
+int spl_job_cut(const struct spl_job_cell *cells, size_t count, double halo, struct spl_job_box *parts,
+                uint32_t part_count, struct spl_error *err);
+
+/* How far apart points are on the surfaces that cells are pieces of: *usual of half of them, *wide of all but a
+ * twentieth. Those cells alone whose points are many enough to tell. */
+void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, double *usual, double *wide);
+
+#endif
