@@ -55,8 +55,11 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
 {
     struct spl_default_view view;
     double radius;
-    int rc = p->options->default_view ? SPL_OK
-                                      : spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, &view, err);
+    int rc = SPL_OK;
+    if (p->part)
+        spl_part_view(&p->points, &view);
+    else if (!p->options->default_view)
+        rc = spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, &view, err);
     if (p->options->default_view)
         spl_said_view(p->options->default_view, p->points.up, &view);
     if (!rc)

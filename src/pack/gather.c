@@ -170,14 +170,13 @@ static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const
     spl_kept_has_scan(scans, &stations);
     if (!rules && stations)
         first = p->station_count;
-    int rc = spl_scan_grow(scan, batch, read, err);
-    if (rc)
-        return rc;
     if (beside->numbers)
         number_scan(batch, info->attributes, stations, first, beside->numbers);
-    size_t inside = rules ? spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers, beside->halo)
-                          : batch->count;
-    if (batch->count)
+    size_t inside = batch->count;
+    if (rules) /* where it is one of many parts of a large scan, nothing else is asked of the points of the others */
+        inside = spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers, beside->halo);
+    int rc = spl_scan_grow(scan, batch, read, err);
+    if (!rc && batch->count)
         rc = append(p, batch, info, info->attributes, p->station_count, beside->numbers, err);
     if (!rc && rules && batch->count)
         memcpy(p->halo + count, beside->halo, batch->count);

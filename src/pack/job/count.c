@@ -11,7 +11,7 @@
 #include "base/memory.h"
 
 static const double edge_least = 0x1p-20; /* where places are whole numbers of 64 bits up to SPL_COORDINATE_MAX */
-enum { cells_a_side = 1024 };             /* of the first points */
+enum { cells_a_side = 1024, sample_most = 1024 }; /* of the first points */
 
 struct cell {
     int64_t at[3];
@@ -81,16 +81,22 @@ void spl_job_grid_coarsen(struct spl_job_grid *grid)
     grid->edge *= 2;
 }
 
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Where most of the first points lie: what is too fine gets coarser, but never the other way round. */
 static double first_edge(const double (*points)[3], size_t count)
 {
-    double size = 0;
+    double size = 0, some[sample_most];
+    const size_t sample = count < sample_most ? count : sample_most;
     for (int c = 0; c < 3; c++) {
-        double low = points[0][c], high = low;
-        for (size_t i = 1; i < count; i++) {
-            low = fmin(low, points[i][c]);
-            high = fmax(high, points[i][c]);
-        }
-        size = fmax(size, high - low);
+        for (size_t i = 0; i < sample; i++)
+            some[i] = points[i * count / sample][c];
+        qsort(some, sample, sizeof *some, compare);
+        size = fmax(size, some[sample - 1 - sample / 8] - some[sample / 8]);
     }
     return fmax(edge_least, size > 0 ? ldexp(1, ilogb(size / cells_a_side)) : 0);
 }

@@ -11,11 +11,12 @@
 #include "base/memory.h"
 
 static const double outermost = 0.01; /* of the points, on either side */
-enum { steps = 50 };
+enum { steps = 50, rough_steps = 24 };
 
 struct region {
     const struct spl_job_cell *cells;
-    uint32_t *list; // owned
+    uint32_t *list;  // owned: cells that reach into it or its halo
+    double *weights; // owned: points of each that lie in it
     size_t count;
     double min[3], max[3], halo;
 };
@@ -42,17 +43,29 @@ static double points_within(const struct region *r, const double min[3], const d
     return sum;
 }
 
-/* Where, along an axis, `wanted` of the region's points lie below; *low and *high are bounds of all its cells there. */
-static double find_place(const struct region *r, int axis, double wanted, double low, double high)
+/* Of its points, those that lie below `place` along an axis. */
+static double points_below(const struct region *r, int axis, double place)
 {
-    double max[3];
-    memcpy(max, r->max, sizeof max);
-    for (int i = 0; i < steps && low < high; i++) {
+    double sum = 0;
+    for (size_t i = 0; i < r->count; i++) {
+        if (!(r->weights[i] > 0))
+            continue;
+        const struct spl_job_cell *cell = &r->cells[r->list[i]];
+        double from = cell->min[axis] > r->min[axis] ? cell->min[axis] : r->min[axis];
+        double to = cell->max[axis] < r->max[axis] ? cell->max[axis] : r->max[axis];
+        sum += r->weights[i] * share_of_side(from, to, r->min[axis], place);
+    }
+    return sum;
+}
+
+/* Where, along an axis, `wanted` of the region's points lie below; *low and *high are bounds of all its cells there. */
+static double find_place(const struct region *r, int axis, double wanted, double low, double high, int most)
+{
+    for (int i = 0; i < most && low < high; i++) {
         double middle = low / 2 + high / 2;
         if (!(middle > low && middle < high))
             break;
-        max[axis] = middle;
-        if (points_within(r, r->min, max) < wanted)
+        if (points_below(r, axis, middle) < wanted)
             low = middle;
         else
             high = middle;
@@ -72,10 +85,19 @@ static void find_extent(const struct region *r, int axis, double *low, double *h
     *high = fmin(*high, r->max[axis]);
 }
 
+static void finish(struct region *r)
+{
+    free(r->list);
+    free(r->weights);
+    r->list = NULL;
+    r->weights = NULL;
+}
+
 static int take_side(const struct region *r, struct region *side, struct spl_error *err)
 {
     side->list = spl_alloc_raw(r->count ? r->count : 1, sizeof *side->list, err);
-    if (!side->list)
+    side->weights = spl_alloc_raw(r->count ? r->count : 1, sizeof *side->weights, err);
+    if (!side->list || !side->weights)
         return SPL_E_NOMEM;
     side->count = 0;
     for (size_t i = 0; i < r->count; i++) {
@@ -83,8 +105,12 @@ static int take_side(const struct region *r, struct region *side, struct spl_err
         bool reaches = true;
         for (int c = 0; c < 3; c++)
             reaches &= cell->min[c] <= side->max[c] + side->halo && cell->max[c] >= side->min[c] - side->halo;
-        if (reaches)
-            side->list[side->count++] = r->list[i];
+        if (!reaches)
+            continue;
+        side->weights[side->count] = cell->points;
+        for (int c = 0; c < 3; c++)
+            side->weights[side->count] *= share_of_side(cell->min[c], cell->max[c], side->min[c], side->max[c]);
+        side->list[side->count++] = r->list[i];
     }
     return SPL_OK;
 }
@@ -108,7 +134,7 @@ static int cut(struct region *r, struct spl_job_box *parts, uint32_t part_count,
 {
     if (part_count == 1) {
         finish_part(r, parts);
-        free(r->list);
+        finish(r);
         return SPL_OK;
     }
     double all = points_within(r, r->min, r->max), longest = -1, low = 0, high = 0;
@@ -117,7 +143,8 @@ static int cut(struct region *r, struct spl_job_box *parts, uint32_t part_count,
     for (int c = 0; c < 3; c++) {
         double from, to;
         find_extent(r, c, &from, &to);
-        double side = all > 0 ? find_place(r, c, all * (1 - outermost), from, to) - find_place(r, c, all * outermost, from, to)
+        double side = all > 0 ? find_place(r, c, all * (1 - outermost), from, to, rough_steps) -
+                                    find_place(r, c, all * outermost, from, to, rough_steps)
                               : 0;
         if (!(side > longest))
             continue;
@@ -127,24 +154,25 @@ static int cut(struct region *r, struct spl_job_box *parts, uint32_t part_count,
         high = to;
     }
     /* without points anywhere will do, within what is finite */
-    double at = all > 0            ? find_place(r, axis, all * below / part_count, low, high)
+    double at = all > 0            ? find_place(r, axis, all * below / part_count, low, high, steps)
                 : isfinite(r->min[axis]) ? r->min[axis]
                 : isfinite(r->max[axis]) ? r->max[axis]
                                          : 0;
     struct region left = *r, right = *r;
     left.max[axis] = right.min[axis] = at;
     left.list = right.list = NULL;
+    left.weights = right.weights = NULL;
     int rc = take_side(r, &left, err);
     if (!rc)
         rc = take_side(r, &right, err);
-    free(r->list);
+    finish(r);
     if (rc) {
-        free(left.list);
-        free(right.list);
+        finish(&left);
+        finish(&right);
         return rc;
     }
     if ((rc = cut(&left, parts, below, err)))
-        free(right.list);
+        finish(&right);
     return rc ? rc : cut(&right, parts + below, part_count - below, err);
 }
 
@@ -156,10 +184,16 @@ int spl_job_cut(const struct spl_job_cell *cells, size_t count, double halo, str
                          .min = {-INFINITY, -INFINITY, -INFINITY},
                          .max = {INFINITY, INFINITY, INFINITY},
                          .halo = halo};
-    if (!(all.list = spl_alloc_raw(count ? count : 1, sizeof *all.list, err)))
+    all.list = spl_alloc_raw(count ? count : 1, sizeof *all.list, err);
+    all.weights = spl_alloc_raw(count ? count : 1, sizeof *all.weights, err);
+    if (!all.list || !all.weights) {
+        finish(&all);
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < count; i++)
+    }
+    for (size_t i = 0; i < count; i++) {
         all.list[i] = (uint32_t)i;
+        all.weights[i] = cells[i].points;
+    }
     return cut(&all, parts, part_count, err);
 }
 

@@ -3,6 +3,7 @@
 #include "pack/job/part.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,7 @@
 #include "dataset/dataset.h"
 #include "pack/build.h"
 #include "pack/job/stamp.h"
+#include "pack/view.h"
 #include "pack/warn.h"
 
 static int check_input(const struct spl_job_input *input, struct spl_error *err)
@@ -84,6 +86,28 @@ uint64_t spl_part_get_expected(const struct spl_part *part)
     return box->points + box->halo_points;
 }
 
+void spl_part_view(const struct spl_points *points, struct spl_default_view *view)
+{
+    static const double fov = 60, above = 0.6, beside = 0.8;
+    const double *up = points->up;
+    double side[3] = {0}, length = 0, diagonal = 0;
+    int flat = 0; /* the axis that is farthest from up */
+    for (int c = 1; c < 3; c++)
+        flat = fabs(up[c]) < fabs(up[flat]) ? c : flat;
+    for (int c = 0; c < 3; c++) {
+        side[c] = (c == flat) - up[flat] * up[c];
+        length = hypot(length, side[c]);
+        diagonal = hypot(diagonal, points->bounds_max[c] - points->bounds_min[c]);
+    }
+    diagonal = diagonal > 0 ? diagonal : 1;
+    *view = (struct spl_default_view){.fov = fov, .fit = {fov, fov}};
+    for (int c = 0; c < 3; c++) {
+        view->target[c] = points->bounds_min[c] / 2 + points->bounds_max[c] / 2;
+        view->eye[c] = view->target[c] + diagonal * (above * up[c] - beside * side[c] / length);
+        view->up[c] = up[c];
+    }
+}
+
 json_t *spl_part_describe(const struct spl_part *part, uint64_t halo_points)
 {
     return json_pack("{s:s, s:I, s:I, s:I}", "id", part->job->id, "part", (json_int_t)part->number, "parts",
@@ -128,7 +152,7 @@ static int look_at_dataset(const struct spl_job *job, uint32_t number, const cha
     if (access(path, F_OK))
         return SPL_OK;
     int rc = spl_dataset_open(path, true, &dataset, &why);
-    if (rc == SPL_E_INPUT) {
+    if (rc == SPL_E_INPUT || rc == SPL_E_CORRUPT) {
         there->replace = true;
         spl_pack_warn(o->warn, o->progress_context, "%.300s: it is broken, and packed anew: %.300s", path, why.message);
         return SPL_OK;

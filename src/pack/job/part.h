@@ -3,6 +3,7 @@
 #define SPL_PACK_JOB_PART_H
 
 #include "pack/job/job.h"
+#include "pack/points.h"
 #include "pack/scans.h"
 #include "pack/system.h"
 
@@ -20,6 +21,10 @@ int spl_part_open(const struct spl_part *part, struct spl_scans *scans, struct s
 
 /* Points that are expected, with those of the halo. */
 uint64_t spl_part_get_expected(const struct spl_part *part);
+
+/* A look at its bounds, from above: the view that is worth looking for is the collection's. Pure. */
+struct spl_default_view;
+void spl_part_view(const struct spl_points *points, struct spl_default_view *view);
 
 /* META's "job"; NULL: no memory. */
 json_t *spl_part_describe(const struct spl_part *part, uint64_t halo_points);

@@ -18,7 +18,7 @@
 #include "pack/said.h"
 #include "pack/warn.h"
 
-enum { cells_most = 1 << 18, scans_a_part = 4, cell_points = 16 };
+enum { cells_least = 1 << 15, cells_most = 1 << 18, cells_a_part = 1 << 12, scans_a_part = 4, cell_points = 16 };
 /* Spacings that a halo is wide: of what half of the points have, and of what nearly all have. A point's radius is held
  * against those of its neighbours, of which the 36th is 3.4 spacings away. */
 static const double halo_usual = 5, halo_wide = 3;
@@ -112,7 +112,9 @@ static int take_headers(struct planning *p, struct spl_error *err)
 
 static int count_points(struct planning *p, struct spl_error *err)
 {
-    struct spl_job_grid *grid = spl_job_grid_create(cells_most, err);
+    size_t cells = (size_t)p->options->parts * cells_a_part;
+    cells = cells < cells_least ? cells_least : cells > cells_most ? cells_most : cells;
+    struct spl_job_grid *grid = spl_job_grid_create(cells, err);
     struct spl_job_cell *coarse = NULL;
     size_t count = 0, before = 0;
     int rc = grid ? spl_survey(&p->scans, grid, &p->job->rules, &p->stage, err) : SPL_E_NOMEM;

@@ -62,7 +62,7 @@ static int read_number(const struct reader *r, const json_t *of, const char *fie
 static int read_count(const struct reader *r, const json_t *of, const char *field, double most, uint64_t *out)
 {
     const json_t *v = json_object_get(of, field);
-    if (!json_is_integer(v) || json_integer_value(v) < 0 || (double)json_integer_value(v) > most)
+    if (!json_is_integer(v) || json_integer_value(v) < 0 || json_integer_value(v) > (json_int_t)most)
         return fail(r, field, "must be a whole number from 0 to %.0f", most);
     *out = (uint64_t)json_integer_value(v);
     return SPL_OK;
@@ -280,7 +280,7 @@ static int read_all(struct reader *r, const json_t *root, struct spl_job *job)
         rc = fail(r, "format", "must be \"" SPL_JOB_FORMAT "\"");
     rc = rc ? rc : read_number(r, root, "format_version", SPL_JOB_VERSION, SPL_JOB_VERSION, &version);
     rc = rc ? rc : read_hash(r, root, "id", &hash);
-    rc = rc ? rc : read_number(r, root, "unit_m", 0, 1e300, &job->unit_m);
+    rc = rc ? rc : read_number(r, root, "unit_m", 0, 1e15, &job->unit_m);
     rc = rc ? rc : read_text(r, root, "crs", false, &job->crs);
     rc = rc ? rc : read_number(r, root, "halo", 0, SPL_COORDINATE_MAX, &job->rules.halo);
     rc = rc ? rc : read_bool(r, root, "class", &job->rules.has_class);
