@@ -257,6 +257,7 @@ static void begin_points(struct spl_points *points, const struct spl_scans *scan
     points->keep = scans->how.keep;
     points->spill = stage->spill;
     points->has_halo = scans->rules != NULL;
+    points->cells = scans->rules ? scans->rules->cells : 0;
     points->has_class = scans->rules && scans->rules->has_class;
     for (int s = 0; s < SPL_POINT_SCALARS; s++)
         points->scalar[s].spill = stage->spill;

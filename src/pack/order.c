@@ -82,12 +82,30 @@ static void find_cube(struct order *o, double high[3])
     }
 }
 
+/* Of a part: cells of all parts lie at the same places, up to those of as many levels as wires are looked for on. */
+static void align_cube(struct order *o)
+{
+    struct spl_points *p = o->points;
+    const double step = p->cells * SPL_CELLS_ALIGNED;
+    double size = step;
+    for (int c = 0; c < 3; c++) {
+        o->origin[c] = p->cube_min[c] = floor(p->bounds_min[c] / step) * step;
+        while (!(size > p->bounds_max[c] - o->origin[c]))
+            size *= 2;
+    }
+    p->cube_size = o->size = size;
+}
+
 static void find_whole_cube(struct order *o)
 {
     struct spl_points *p = o->points;
     find_cube(o, p->bounds_max);
     memcpy(p->bounds_min, o->origin, sizeof p->bounds_min);
     memcpy(p->cube_min, o->origin, sizeof p->cube_min);
+    if (p->cells > 0) {
+        align_cube(o);
+        return;
+    }
     /* The next float up, as the container keeps it: the cube of the file is the cube of the keys. */
     p->cube_size = o->size = o->size > 0 ? nextafterf((float)o->size, INFINITY) : 1;
 }

@@ -13,6 +13,7 @@
 
 #define SPL_NO_STATION UINT16_MAX
 #define SPL_POINTS_MAX (UINT32_MAX - 1) /* of a dataset: indices have 32 bits */
+enum { SPL_CELLS_ALIGNED = 64 };  /* cells of a part: the cube begins at a multiple of so many */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
@@ -42,6 +43,7 @@ struct spl_points {
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
     double bounds_min[3], bounds_max[3]; /* set by spl_points_order() */
     double cube_min[3], cube_size;       /* the cube that they are sorted in, of no other use; set by it too */
+    double cells;                        /* of a part: as of struct spl_part_rules; 0: of none */
     double (*eyes)[3]; /* set by spl_eyes_take() */
     size_t eye_count;
     double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */

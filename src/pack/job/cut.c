@@ -215,12 +215,12 @@ static double find_share(const struct spaced *list, size_t count, double points)
     return count ? list[i < count ? i : count - 1].spacing : 0;
 }
 
-void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, double *usual, double *wide)
+void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, struct spl_job_spacing *out)
 {
     struct spaced *list = spl_alloc_raw(count ? count : 1, sizeof *list, NULL);
-    double sum = 0;
+    double sum = 0, surface = 0;
     size_t used = 0;
-    *usual = *wide = 0;
+    *out = (struct spl_job_spacing){0};
     for (size_t i = 0; list && i < count; i++) {
         double side[3], area = 0;
         for (int c = 0; c < 3; c++)
@@ -231,11 +231,13 @@ void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, double
             continue;
         list[used++] = (struct spaced){sqrt(area / cells[i].points), cells[i].points};
         sum += cells[i].points;
+        surface += area;
     }
     if (list && used) {
         qsort(list, used, sizeof *list, by_spacing);
-        *usual = find_share(list, used, sum / 2);
-        *wide = find_share(list, used, sum * 0.95);
+        out->usual = find_share(list, used, sum / 2);
+        out->wide = find_share(list, used, sum * 0.95);
+        out->mean = sqrt(surface / sum);
     }
     free(list);
 }

@@ -17,8 +17,12 @@ struct spl_job_cell {
 int spl_job_cut(const struct spl_job_cell *cells, size_t count, double halo, struct spl_job_box *parts,
                 uint32_t part_count, struct spl_error *err);
 
-/* How far apart points are on the surfaces that cells are pieces of: *usual of half of them, *wide of all but a
- * twentieth. Those cells alone whose points are many enough to tell. */
-void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, double *usual, double *wide);
+/* How far apart points are on the surfaces that cells are pieces of, where these have enough points to tell. */
+struct spl_job_spacing {
+    double usual; /* of half of the points */
+    double wide;  /* of all but a twentieth */
+    double mean;  /* over the surfaces, not over the points */
+};
+void spl_job_find_spacing(const struct spl_job_cell *cells, size_t count, struct spl_job_spacing *out);
 
 #endif

@@ -21,6 +21,7 @@
 enum { cells_least = 1 << 15, cells_most = 1 << 18, cells_a_part = 1 << 12, scans_a_part = 4, cell_points = 16 };
 /* Spacings that a halo is wide: of what half of the points have, and of what nearly all have. A point's radius is held
  * against those of its neighbours, of which the 36th is 3.4 spacings away. */
+static const double linear_points = 10, cells_finest = 0x1p-30; /* wires are looked for in cells of so many points */
 static const double halo_usual = 5, halo_wide = 3;
 
 struct planning {
@@ -32,7 +33,7 @@ struct planning {
     struct spl_system system;
     struct spl_job_cell *cells; // owned
     size_t cell_count;
-    double usual, wide; /* the points' spacing */
+    struct spl_job_spacing spacing;
     struct spl_job *job;
 };
 
@@ -106,7 +107,7 @@ static int take_headers(struct planning *p, struct spl_error *err)
     }
     for (int s = 0; s < SPL_SCALAR_COUNT; s++) /* one that some scans lack has points without it */
         rules->steps[s] = (struct spl_scalar_steps){all >> s & 1, 0, 1};
-    spl_job_find_spacing(p->cells, p->cell_count, &p->usual, &p->wide);
+    spl_job_find_spacing(p->cells, p->cell_count, &p->spacing);
     return SPL_OK;
 }
 
@@ -129,7 +130,7 @@ static int count_points(struct planning *p, struct spl_error *err)
             rc = SPL_E_NOMEM;
     }
     if (!rc)
-        spl_job_find_spacing(coarse ? coarse : p->cells, coarse ? count : p->cell_count, &p->usual, &p->wide);
+        spl_job_find_spacing(coarse ? coarse : p->cells, coarse ? count : p->cell_count, &p->spacing);
     free(coarse);
     spl_job_grid_destroy(grid);
     return rc;
@@ -200,7 +201,9 @@ static int cut(struct planning *p, struct spl_error *err)
     if (!p->cell_count)
         return spl_fail_field(err, SPL_E_INPUT, "inputs", "%.300s%s: no usable point", p->scans.list[0].path,
                               p->scans.count > 1 ? " and the other inputs" : "");
-    job->rules.halo = asked >= 0 ? asked : fmax(halo_usual * p->usual, halo_wide * p->wide);
+    job->rules.halo = asked >= 0 ? asked : fmax(halo_usual * p->spacing.usual, halo_wide * p->spacing.wide);
+    if (p->spacing.mean > 0) /* with ten points a cell, where a pack of all has five to twenty */
+        job->rules.cells = fmax(cells_finest, ldexp(1, (int)lround(log2(sqrt(linear_points) * p->spacing.mean))));
     job->part_count = p->options->parts;
     if (!(job->parts = spl_alloc(job->part_count, sizeof *job->parts, err)))
         return SPL_E_NOMEM;

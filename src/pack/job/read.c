@@ -269,6 +269,12 @@ static int read_parts(struct reader *r, const json_t *root, struct spl_job *job)
     return rc;
 }
 
+static bool is_power_of_two(double v)
+{
+    int exponent;
+    return frexp(v, &exponent) == 0.5;
+}
+
 static int read_all(struct reader *r, const json_t *root, struct spl_job *job)
 {
     const char *format = NULL;
@@ -283,6 +289,9 @@ static int read_all(struct reader *r, const json_t *root, struct spl_job *job)
     rc = rc ? rc : read_number(r, root, "unit_m", 0, 1e15, &job->unit_m);
     rc = rc ? rc : read_text(r, root, "crs", false, &job->crs);
     rc = rc ? rc : read_number(r, root, "halo", 0, SPL_COORDINATE_MAX, &job->rules.halo);
+    rc = rc ? rc : read_number(r, root, "cells", 0, SPL_COORDINATE_MAX, &job->rules.cells);
+    if (!rc && job->rules.cells > 0 && !(job->rules.cells >= 0x1p-40 && is_power_of_two(job->rules.cells)))
+        rc = fail(r, "cells", "must be 0, or a power of two");
     rc = rc ? rc : read_bool(r, root, "class", &job->rules.has_class);
     rc = rc ? rc : read_bool(r, root, "scan", &job->rules.has_scan);
     rc = rc ? rc : read_bool(r, root, "stations", &job->rules.stations);

@@ -12,6 +12,7 @@
 struct spl_part_rules {
     double min[3], max[3]; /* of the part, half open: [min, max); where it is an outer one, infinite */
     double halo;           /* as far beyond it points are read that take part in neighbourhoods, and are dropped then */
+    double cells;          /* a power of two: the finest that wires are looked for in, at its multiples; 0: as points ask */
     bool has_class;        /* any of the job's scans has one */
     bool has_scan;         /* points know the number of their scan, */
     bool stations;         /* which is that of their station */

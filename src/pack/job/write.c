@@ -81,10 +81,10 @@ static json_t *describe(const struct spl_job *job, bool for_id)
         failed |= json_array_append_new(inputs, describe_input(&job->inputs[i], for_id)) != 0;
     for (uint32_t k = 0; k < job->part_count; k++)
         failed |= json_array_append_new(parts, describe_part(&job->parts[k])) != 0;
-    json_t *all = json_pack("{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o}", "format",
+    json_t *all = json_pack("{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o}", "format",
                             SPL_JOB_FORMAT, "format_version", SPL_JOB_VERSION, "id", for_id ? "" : job->id, "title",
                             for_id ? NULL : job->options.title, "description", for_id ? NULL : job->options.description,
-                            "unit_m", job->unit_m, "crs", job->crs, "halo", job->rules.halo, "class",
+                            "unit_m", job->unit_m, "crs", job->crs, "halo", job->rules.halo, "cells", job->rules.cells, "class",
                             (int)job->rules.has_class, "scan", (int)job->rules.has_scan, "stations",
                             (int)job->rules.stations, "options", describe_options(&job->options), "attributes",
                             describe_attributes(job), "parts", parts, "inputs", inputs);

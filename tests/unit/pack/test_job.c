@@ -15,6 +15,7 @@
 #include <cmocka.h>
 
 #include "clouds.h"
+#include "pack/cells.h"
 #include "pack/job/count.h"
 #include "pack/job/cut.h"
 #include "pack/job/paths.h"
@@ -164,7 +165,8 @@ static void test_strays_and_flat_clouds_are_cut_too(void **state)
 static void test_spacing_is_that_of_surfaces(void **state)
 {
     (void)state;
-    double(*p)[3] = malloc(points * sizeof *p), usual, wide;
+    double(*p)[3] = malloc(points * sizeof *p);
+    struct spl_job_spacing spacing;
     uint64_t random = 11;
     for (size_t i = 0; i < points; i++) {
         p[i][0] = 20 * uniform(&random);
@@ -176,9 +178,10 @@ static void test_spacing_is_that_of_surfaces(void **state)
         spl_job_grid_coarsen(grid);
     size_t count;
     struct spl_job_cell *cells = spl_job_grid_get_cells(grid, &count, NULL);
-    spl_job_find_spacing(cells, count, &usual, &wide);
-    assert_true(usual > 0.08 && usual < 0.12); /* 0.1 */
-    assert_true(wide >= usual && wide < 0.2);
+    spl_job_find_spacing(cells, count, &spacing);
+    assert_true(spacing.usual > 0.08 && spacing.usual < 0.12); /* 0.1 */
+    assert_true(spacing.wide >= spacing.usual && spacing.wide < 0.2);
+    assert_true(spacing.mean > 0.08 && spacing.mean < 0.12);
     free(cells);
     spl_job_grid_destroy(grid);
     free(p);
@@ -238,6 +241,50 @@ static void test_the_halo_is_dropped(void **state)
     spl_points_finish(&cloud);
     free(radius);
     free(p);
+}
+
+/* Wires are looked for in cells: of two parts that share points in the same ones, whatever else each has. */
+static void test_cells_of_parts_lie_at_the_same_places(void **state)
+{
+    (void)state;
+    enum { count = 5000 };
+    const double edge = 0.125;
+    struct spl_stage stage = quiet_stage(2);
+    for (int part = 0; part < 2; part++) {
+        double(*p)[3] = shape_points(SHAPE_CUBE, count, 4);
+        for (size_t i = 0; i < count; i++)
+            for (int c = 0; c < 3; c++)
+                p[i][c] = part ? p[i][c] * (c == 1 ? 90 : 3) - 7e5 : p[i][c] * 20 + 5.4e6;
+        struct spl_points cloud = cloud_of((const double(*)[3])p, count);
+        struct spl_cells cells, above;
+        cloud.cells = edge;
+        assert_int_equal(spl_points_order(&cloud, &stage, NULL), 0);
+        assert_int_equal(spl_cells_init_at(&cells, &cloud, edge, 2, NULL), 0);
+        assert_true(cells.edge == edge);
+        for (int level = 0; level < 6; level++) {
+            for (uint32_t k = 0; k < cells.count; k++) {
+                int64_t at[3];
+                spl_cells_place(&cells, k, at);
+                for (size_t i = cells.cells[k].begin; i < cells.cells[k + 1].begin; i++)
+                    for (int c = 0; c < 3; c++)
+                        assert_true(cloud.cube_min[c] + (double)at[c] * cells.edge ==
+                                    floor(cloud.axis[c][i] / cells.edge) * cells.edge);
+            }
+            assert_int_equal(spl_cells_init_above(&above, &cells, 2, NULL), 0);
+            spl_cells_finish(&cells);
+            cells = above;
+        }
+        spl_cells_finish(&cells);
+        assert_true(cloud.cube_size < 4 * 90 && ldexp(1, ilogb(cloud.cube_size)) == cloud.cube_size);
+        /* a stray makes them as coarse as keys must be, no finer than they can */
+        cloud.axis[0][0] = 1e9;
+        assert_int_equal(spl_points_order(&cloud, &stage, NULL), 0);
+        assert_int_equal(spl_cells_init_at(&cells, &cloud, edge, 2, NULL), 0);
+        assert_true(cells.edge > 100 && cells.count >= 2);
+        spl_cells_finish(&cells);
+        spl_points_finish(&cloud);
+        free(p);
+    }
 }
 
 static void test_paths_are_relative(void **state)
@@ -334,7 +381,7 @@ static struct spl_job some_job(void)
     job.options.keep = "gps_time";
     job.options.title = "Ä city";
     job.options.up[1] = 0.1;
-    job.rules = (struct spl_part_rules){.halo = 1.0 / 3, .has_class = true, .has_scan = true};
+    job.rules = (struct spl_part_rules){.halo = 1.0 / 3, .cells = 0.125, .has_class = true, .has_scan = true};
     job.rules.scalars = 1u << SPL_SCALAR_INTENSITY | 1u << SPL_SCALAR_KEPT | 1u << SPL_SCALAR_SCAN;
     job.rules.steps[SPL_SCALAR_INTENSITY] = (struct spl_scalar_steps){true, 0, 1};
     job.rules.steps[SPL_SCALAR_KEPT] = (struct spl_scalar_steps){false, -12345, 0x1p20};
@@ -429,6 +476,9 @@ static void test_what_is_no_job_is_refused(void **state)
         {"\"halo\": 0.33333333333333331", "\"halo\": -1", "halo"},
         {"\"halo\": 0.33333333333333331", "\"halo\": 1e300", "halo"},
         {"\"halo\": 0.33333333333333331", "\"halo\": null", "halo"},
+        {"\"cells\": 0.125", "\"cells\": 0.126", "cells"},
+        {"\"cells\": 0.125", "\"cells\": -0.125", "cells"},
+        {"\"cells\": 0.125", "\"cells\": 1e-30", "cells"},
         {"\"class\": true", "\"class\": 1", "class"},
         {"\"scan\": true", "\"scan\": \"yes\"", "scan"},
         {"\"stations\": false", "\"station\": false", "stations"},
@@ -527,6 +577,7 @@ int main(void)
         cmocka_unit_test(test_spacing_is_that_of_surfaces),
         cmocka_unit_test(test_points_outside_of_their_scans_box_are_of_one_part),
         cmocka_unit_test(test_the_halo_is_dropped),
+        cmocka_unit_test(test_cells_of_parts_lie_at_the_same_places),
         cmocka_unit_test(test_paths_are_relative),
         cmocka_unit_test(test_a_folder_of_something_else_is_refused),
         cmocka_unit_test(test_ends_tell_files_apart),

@@ -96,7 +96,8 @@ static size_t find(const struct spl_points *whole, const uint32_t *sorted, doubl
 }
 
 struct seams {
-    size_t points, near, radius, normal, clip; /* of those near a border, the ones that differ */
+    size_t points, linear, near, radius, normal, clip; /* on wires; of those near a border, the ones that differ */
+    size_t other; /* on a wire in the part alone, or in the whole alone */
 };
 
 /* Adds a part's points that lie within `reach` of its border. */
@@ -109,7 +110,10 @@ static void compare(const struct spl_job *job, int number, const struct spl_poin
             border = fmin(border, fmin(p->axis[c][i] - job->parts[number].min[c], job->parts[number].max[c] - p->axis[c][i]));
         size_t k = find(whole, sorted, p->axis[0][i]);
         assert_true(whole->axis[1][k] == p->axis[1][i] && whole->axis[2][k] == p->axis[2][i]);
+        bool on_wire = p->linear && p->linear[i], on_wire_in_all = whole->linear && whole->linear[k];
         out->points++;
+        out->linear += on_wire_in_all;
+        out->other += on_wire != on_wire_in_all;
         if (border > reach)
             continue;
         for (int c = 0; c < 3; c++)
@@ -159,13 +163,14 @@ static void test_nothing_differs_at_borders(void **state)
     qsort(sorted, count, sizeof *sorted, by_key);
     struct seams with = find_seams(&job, &whole, sorted, job.rules.halo), without = find_seams(&job, &whole, sorted, 0);
     print_message("%zu of %zu points near a border, halo %.3g: radius of %zu, normal of %zu, clip line of %zu differ; without a "
-                  "halo of %zu, %zu, %zu\n",
+                  "halo of %zu, %zu, %zu; wires: %zu of %zu, without %zu\n",
                   with.near, with.points, job.rules.halo, with.radius, with.normal, with.clip, without.radius, without.normal,
-                  without.clip);
+                  without.clip, with.other, with.linear, without.other);
     assert_true(with.near > count / 100);
     assert_true(with.radius * 100 < with.near);
     assert_true(with.normal * 100 < with.near);
     assert_true(with.clip * 100 < with.near);
+    assert_true(with.linear > count / 500 && with.other * 100 < with.linear);
     /* the fault that this is there to find */
     assert_true(without.radius * 10 > without.near);
     assert_true(without.normal * 10 > without.near);
