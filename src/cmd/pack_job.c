@@ -71,7 +71,6 @@ static void print_plan(const struct spl_job *job, bool unchanged)
                 own += job->inputs[i].bytes;
                 scans++;
             }
-        points += part->points;
         halo += part->halo_points;
         most = part->points > most ? part->points : most;
         read += own;
@@ -81,8 +80,10 @@ static void print_plan(const struct spl_job *job, bool unchanged)
         else if (k == rows_most)
             printf("   ... and %u more\n", job->part_count - k);
     }
-    for (size_t i = 0; i < job->input_count; i++)
+    for (size_t i = 0; i < job->input_count; i++) {
         bytes += job->inputs[i].bytes;
+        points += job->inputs[i].points;
+    }
     printf("%u parts of %llu points, the largest %.2f times the mean; %.1f %% of the points lie in a neighbour's halo too, "
            "%.3g wide; the scans' bytes are read %.1f times.\n",
            job->part_count, (unsigned long long)points, (double)most * job->part_count / (double)(points ? points : 1),

@@ -4,10 +4,12 @@ a slurmctld and a slurmd of this test's own; the fields of the Kubernetes job, a
 Parts are the bytes that they are when packed one after the other in a job of the same scans elsewhere, whatever failed, was
 killed or ran twice on the way, and so is what they are joined to."""
 import contextlib
+import json
 import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -115,6 +117,33 @@ def check_failures(survey):
     made = survey.make()
     assert made.returncode == 0, made.stdout
     survey.check(joined=True)
+
+
+def check_headers(survey, top):
+    """Of many LAS scans headers alone are read. One whose box is a lie, too small or with a stray, costs no point."""
+    folder, job = top / "las", top / "las job"
+    folder.mkdir()
+    for i in range(9):
+        subprocess.run([SPLATD, "synth", "courtyard", "--points", "2000", "--seed", str(i + 1), "--format", "las", "-o",
+                        str(top / "scan")], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        (top / "scan/courtyard.las").rename(folder / f"{i}.las")
+    for name, place, value in ("0.las", 179, None), ("1.las", 195, 1e9):  # the most of x is nearly its least; of y far away
+        las = bytearray((folder / name).read_bytes())
+        least = struct.unpack_from("<d", las, place + 8)[0]
+        struct.pack_into("<d", las, place, least + 0.5 if value is None else value)
+        (folder / name).write_bytes(las)
+    planned = survey.run("--plan", 2, folder, "-o", job)
+    assert planned.returncode == 0 and "counting" not in planned.stdout, planned.stdout
+    counted = survey.run("--plan", 3, folder, "-o", top / "counted")
+    assert counted.returncode == 0 and "counting" in counted.stdout, counted.stdout
+    assert survey.run("--part", 1, job).returncode == 0 and survey.run("--part", 0, job).returncode == 0
+    assert survey.run("--join", job).returncode == 0
+    assert survey.run(folder, "-o", top / "whole.spld").returncode == 0
+    whole, joined = (json.loads(subprocess.run([SPLATD, "info", "--json", path], check=True, stdout=subprocess.PIPE).stdout)
+                     for path in (top / "whole.spld", job / "all.spld"))
+    for field in "points", "leaf_splats", "bounds", "unit":
+        assert whole[field] == joined[field], (field, whole[field], joined[field])
+    assert {s["name"] for s in whole["streams"]} <= {s["name"] for s in joined["streams"]}, joined["streams"]
 
 
 def check_refusals(survey):
@@ -260,6 +289,7 @@ with tempfile.TemporaryDirectory() as folder:
         check_at_once(survey)
         check_failures(survey)
         check_refusals(survey)
+        check_headers(survey, pathlib.Path(folder))
         check_task(survey)
         check_job(survey)
 print("parts are whole")
