@@ -24,7 +24,7 @@
 
 enum { scans = 3, points = 12000, parts = 5 };
 
-/* Overlapping pieces of ground along x, some with intensities that are no whole numbers, one without any. */
+/* Pieces of ground along x that overlap here and there, two with intensities that are no whole numbers, one without. */
 static void write_scan(int scan)
 {
     char name[32];
@@ -36,7 +36,7 @@ static void write_scan(int scan)
                "property uchar red\nproperty uchar green\nproperty uchar blue\n%s%send_header\n", points,
             scan ? "property double intensity\n" : "", scan == 2 ? "property uchar classification\n" : "");
     for (int i = 0; i < points; i++) {
-        double x = 500000 + 8 * scan + 20 * uniform(&random), y = 5400000 + 10 * uniform(&random);
+        double x = 500000 + 14 * scan + 20 * uniform(&random), y = 5400000 + 10 * uniform(&random);
         fprintf(f, "%.5f %.5f %.5f %d %d 90", x, y, 0.2 * sin(x) + 0.002 * uniform(&random), 60 * scan, i % 200);
         fprintf(f, scan ? " %.2f" : "", 100 * scan + i % 50 + 0.25);
         fprintf(f, scan == 2 ? " %d\n" : "\n", 2 + i % 3);
