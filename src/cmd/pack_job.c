@@ -38,20 +38,21 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
     if ((a->plan > 0) + part + a->join > 1)
         return spl_fail(err, SPL_E_USAGE, "--plan, --part and --join are three steps: name one of them at a time");
     if (a->plan && !a->pack.output)
-        return spl_fail(err, SPL_E_USAGE, "--plan needs a folder for the job: splatd pack --plan %u scans -o job", a->plan);
+        return spl_fail(err, SPL_E_USAGE, "--plan needs a folder for the job: splatd pack --plan %u scans -o job",
+                        a->plan);
     if (a->plan)
         return operands ? SPL_OK
-                        : spl_fail(err, SPL_E_USAGE, "--plan needs at least one scan: splatd pack --plan %u scans -o job",
-                                   a->plan);
+                        : spl_fail(err, SPL_E_USAGE,
+                                   "--plan needs at least one scan: splatd pack --plan %u scans -o job", a->plan);
     const char *step = part ? "--part" : "--join";
     if (operands != 1)
         return spl_fail(err, SPL_E_USAGE, "%s takes one folder, that of the job: splatd pack %s job", step,
                         part ? "--part 0" : "--join");
     for (int i = 0; i < word_count; i++)
         if (!strncmp(words[i], "--", 2) && words[i][2] && !is_among(words[i], part ? of_part : of_join))
-            return spl_fail(err, SPL_E_USAGE,
-                            "%.40s is decided by the plan: %s takes %s alone beside the job; name it to --plan", words[i],
-                            step, part ? "--memory and --threads" : "-o, --title, --description and --threads");
+            return spl_fail(
+                err, SPL_E_USAGE, "%.40s is decided by the plan: %s takes %s alone beside the job; name it to --plan",
+                words[i], step, part ? "--memory and --threads" : "-o, --title, --description and --threads");
     if (part && a->pack.output)
         return spl_fail(err, SPL_E_USAGE, "--part writes part-%llu.spld in the job's folder: leave out -o",
                         (unsigned long long)a->part);
@@ -84,10 +85,12 @@ static void print_plan(const struct spl_job *job, bool unchanged)
         bytes += job->inputs[i].bytes;
         points += job->inputs[i].points;
     }
-    printf("%u parts of %llu points, the largest %.2f times the mean; %.1f %% of the points lie in a neighbour's halo too, "
+    printf("%u parts of %llu points, the largest %.2f times the mean; %.1f %% of the points lie in a neighbour's halo "
+           "too, "
            "%.3g wide; the scans' bytes are read %.1f times.\n",
            job->part_count, (unsigned long long)points, (double)most * job->part_count / (double)(points ? points : 1),
-           100 * (double)halo / (double)(points ? points : 1), job->rules.halo, (double)read / (double)(bytes ? bytes : 1));
+           100 * (double)halo / (double)(points ? points : 1), job->rules.halo,
+           (double)read / (double)(bytes ? bytes : 1));
     spl_cmd_put_text(stdout, job->folder, 0);
     printf(": %s %s. Pack its parts, in any order, on any machine that sees it and the scans at the same distance:\n",
            unchanged ? "the same plan as before, job" : "job", job->id);
@@ -141,8 +144,9 @@ static int pack_part(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener 
         spl_cmd_pack_print(path, NULL, &report);
     else if (!rc) {
         spl_cmd_put_text(stderr, outcome == SPL_PART_EMPTY ? job.folder : path, 0);
-        fprintf(stderr, outcome == SPL_PART_EMPTY ? ": no point lies in part %u, which is noted\n"
-                                                  : ": part %u is there, whole and of this plan\n",
+        fprintf(stderr,
+                outcome == SPL_PART_EMPTY ? ": no point lies in part %u, which is noted\n"
+                                          : ": part %u is there, whole and of this plan\n",
                 number);
     }
     free(path);

@@ -21,8 +21,8 @@ struct spl_build_outputs {
 };
 
 /* Writes the datasets and makes the drawing, which the caller writes once all is done. `later` (NULL = nothing) is what
- * comes after: where it saw the scan from, how long it will take. `part` (job/part.h; NULL = all of the scans) is what is
- * packed of the inputs, which are its job's then. `report` may be NULL. Nothing of the scan is held
+ * comes after: where it saw the scan from, how long it will take. `part` (job/part.h; NULL = all of the scans) is what
+ * is packed of the inputs, which are its job's then. `report` may be NULL. Nothing of the scan is held
  * afterwards. Blocks, as spl_pack(); its errors. */
 int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs, const struct spl_part *part,
               const struct spl_passes *later, struct spl_build_outputs *out, struct spl_stage *stage,

@@ -152,8 +152,8 @@ static void forget(struct spl_scan *scan, struct spl_stage *stage)
     atomic_store(&stage->done, 0);
 }
 
-/* Room for what a batch's points have beside: their scan's numbers, NULL where that is not kept; of a part which of them
- * lie in its halo. */
+/* Room for what a batch's points have beside: their scan's numbers, NULL where that is not kept; of a part which of
+ * them lie in its halo. */
 struct beside {
     double *numbers;
     uint8_t *halo;
@@ -174,7 +174,8 @@ static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const
         number_scan(batch, info->attributes, stations, first, beside->numbers);
     size_t inside = batch->count;
     if (rules) /* where it is one of many parts of a large scan, nothing else is asked of the points of the others */
-        inside = spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers, beside->halo);
+        inside = spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers,
+                                 beside->halo);
     int rc = spl_scan_grow(scan, batch, read, err);
     if (!rc && batch->count)
         rc = append(p, batch, info, info->attributes, p->station_count, beside->numbers, err);
@@ -195,7 +196,8 @@ static bool is_counted_here(const struct spl_scans *scans, const struct spl_scan
 }
 
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
-                       struct spl_scan *scan, const struct beside *beside, struct spl_stage *stage, struct spl_error *err)
+                       struct spl_scan *scan, const struct beside *beside, struct spl_stage *stage,
+                       struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     struct spl_cloud_options options = scans->how;
@@ -213,8 +215,9 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is no point
-     * they alone do: beyond the bound of memory what is allocated takes room on disk, used or not. Of a part they do. */
-    if (info->points_expected && !scans->rules && !info->points_at_most && info->points_expected < SPL_POINTS_MAX - p->count)
+     * they alone do, as of a part: beyond the bound of memory what is allocated takes room on disk, used or not. */
+    if (info->points_expected && !scans->rules && !info->points_at_most &&
+        info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         if (rc == SPL_CLOUD_AGAIN) {

@@ -1,6 +1,7 @@
-/* A hash table of occupied cells, so that a stray point far away is a cell more, and no others are coarser for it. Cells
- * lie at multiples of their edge, a power of two: eight become one where more are occupied than there is room for. What
- * edge there is in the end depends on the points, not on their order, but for the first of them. One thread. */
+/* A hash table of occupied cells, so that a stray point far away is a cell more, and no others are coarser for it.
+ * Cells lie at multiples of their edge, a power of two: eight become one where more are occupied than there is room
+ * for. What edge there is in the end depends on the points, not on their order, but for the first of them. One thread.
+ */
 #include "pack/job/count.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Recursive bisection. A region is a box of space and the cells that reach into it or its halo; where to cut it the
  * points say, which are counted by how much of a cell lies in the region. Which side is the longest is asked of all but
- * the outermost hundredths of the points, so that a stray one turns no cut. One thread; the time is that of some hundred
- * passes over the cells a level. */
+ * the outermost hundredths of the points, so that a stray one turns no cut. One thread; the time is that of some
+ * hundred passes over the cells a level. */
 #include "pack/job/cut.h"
 
 #include <math.h>
@@ -154,7 +154,7 @@ static int cut(struct region *r, struct spl_job_box *parts, uint32_t part_count,
         high = to;
     }
     /* without points anywhere will do, within what is finite */
-    double at = all > 0            ? find_place(r, axis, all * below / part_count, low, high, steps)
+    double at = all > 0                  ? find_place(r, axis, all * below / part_count, low, high, steps)
                 : isfinite(r->min[axis]) ? r->min[axis]
                 : isfinite(r->max[axis]) ? r->max[axis]
                                          : 0;

@@ -11,9 +11,9 @@ struct spl_job_cell {
     double min[3], max[3], points;
 };
 
-/* Fills `parts` (`part_count` of them, >= 1) with boxes that together are all of space and do not overlap, each found by
- * halving along the longest side of what most of the points lie in; says of each how many points are expected in it and,
- * within `halo`, around it. Depends on the cells alone, in their order. SPL_E_NOMEM. */
+/* Fills `parts` (`part_count` of them, >= 1) with boxes that together are all of space and do not overlap, each found
+ * by halving along the longest side of what most of the points lie in; says of each how many points are expected in it
+ * and, within `halo`, around it. Depends on the cells alone, in their order. SPL_E_NOMEM. */
 int spl_job_cut(const struct spl_job_cell *cells, size_t count, double halo, struct spl_job_box *parts,
                 uint32_t part_count, struct spl_error *err);
 

@@ -9,7 +9,8 @@ bool spl_job_reads(const struct spl_job *job, uint32_t part, const struct spl_jo
     const struct spl_job_box *box = &job->parts[part];
     bool reaches = input->points > 0;
     for (int c = 0; c < 3; c++)
-        reaches &= input->box[0][c] <= box->max[c] + job->rules.halo && input->box[1][c] >= box->min[c] - job->rules.halo;
+        reaches &=
+            input->box[0][c] <= box->max[c] + job->rules.halo && input->box[1][c] >= box->min[c] - job->rules.halo;
     return reaches;
 }
 

@@ -81,10 +81,11 @@ static int find_parts(const struct spl_job *job, char **paths, size_t *count, st
     if (rc || !missing.count)
         return rc;
     add_run(&missing);
-    return spl_fail_field(err, SPL_E_NOT_FOUND, "part",
-                          "%.300s: %u of %u parts are missing: %s; make each with \"splatd pack --part K %.200s\", on any "
-                          "machine",
-                          job->folder, missing.count, job->part_count, missing.text, job->folder);
+    return spl_fail_field(
+        err, SPL_E_NOT_FOUND, "part",
+        "%.300s: %u of %u parts are missing: %s; make each with \"splatd pack --part K %.200s\", on any "
+        "machine",
+        job->folder, missing.count, job->part_count, missing.text, job->folder);
 }
 
 int spl_job_join(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err)
@@ -94,8 +95,8 @@ int spl_job_join(const struct spl_job *job, const struct spl_collect_options *op
     char **paths = spl_alloc(job->part_count, sizeof *paths, err);
     int rc = paths ? find_parts(job, paths, &count, err) : SPL_E_NOMEM;
     if (!rc && !count)
-        rc = spl_fail_field(err, SPL_E_INPUT, "part", "%.300s: no part has a point; the headers of the scans promised some",
-                            job->folder);
+        rc = spl_fail_field(err, SPL_E_INPUT, "part",
+                            "%.300s: no part has a point; the headers of the scans promised some", job->folder);
     o.inputs = (const char *const *)paths;
     o.input_count = count;
     o.title = o.title ? o.title : job->options.title;

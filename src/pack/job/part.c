@@ -25,18 +25,20 @@ static int check_input(const struct spl_job_input *input, struct spl_error *err)
     uint64_t bytes = 0, ends = 0;
     int rc = spl_stamp_take(input->file, &bytes, &ends, &why);
     if (rc)
-        return spl_fail_field(err, rc, "path", "%.400s; the plan reads it: bring it back, or make the plan anew without it",
-                              why.message);
+        return spl_fail_field(
+            err, rc, "path", "%.400s; the plan reads it: bring it back, or make the plan anew without it", why.message);
     if (bytes != input->bytes)
-        return spl_fail_field(err, SPL_E_INPUT, "bytes",
-                              "%.300s: has %llu bytes, and %llu when the plan was made: bring that file back, or make the "
-                              "plan and all parts anew",
-                              input->file, (unsigned long long)bytes, (unsigned long long)input->bytes);
+        return spl_fail_field(
+            err, SPL_E_INPUT, "bytes",
+            "%.300s: has %llu bytes, and %llu when the plan was made: bring that file back, or make the "
+            "plan and all parts anew",
+            input->file, (unsigned long long)bytes, (unsigned long long)input->bytes);
     if (ends != input->ends)
-        return spl_fail_field(err, SPL_E_INPUT, "ends",
-                              "%.300s: its first or last 64 KiB are others than when the plan was made: bring that file "
-                              "back, or make the plan and all parts anew",
-                              input->file);
+        return spl_fail_field(
+            err, SPL_E_INPUT, "ends",
+            "%.300s: its first or last 64 KiB are others than when the plan was made: bring that file "
+            "back, or make the plan and all parts anew",
+            input->file);
     return SPL_OK;
 }
 
@@ -127,10 +129,11 @@ int spl_part_recognise(const struct spl_job *job, uint32_t number, const json_t 
                               path);
     *older = strcmp(id, job->id) != 0;
     if (*older)
-        return spl_fail_field(err, SPL_E_INPUT, "part",
-                              "%.300s: it is a part of another plan (%.16s, this one is %s); make it anew with \"splatd "
-                              "pack --part %u %.200s\"",
-                              path, id, job->id, number, job->folder);
+        return spl_fail_field(
+            err, SPL_E_INPUT, "part",
+            "%.300s: it is a part of another plan (%.16s, this one is %s); make it anew with \"splatd "
+            "pack --part %u %.200s\"",
+            path, id, job->id, number, job->folder);
     if (json_integer_value(part) != (json_int_t)number)
         return spl_fail_field(err, SPL_E_INPUT, "part",
                               "%.300s: it is part %lld of this job under another name; give it its own back", path,

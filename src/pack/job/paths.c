@@ -45,8 +45,8 @@ int spl_job_make_folder(const char *path, bool *made, struct spl_error *err)
     if (errno != EEXIST)
         return spl_fail_errno(err, errno, "%.300s: this folder cannot be made", path);
     if (stat(path, &status) || !S_ISDIR(status.st_mode))
-        return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s: a job is a folder, and this is none; choose another name",
-                              path);
+        return spl_fail_field(err, SPL_E_USAGE, "output",
+                              "%.300s: a job is a folder, and this is none; choose another name", path);
     return look_into(path, err);
 }
 

@@ -41,19 +41,20 @@ struct planning {
 static int check_options(const struct spl_plan_options *options, struct spl_error *err)
 {
     const struct spl_pack_options *o = &options->pack;
-    const char *what = o->photos                     ? "photographs (--cameras)"
-                       : o->maps && !o->maps->find   ? "maps of stations (--panoramas)"
-                       : o->maps && o->maps->edits   ? "maps of stations (--maps)"
+    const char *what = o->photos                       ? "photographs (--cameras)"
+                       : o->maps && !o->maps->find     ? "maps of stations (--panoramas)"
+                       : o->maps && o->maps->edits     ? "maps of stations (--maps)"
                        : o->maps && o->maps->export_to ? "maps of stations (--export-maps)"
-                       : o->prune > 1                ? "--prune"
-                       : o->export_primitives        ? "--export-primitives"
-                       : o->max_points               ? "--max-points"
-                       : o->default_view             ? "--default-view"
-                       : o->view_count               ? "--view"
-                                                     : NULL;
+                       : o->prune > 1                  ? "--prune"
+                       : o->export_primitives          ? "--export-primitives"
+                       : o->max_points                 ? "--max-points"
+                       : o->default_view               ? "--default-view"
+                       : o->view_count                 ? "--view"
+                                                       : NULL;
     if (what)
         return spl_fail_field(err, SPL_E_USAGE, "plan",
-                              "%s cannot be split into parts: leave it out, or pack without --plan, in one piece", what);
+                              "%s cannot be split into parts: leave it out, or pack without --plan, in one piece",
+                              what);
     if (options->parts < 1 || options->parts > SPL_JOB_PARTS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "plan", "%u parts; 1 to %d can be planned", options->parts,
                               SPL_JOB_PARTS_MAX);

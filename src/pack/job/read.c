@@ -1,6 +1,6 @@
-/* job.json as a struct. It is a file from outside: counts are bounded before anything is allocated, every number and text
- * is checked and named where it is wrong, and the whole must have the id that it says, so that a plan that somebody
- * changed by hand mixes no parts. Unknown members are ignored, but count for nothing. Any thread. */
+/* job.json as a struct. It is a file from outside: counts are bounded before anything is allocated, every number and
+ * text is checked and named where it is wrong, and the whole must have the id that it says, so that a plan that
+ * somebody changed by hand mixes no parts. Unknown members are ignored, but count for nothing. Any thread. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -28,7 +28,8 @@ struct reader {
     struct spl_error *err;
 };
 
-__attribute__((format(printf, 3, 4))) static int fail(const struct reader *r, const char *field, const char *format, ...)
+__attribute__((format(printf, 3, 4))) static int fail(const struct reader *r, const char *field, const char *format,
+                                                      ...)
 {
     char why[300];
     va_list list;
@@ -151,7 +152,8 @@ static int read_attribute(const struct reader *r, const json_t *of, const struct
     if (rc)
         return rc;
     const int places = SPL_SCALAR_KEPT + (int)keep->count;
-    while (s < SPL_POINT_SCALARS && ((s >= places && s != SPL_SCALAR_SCAN) || strcmp(spl_kept_name(keep, s), name) != 0))
+    while (s < SPL_POINT_SCALARS &&
+           ((s >= places && s != SPL_SCALAR_SCAN) || strcmp(spl_kept_name(keep, s), name) != 0))
         s++;
     if (s == SPL_POINT_SCALARS || rules->scalars >> s & 1)
         return fail(r, "name", "is %s", s == SPL_POINT_SCALARS ? "no attribute of these options" : "there twice");
@@ -180,7 +182,8 @@ static int read_attributes(struct reader *r, const json_t *root, struct spl_job 
 static int read_colors(const struct reader *r, const json_t *of, struct spl_cloud_colors *colors)
 {
     const char *from = NULL;
-    int kind = 0, rc = json_is_object(of) ? read_text(r, of, "from", true, &from) : fail(r, "colors", "must be an object");
+    int kind = 0,
+        rc = json_is_object(of) ? read_text(r, of, "from", true, &from) : fail(r, "colors", "must be an object");
     while (!rc && kind < 3 && strcmp(spl_job_color_names[kind], from) != 0)
         kind++;
     if (!rc && kind == 3)
@@ -304,8 +307,9 @@ static int read_all(struct reader *r, const json_t *root, struct spl_job *job)
     snprintf(id, sizeof id, "%016" PRIx64, hash);
     if ((rc = spl_job_name(job, r->err)))
         return rc;
-    return strcmp(id, job->id) ? fail(r, "id", "is %s, and that of what it says %s: it was changed by hand", id, job->id)
-                               : SPL_OK;
+    return strcmp(id, job->id)
+               ? fail(r, "id", "is %s, and that of what it says %s: it was changed by hand", id, job->id)
+               : SPL_OK;
 }
 
 int spl_job_parse(struct spl_job *job, const char *bytes, size_t length, const char *folder, const char *name,

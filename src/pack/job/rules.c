@@ -1,5 +1,5 @@
-/* The points of one part: found while scans are read, and what is around them dropped again. Coordinates are compared as
- * the packer keeps them, where what is nearly 0 is 0. Pure. */
+/* The points of one part: found while scans are read, and what is around them dropped again. Coordinates are compared
+ * as the packer keeps them, where what is nearly 0 is 0. Pure. */
 #include "pack/job/rules.h"
 
 #include <math.h>
@@ -7,7 +7,8 @@
 
 #include "pack/points.h"
 
-enum spl_part_place spl_part_find(const struct spl_part_rules *rules, const double low[3], const double high[3], const double at[3])
+enum spl_part_place spl_part_find(const struct spl_part_rules *rules, const double low[3], const double high[3],
+                                  const double at[3])
 {
     bool inside = true, near = true;
     for (int c = 0; c < 3; c++) {
@@ -18,8 +19,8 @@ enum spl_part_place spl_part_find(const struct spl_part_rules *rules, const doub
     return inside ? SPL_PART_INSIDE : near ? SPL_PART_HALO : SPL_PART_OUTSIDE;
 }
 
-size_t spl_part_filter(const struct spl_part_rules *rules, const double low[3], const double high[3], struct spl_point_batch *batch,
-                       uint32_t scalars, double *numbers, uint8_t *halo)
+size_t spl_part_filter(const struct spl_part_rules *rules, const double low[3], const double high[3],
+                       struct spl_point_batch *batch, uint32_t scalars, double *numbers, uint8_t *halo)
 {
     size_t to = 0, inside = 0;
     for (size_t i = 0; i < batch->count; i++) {

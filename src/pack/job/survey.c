@@ -1,5 +1,5 @@
-/* A pass over all points. What attributes have in common is found as points come, with an array of one batch; what needs
- * many values at once, of a sample. One thread. */
+/* A pass over all points. What attributes have in common is found as points come, with an array of one batch; what
+ * needs many values at once, of a sample. One thread. */
 #include "pack/job/survey.h"
 
 #include <math.h>
@@ -119,8 +119,8 @@ static int settle(struct survey *s, struct spl_part_rules *rules, struct spl_err
     return rc;
 }
 
-int spl_survey(struct spl_scans *scans, struct spl_job_grid *grid, struct spl_part_rules *rules, struct spl_stage *stage,
-               struct spl_error *err)
+int spl_survey(struct spl_scans *scans, struct spl_job_grid *grid, struct spl_part_rules *rules,
+               struct spl_stage *stage, struct spl_error *err)
 {
     struct survey s = {.scans = scans, .grid = grid, .stage = stage};
     uint64_t expected = 0;

@@ -1,5 +1,5 @@
-/* A job as JSON, its id, and the file. Members stand in the order of this file, numbers have 17 digits: the same plan is
- * the same bytes. Any thread. */
+/* A job as JSON, its id, and the file. Members stand in the order of this file, numbers have 17 digits: the same plan
+ * is the same bytes. Any thread. */
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
@@ -59,10 +59,10 @@ static json_t *describe_input(const struct spl_job_input *input, bool for_id)
     const struct spl_cloud_colors *colors = &input->colors;
     snprintf(ends, sizeof ends, "%016" PRIx64, input->ends);
     return json_pack("{s:s, s:I, s:s, s:I, s:o, s:o, s:{s:s, s:f, s:f, s:b, s:b, s:b}, s:I}", "path",
-                     for_id ? spl_input_name(input->path) : input->path, "bytes", (json_int_t)input->bytes, "ends", ends,
-                     "points", (json_int_t)input->points, "min", place(input->box[0]), "max", place(input->box[1]),
-                     "colors", "from", spl_job_color_names[colors->from], "black", colors->black, "white",
-                     colors->white, "guessed", (int)colors->guessed, "blank", (int)colors->blank, "sampled",
+                     for_id ? spl_input_name(input->path) : input->path, "bytes", (json_int_t)input->bytes, "ends",
+                     ends, "points", (json_int_t)input->points, "min", place(input->box[0]), "max",
+                     place(input->box[1]), "colors", "from", spl_job_color_names[colors->from], "black", colors->black,
+                     "white", colors->white, "guessed", (int)colors->guessed, "blank", (int)colors->blank, "sampled",
                      (int)colors->sampled, "first_number", (json_int_t)input->first_number);
 }
 
@@ -81,13 +81,13 @@ static json_t *describe(const struct spl_job *job, bool for_id)
         failed |= json_array_append_new(inputs, describe_input(&job->inputs[i], for_id)) != 0;
     for (uint32_t k = 0; k < job->part_count; k++)
         failed |= json_array_append_new(parts, describe_part(&job->parts[k])) != 0;
-    json_t *all = json_pack("{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o}", "format",
-                            SPL_JOB_FORMAT, "format_version", SPL_JOB_VERSION, "id", for_id ? "" : job->id, "title",
-                            for_id ? NULL : job->options.title, "description", for_id ? NULL : job->options.description,
-                            "unit_m", job->unit_m, "crs", job->crs, "halo", job->rules.halo, "cells", job->rules.cells, "class",
-                            (int)job->rules.has_class, "scan", (int)job->rules.has_scan, "stations",
-                            (int)job->rules.stations, "options", describe_options(&job->options), "attributes",
-                            describe_attributes(job), "parts", parts, "inputs", inputs);
+    json_t *all = json_pack(
+        "{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o}", "format", SPL_JOB_FORMAT,
+        "format_version", SPL_JOB_VERSION, "id", for_id ? "" : job->id, "title", for_id ? NULL : job->options.title,
+        "description", for_id ? NULL : job->options.description, "unit_m", job->unit_m, "crs", job->crs, "halo",
+        job->rules.halo, "cells", job->rules.cells, "class", (int)job->rules.has_class, "scan",
+        (int)job->rules.has_scan, "stations", (int)job->rules.stations, "options", describe_options(&job->options),
+        "attributes", describe_attributes(job), "parts", parts, "inputs", inputs);
     if (failed) {
         json_decref(all);
         return NULL;
@@ -106,8 +106,9 @@ static int fail_text(const struct spl_job *job, struct spl_error *err)
                                   job->inputs[i].path);
         json_decref(text);
     }
-    return spl_fail(err, SPL_E_NOMEM, "out of memory for the plan of %zu scans in %u parts, or a text among its options "
-                                      "is no UTF-8",
+    return spl_fail(err, SPL_E_NOMEM,
+                    "out of memory for the plan of %zu scans in %u parts, or a text among its options "
+                    "is no UTF-8",
                     job->input_count, job->part_count);
 }
 
