@@ -212,7 +212,7 @@ static int find_planes(struct spl_build *p, struct spl_error *err)
     char doubt[SPL_BOUND_TEXT_MAX];
     if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
         return 0;
-    int rc = spl_bound_check(&bound, &p->points, err);
+    int rc = p->part ? SPL_OK : spl_bound_check(&bound, &p->points, err);
     if (!rc)
         rc = spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
     if (!rc && p->options->warn && spl_bound_find_doubt(&bound, &p->planes, doubt))
@@ -348,7 +348,7 @@ static int build(struct spl_build *p, struct spl_build_outputs *out, struct spl_
     if (!rc && options->warn && spl_strays_find(&p->points, strays))
         options->warn(options->progress_context, strays);
     const struct spl_bound bound = get_bound(p);
-    if (!rc)
+    if (!rc && !p->part) /* of a part the plan has asked, of the whole */
         rc = spl_bound_check_size(&bound, &p->points, err);
     if (!rc)
         rc = spl_stage_check(p->stage, err);

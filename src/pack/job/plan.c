@@ -9,6 +9,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/bound.h"
 #include "pack/check.h"
 #include "pack/job/paths.h"
 #include "pack/job/part.h"
@@ -195,6 +196,21 @@ static int take_inputs(struct planning *p, struct spl_error *err)
     return rc;
 }
 
+/* A part may be small beside what primitives may be off, where the whole is not. */
+static int check_error(const struct planning *p, struct spl_error *err)
+{
+    const double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
+    const struct spl_bound bound = {.error = p->options->pack.error / unit, .unit_m = unit};
+    struct spl_points all = {.bounds_min = {INFINITY, INFINITY, INFINITY},
+                             .bounds_max = {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t i = 0; i < p->job->input_count; i++)
+        for (int c = 0; c < 3 && p->job->inputs[i].points; c++) {
+            all.bounds_min[c] = fmin(all.bounds_min[c], p->job->inputs[i].box[0][c]);
+            all.bounds_max[c] = fmax(all.bounds_max[c], p->job->inputs[i].box[1][c]);
+        }
+    return spl_bound_check_size(&bound, &all, err);
+}
+
 static int cut(struct planning *p, struct spl_error *err)
 {
     struct spl_job *job = p->job;
@@ -267,6 +283,8 @@ static int plan(struct planning *p, struct spl_error *err)
         number_scans(p);
     if (!rc)
         rc = take_inputs(p, err);
+    if (!rc)
+        rc = check_error(p, err);
     if (!rc)
         rc = cut(p, err);
     return rc ? rc : take_options(p, err);

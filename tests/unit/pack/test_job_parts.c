@@ -376,6 +376,13 @@ static void test_what_cannot_be_split_is_refused(void **state)
     assert_int_equal(plan("refused", &(struct spl_pack_options){.keep = "amplitude"}, 2, &same, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "keep");
     assert_int_equal(plan("refused", &(struct spl_pack_options){0}, 10001, &same, NULL), SPL_E_USAGE);
+    /* a tenth of the whole, which no part is as long as */
+    const struct spl_pack_options rough = {.primitives = SPL_PRIMITIVES_ALL, .error = 4}, bold = {.primitives = SPL_PRIMITIVES_ALL, .error = 5};
+    err = (struct spl_error){0};
+    assert_int_equal(plan("refused", &bold, 8, &same, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "error");
+    plan_well("rough", &rough, 8);
+    pack_well("rough", 3, 2, SPL_PART_MADE);
     assert_int_equal(access(in_folder("refused"), F_OK), -1); /* nothing is left of what fails */
     plan_well("found", &(struct spl_pack_options){.maps = &found}, 2); /* nobody asked for those */
 }
