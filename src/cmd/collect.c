@@ -55,7 +55,7 @@ static const struct spl_cmd_table table = {
     .count = sizeof options / sizeof *options,
 };
 
-static int print_summary(const char *output, struct spl_error *err)
+int spl_cmd_print_collection(const char *output, struct spl_error *err)
 {
     struct spl_dataset *dataset;
     int rc = spl_dataset_open(output, false, &dataset, err);
@@ -93,6 +93,6 @@ int spl_cmd_collect(int argc, char **argv)
     rc = spl_collect(&o, &err);
     spl_cmd_progress_finish(&progress);
     if (!rc)
-        rc = print_summary(o.output, &err);
+        rc = spl_cmd_print_collection(o.output, &err);
     return rc ? spl_cmd_fail(&err) : 0;
 }

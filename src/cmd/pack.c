@@ -7,6 +7,7 @@
 
 #include "cmd/cmd.h"
 #include "cmd/output.h"
+#include "cmd/pack_job.h"
 #include "cmd/table.h"
 #include "cmd/unfinished.h"
 #include "service/datasets/catalog.h"
@@ -53,6 +54,11 @@ int spl_cmd_pack(int argc, char **argv)
         return 0;
     if (rc)
         return spl_cmd_fail(&err);
+    if (spl_cmd_pack_is_job(&a)) {
+        rc = spl_cmd_pack_run_job(&a, &listener, &err);
+        spl_cmd_pack_finish_left_out(&listener, !rc);
+        return rc ? spl_cmd_fail(&err) : 0;
+    }
     warn_of_name(a.pack.output);
     clean_up_on_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);

@@ -1,11 +1,13 @@
 /* What the files of 'splatd pack' share: pack_options.c reads the options, pack.c packs, pack_report.c says what came
- * of it. */
+ * of it; pack_job.c packs in parts. */
 #ifndef SPL_CMD_PACK_H
 #define SPL_CMD_PACK_H
 
 #include <splatd/pack.h>
 
 #include "cmd/pack_report.h"
+
+#define SPL_CMD_PACK_NO_PART UINT64_MAX
 
 struct spl_cmd_pack {
     struct spl_pack_options pack;
@@ -15,6 +17,10 @@ struct spl_cmd_pack {
     int textures;        /* enum spl_texture_coding; -1 = not given */
     const char *quality; // may be NULL
     bool keep_going, skip_broken;
+    uint32_t plan; /* parts that are planned; 0 = none */
+    uint64_t part; /* the one that is packed, or SPL_CMD_PACK_NO_PART */
+    bool join;
+    double halo; /* negative: as wide as need be */
     struct spl_saved_view default_view, views[SPL_SAVED_VIEWS_MAX];
 };
 

@@ -10,8 +10,10 @@
 #include "base/decimal.h"
 #include "cmd/options.h"
 #include "cmd/output.h"
+#include "cmd/pack_job.h"
 #include "cmd/table.h"
 #include "geom/unit.h"
+#include "pack/job/job.h"
 
 static const char *const texture_names[SPL_TEXTURES_COUNT + 1] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
 
@@ -233,6 +235,18 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_FLAG(struct spl_cmd_pack, skip_broken)},
     {"max-points", "N", "an even part of the scans: the coarse levels of COPC, so many points of other files",
      .otherwise = "all", SPL_CMD_COUNT(struct spl_cmd_pack, pack.max_points, 1, UINT64_MAX)},
+    {"plan", "N",
+     "nothing is packed yet: decides what N parts of the scans, each a box, are and have alike, into a new folder JOB "
+     "(-o), for processes on any machines; without what is put onto a scan as a whole: photographs, maps, --prune",
+     SPL_CMD_COUNT_32(struct spl_cmd_pack, plan, 1, SPL_JOB_PARTS_MAX)},
+    {"halo", "LENGTH",
+     "with --plan: how far around its box a part reads points for the normals and radii of its own, in the scans' unit",
+     .otherwise = "by the points' spacing", SPL_CMD_REAL(struct spl_cmd_pack, halo, 0, 1e12)},
+    {"part", "K", "packs part K of the job IN, JOB/part-K.spld, unless it is there",
+     SPL_CMD_COUNT(struct spl_cmd_pack, part, 0, SPL_JOB_PARTS_MAX - 1)},
+    {"join", NULL,
+     "makes one dataset of the parts of the job IN, which stay beside it: JOB/all.spld, or -o JOB/NAME.spld",
+     SPL_CMD_FLAG(struct spl_cmd_pack, join)},
     {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
      SPL_CMD_COUNT_32(struct spl_cmd_pack, pack.threads, 1, 64)},
 };
@@ -249,7 +263,10 @@ static const struct spl_cmd_table table = {
         "                                    [--keep-textures FILE] [--device D]]\n"
         "                   [--panoramas PATH [--images DIR] [--keep-going] | --no-panoramas] [--prune N]\n"
         "                   [--export-maps DIR] [--maps DIR]\n"
-        "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n\n"
+        "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n"
+        "       splatd pack --plan N IN... -o JOB [--halo LENGTH] [--OPTION]...\n"
+        "       splatd pack --part K JOB [--memory MIB] [--threads N]\n"
+        "       splatd pack --join JOB [-o JOB/NAME.spld] [--title TEXT] [--description TEXT]\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ, other text) into one dataset to serve and\n"
         "render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates\n"
         "are kept once.\n"
@@ -285,6 +302,10 @@ static const struct spl_cmd_table table = {
         "  splatd pack hall.ply --primitives all --error 10mm -o hall.spld\n"
         "Its planes and wires for CAD, with areas, inclinations and sag:\n"
         "  splatd pack hall.ply --primitives all --export-primitives hall.dxf -o hall.spld\n"
+        "A survey that is too much for one process, as 8 parts without seams, each packed on any machine, and one\n"
+        "dataset of them:\n"
+        "  splatd pack --plan 8 street-*.las -o job\n"
+        "  for k in 0 1 2 3 4 5 6 7; do splatd pack --part $k job; done && splatd pack --join job -o job/street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
     .after = "\nAbout 80 bytes of memory a point, 180 on a wire, or --memory. Progress and the summary go to stderr.\n",
@@ -327,7 +348,11 @@ static int check(const struct spl_cmd_pack *a, struct spl_error *err)
     if (!o->input_count)
         return spl_fail(err, SPL_E_USAGE, "pack needs at least one scan: splatd pack scan.las -o scan.spld; "
                                           "'splatd pack --help' shows more");
-    int rc = spl_cmd_check_dataset("pack", o->output, err);
+    if (!a->plan && a->halo >= 0)
+        return spl_fail(err, SPL_E_USAGE, "--halo is of parts, which --plan N makes: name that too, or leave it out");
+    int rc = a->plan ? SPL_OK : spl_cmd_check_dataset("pack", o->output, err);
+    if (!rc && !o->output)
+        rc = spl_fail(err, SPL_E_USAGE, "--plan needs a folder for the job: -o FOLDER");
     if (rc)
         return rc;
     const char *contradiction = find_contradiction(a);
@@ -345,11 +370,17 @@ int spl_cmd_pack_parse(struct spl_cmd_pack *a, struct spl_cmd_pack_listener *lis
         .photos = {.size = sizeof a->photos, .trained = spl_cmd_pack_say_trained, .context = listener},
         .maps = {.size = sizeof a->maps},
         .textures = -1,
+        .part = SPL_CMD_PACK_NO_PART,
+        .halo = -1,
     };
     int rc = spl_cmd_table_parse(&table, argc, argv, a, err);
     a->pack.inputs = (const char *const *)&argv[optind];
     a->pack.input_count = (size_t)(argc - optind);
-    if (rc || (rc = check(a, err)))
+    if (!rc)
+        rc = spl_cmd_pack_is_job(a) ? spl_cmd_pack_check_job(a, argv + 1, optind - 1, argc - optind, err) : SPL_OK;
+    if (!rc && (a->plan || !spl_cmd_pack_is_job(a)))
+        rc = check(a, err);
+    if (rc)
         return rc;
     a->pack.left_out = a->skip_broken ? spl_cmd_pack_say_left_out : NULL;
     a->photos.refused = a->keep_going ? spl_cmd_pack_name_refused : NULL;

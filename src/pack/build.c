@@ -25,6 +25,8 @@
 #include "pack/check.h"
 #include "pack/export/export.h"
 #include "pack/eyes.h"
+#include "pack/job/part.h"
+#include "pack/job/rules.h"
 #include "pack/linear.h"
 #include "pack/median.h"
 #include "pack/said.h"
@@ -53,9 +55,11 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
 {
     struct spl_default_view view;
     double radius;
-    int rc = p->options->default_view
-                 ? SPL_OK
-                 : spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, p->stage->threads, &view, err);
+    int rc = SPL_OK;
+    if (p->part)
+        spl_part_view(&p->points, &view);
+    else if (!p->options->default_view)
+        rc = spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, p->stage->threads, &view, err);
     if (p->options->default_view)
         spl_said_view(p->options->default_view, p->points.up, &view);
     if (!rc)
@@ -102,6 +106,8 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
     bool twice = writes_twice(p, later);
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
+    uint64_t read = points; /* of which a part keeps some */
+    points = p->part ? spl_part_get_expected(p->part) : points;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
         if ((!parts[i].of_surface || !p->options->points_only) &&
             ((strcmp(parts[i].name, "planes") && strcmp(parts[i].name, "panels")) ||
@@ -109,8 +115,8 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
             (strcmp(parts[i].name, "outlines") || p->options->export_primitives))
             spl_stage_plan(p->stage, parts[i].name,
                            (parts[i].seconds + (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
-                               (double)points,
-                           i ? 0 : points);
+                               (double)(i ? points : read),
+                           i ? 0 : read);
     if (later && later->photographs.count)
         spl_photos_plan(p->options->photos, p->stage, (uint32_t)later->photographs.count,
                         (uint64_t)(1.33 * (double)points), 0);
@@ -143,6 +149,10 @@ static int begin_spill(struct spl_build *p, const struct spl_passes *later, stru
         least += scan->max_points || scan->counted ? own : own / 2;
         normals = scan->attributes & SPL_CLOUD_NORMAL ? bytes_normal : normals;
         scalars = fmax(scalars, bytes_scalar * __builtin_popcount(scan->scalars));
+    }
+    if (p->part) {
+        points = (double)spl_part_get_expected(p->part);
+        least = points / 2;
     }
     bytes += normals + scalars;
     double beyond = points * bytes - (double)spl_spill_get_share(o->memory_bytes);
@@ -206,7 +216,7 @@ static int find_planes(struct spl_build *p, struct spl_error *err)
     char doubt[SPL_BOUND_TEXT_MAX];
     if (p->options->primitives == SPL_PRIMITIVES_OFF || p->options->points_only)
         return 0;
-    int rc = spl_bound_check(&bound, &p->points, err);
+    int rc = p->part ? SPL_OK : spl_bound_check(&bound, &p->points, err);
     if (!rc)
         rc = spl_planes_find(&p->planes, &p->points, &planes, p->stage, err);
     if (!rc && p->options->warn && spl_bound_find_doubt(&bound, &p->planes, doubt))
@@ -303,11 +313,74 @@ static int gather(struct spl_build *p, struct spl_system_options *said, struct s
     return spl_system_find(&p->system, &p->scans, said, err);
 }
 
-int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs, const struct spl_passes *later,
-              struct spl_build_outputs *out, struct spl_stage *stage, struct spl_pack_report *report,
-              struct spl_error *err)
+static int open_scans(struct spl_build *p, struct spl_inputs *inputs, const struct spl_system_options *said,
+                      struct spl_error *err)
 {
-    struct spl_build p = {.options = options, .stage = stage};
+    const struct spl_pack_options *options = p->options;
+    const struct spl_cloud_options how = {.columns = options->columns,
+                                          .intensity = options->intensity,
+                                          .keep = &p->keep,
+                                          .max_points = options->max_points};
+    if (p->part)
+        return spl_part_open(p->part, &p->scans, &p->system, inputs, &how, p->stage, err);
+    int rc = spl_scans_init(&p->scans, inputs, &how, p->stage, err);
+    if (!rc)
+        rc = spl_kept_check(&p->scans, err);
+    if (!rc)
+        rc = spl_system_find(&p->system, &p->scans, said, err);
+    return rc ? rc : spl_points_check_count(&p->scans, err);
+}
+
+/* What lies on wires, and what is around each point; of a part also around it. */
+static int look_around(struct spl_build *p, struct spl_error *err)
+{
+    const struct spl_pack_options *options = p->options;
+    int rc = options->no_linear ? SPL_OK : spl_linear_find(&p->points, p->stage, err);
+    if (!rc)
+        rc = options->points_only ? spl_bare_points(&p->points, p->stage, err)
+                                  : spl_surface(&p->points, p->neighbours, !options->no_clip_lines, p->stage, err);
+    if (!rc)
+        spl_part_drop_halo(&p->points);
+    return rc;
+}
+
+/* Of the gathered points. */
+static int build(struct spl_build *p, struct spl_build_outputs *out, struct spl_error *err)
+{
+    const struct spl_pack_options *options = p->options;
+    char strays[SPL_STRAYS_TEXT_MAX];
+    int rc = spl_points_order(&p->points, p->stage, err);
+    if (!rc && options->warn && spl_strays_find(&p->points, strays))
+        options->warn(options->progress_context, strays);
+    const struct spl_bound bound = get_bound(p);
+    if (!rc && !p->part) /* of a part the plan has asked, of the whole */
+        rc = spl_bound_check_size(&bound, &p->points, err);
+    if (!rc)
+        rc = spl_stage_check(p->stage, err);
+    if (!rc)
+        rc = look_around(p, err);
+    if (!rc && !p->points.count) {
+        out->empty = true;
+        return rc;
+    }
+    if (!rc)
+        rc = find_planes(p, err);
+    if (!rc)
+        rc = join_wires(p, err);
+    if (!rc)
+        rc = export_primitives(p, out, err);
+    if (options->prune > 1)
+        p->tree.pruned_to = p->points.count / options->prune + 1;
+    if (!rc)
+        rc = build_tree(p, err);
+    return rc ? rc : write_dataset(p, err);
+}
+
+int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs, const struct spl_part *part,
+              const struct spl_passes *later, struct spl_build_outputs *out, struct spl_stage *stage,
+              struct spl_pack_report *report, struct spl_error *err)
+{
+    struct spl_build p = {.options = options, .part = part, .stage = stage};
     struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = spl_pack_check(options, &p.neighbours, &p.chunk, err);
@@ -322,18 +395,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     if (!rc)
         rc = spl_dataset_writer_create(out->dataset, &p.writer, err);
     if (!rc)
-        rc = spl_scans_init(&p.scans, inputs,
-                            &(struct spl_cloud_options){.columns = options->columns,
-                                                        .intensity = options->intensity,
-                                                        .keep = &p.keep,
-                                                        .max_points = options->max_points},
-                            stage, err);
-    if (!rc)
-        rc = spl_kept_check(&p.scans, err);
-    if (!rc)
-        rc = spl_system_find(&p.system, &p.scans, &said, err);
-    if (!rc)
-        rc = spl_points_check_count(&p.scans, err);
+        rc = open_scans(&p, inputs, &said, err);
     if (!rc) {
         plan(&p, later);
         rc = stage->spill ? begin_spill(&p, later, err) : SPL_OK;
@@ -349,37 +411,13 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_eyes_take(&p.points, later->photographs.count ? &later->photographs : &later->pictures, err);
     if (!rc)
         rc = spl_stage_check(stage, err);
-    if (!rc && options->warn)
+    if (!rc && options->warn && !part)
         spl_scans_compare(&p.scans, options->warn, options->progress_context);
     p.sides_known = p.points.normal || p.points.station_count || p.points.eye_count;
-    if (!rc)
-        rc = spl_points_order(&p.points, stage, err);
-    char strays[SPL_STRAYS_TEXT_MAX];
-    if (!rc && options->warn && spl_strays_find(&p.points, strays))
-        options->warn(options->progress_context, strays);
-    const struct spl_bound bound = get_bound(&p);
-    if (!rc)
-        rc = spl_bound_check_size(&bound, &p.points, err);
-    if (!rc)
-        rc = spl_stage_check(stage, err);
-    if (!rc && !options->no_linear)
-        rc = spl_linear_find(&p.points, stage, err);
-    if (!rc)
-        rc = options->points_only ? spl_bare_points(&p.points, stage, err)
-                                  : spl_surface(&p.points, p.neighbours, !options->no_clip_lines, stage, err);
-    if (!rc)
-        rc = find_planes(&p, err);
-    if (!rc)
-        rc = join_wires(&p, err);
-    if (!rc)
-        rc = export_primitives(&p, out, err);
-    if (options->prune > 1)
-        p.tree.pruned_to = p.points.count / options->prune + 1;
-    if (!rc)
-        rc = build_tree(&p, err);
-    if (!rc)
-        rc = write_dataset(&p, err);
-    if (!rc && report) {
+    out->empty = !rc && !p.points.points_read;
+    if (!rc && !out->empty)
+        rc = build(&p, out, err);
+    if (!rc && report && !out->empty) {
         spl_build_report(&p, report);
         report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     }

@@ -14,6 +14,7 @@
 
 struct spl_build {
     const struct spl_pack_options *options;
+    const struct spl_part *part; /* of a job; NULL: all of the scans */
     struct spl_chunk_options chunk;
     unsigned neighbours;
     struct spl_stage *stage;

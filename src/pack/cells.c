@@ -92,7 +92,7 @@ static void key_points(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     spl_spill_keep_bound(b->points->spill);
     for (size_t i = begin; i < end; i++)
-        b->key[i] = spl_points_key(b->points, i, b->points->bounds_min, b->points->cube_size);
+        b->key[i] = spl_points_key(b->points, i, b->points->cube_min, b->points->cube_size);
 }
 
 static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
@@ -107,7 +107,7 @@ static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
         double middle[3], inverse = 1 / b->cells->edge;
         spl_cells_place(b->cells, (uint32_t)k, at);
         for (int c = 0; c < 3; c++)
-            middle[c] = p->bounds_min[c] + ((double)at[c] + 0.5) * b->cells->edge;
+            middle[c] = p->cube_min[c] + ((double)at[c] + 0.5) * b->cells->edge;
         for (size_t i = cell->begin; i < cell[1].begin; i++) {
             float d[3];
             for (int c = 0; c < 3; c++)
@@ -178,8 +178,18 @@ static unsigned shift_for(const uint64_t *key, size_t count, double wanted, uint
     return shift;
 }
 
-int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, double wanted, unsigned threads,
-                   struct spl_error *err)
+/* Cells that there are at a shift. */
+static uint32_t count_cells(const uint64_t *key, size_t count, unsigned shift)
+{
+    uint32_t cells = count > 0;
+    for (size_t i = 1; i < count; i++)
+        cells += key[i] >> 3 * shift != key[i - 1] >> 3 * shift;
+    return cells;
+}
+
+/* Of `wanted` points a cell or, where that is 0, of `edge`. */
+static int init(struct spl_cells *cells, const struct spl_points *points, double wanted, double edge, unsigned threads,
+                struct spl_error *err)
 {
     struct build b = {.points = points, .cells = cells};
     *cells = (struct spl_cells){.spill = points->spill};
@@ -187,7 +197,13 @@ int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, dou
     if (!b.key)
         return SPL_E_NOMEM;
     spl_parallel_for(threads, points->count, grain, key_points, &b);
-    cells->shift = shift_for(b.key, points->count, wanted, &cells->count);
+    if (wanted > 0) {
+        cells->shift = shift_for(b.key, points->count, wanted, &cells->count);
+    } else {
+        int shift = SPL_MORTON_BITS - ilogb(points->cube_size / edge);
+        cells->shift = shift < 0 ? 0 : shift > SPL_MORTON_BITS ? SPL_MORTON_BITS : (unsigned)shift;
+        cells->count = count_cells(b.key, points->count, cells->shift);
+    }
     cells->edge = ldexp(points->cube_size, (int)cells->shift - SPL_MORTON_BITS);
     cells->cells = spl_spill_alloc(cells->spill, (size_t)cells->count + 1, sizeof *cells->cells, err);
     if (!cells->cells) {
@@ -205,6 +221,18 @@ int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, dou
     spl_spill_free(points->spill, b.key);
     spl_parallel_for(threads, cells->count, grain, sum_points, &b);
     return make_table(cells, err);
+}
+
+int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, double wanted, unsigned threads,
+                   struct spl_error *err)
+{
+    return init(cells, points, wanted, 0, threads, err);
+}
+
+int spl_cells_init_at(struct spl_cells *cells, const struct spl_points *points, double edge, unsigned threads,
+                      struct spl_error *err)
+{
+    return init(cells, points, 0, edge, threads, err);
 }
 
 int spl_cells_init_above(struct spl_cells *cells, const struct spl_cells *below, unsigned threads,

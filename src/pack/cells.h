@@ -29,6 +29,10 @@ struct spl_cells {
 int spl_cells_init(struct spl_cells *cells, const struct spl_points *points, double wanted, unsigned threads,
                    struct spl_error *err);
 
+/* The same with cells of `edge`, a power of two of which cube_size has 2^n, or the next edge that keys can tell. */
+int spl_cells_init_at(struct spl_cells *cells, const struct spl_points *points, double edge, unsigned threads,
+                      struct spl_error *err);
+
 /* The level above: cells of twice the edge. `below` stays. */
 int spl_cells_init_above(struct spl_cells *cells, const struct spl_cells *below, unsigned threads,
                          struct spl_error *err);

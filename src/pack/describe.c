@@ -5,6 +5,7 @@
 
 #include "geom/unit.h"
 #include "pack/build_parts.h"
+#include "pack/job/part.h"
 #include "pack/part.h"
 
 static json_t *json_vector(const double v[3])
@@ -52,6 +53,8 @@ json_t *spl_build_describe(const struct spl_build *p, double radius, const struc
         return NULL;
     if (spl_part_of(&p->scans))
         json_object_set_new(meta, "part_of", json_integer((json_int_t)spl_part_of(&p->scans)));
+    if (p->part)
+        json_object_set_new(meta, "job", spl_part_describe(p->part, points->halo_points));
     if (p->up_from)
         json_object_set_new(meta, "up",
                             json_pack("{s:o, s:s}", "vector", json_vector(p->points.up), "from", p->up_from));

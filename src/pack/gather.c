@@ -13,11 +13,10 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "cloud/cloud.h"
+#include "pack/job/rules.h"
 #include "pack/kept.h"
 
 enum { batch_points = 65536 };
-/* Coordinates below it are 0: so is -0, and no two places are closer than floats relative to a node can tell. */
-static const double nothing = 1e-15;
 static const uint32_t grey = 0xb0b0b0; /* of points without any colour or intensity */
 
 static int grow(struct spl_spill *spill, void **array, size_t capacity, size_t size, struct spl_error *err)
@@ -64,6 +63,8 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
     for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
         if (p->scalar[s].values && capacity > p->capacity)
             rc = grow(p->spill, &p->scalar[s].values, capacity, spl_scalar_bytes(&p->scalar[s]), err);
+    if (!rc && p->has_halo && capacity > p->capacity)
+        rc = grow(p->spill, (void **)&p->halo, capacity, sizeof *p->halo, err);
     if (!rc && (had_station ? capacity > p->capacity : wants_station))
         rc = grow(p->spill, (void **)&p->station, capacity, sizeof *p->station, err);
     if (!rc && (had_normal ? capacity > p->capacity : wants_normal))
@@ -101,10 +102,8 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
         return rc;
     size_t at = p->count;
     for (size_t i = 0; i < batch->count; i++, at++) {
-        for (int c = 0; c < 3; c++) {
-            double v = batch->position[i][c];
-            p->axis[c][at] = fabs(v) < nothing ? 0 : v;
-        }
+        for (int c = 0; c < 3; c++)
+            p->axis[c][at] = spl_points_coordinate(batch->position[i][c]);
         uint32_t color = grey;
         if (attributes & SPL_CLOUD_COLOR)
             color = batch->color[i][0] | (uint32_t)batch->color[i][1] << 8 | (uint32_t)batch->color[i][2] << 16;
@@ -119,7 +118,6 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
             p->normal[at][c] = attributes & SPL_CLOUD_NORMAL ? batch->normal[i][c] + 0.0f : 0;
     }
     p->count = at;
-    p->points_read += batch->count;
     return 0;
 }
 
@@ -134,13 +132,13 @@ static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info
     return 0;
 }
 
-/* The scan's number of each point of a batch: its station's, or that of the input. */
-static void number_scan(const struct spl_points *p, const struct spl_point_batch *batch, uint32_t attributes,
-                        bool stations, size_t input, double *out)
+/* The scan's number of each point of a batch: its station's, from `first` on, or that of the input. */
+static void number_scan(const struct spl_point_batch *batch, uint32_t attributes, bool stations, size_t first,
+                        double *out)
 {
     for (size_t i = 0; i < batch->count; i++)
-        out[i] = !stations                        ? (double)input
-                 : attributes & SPL_CLOUD_STATION ? (double)p->station_count + batch->station[i]
+        out[i] = !stations                        ? (double)first
+                 : attributes & SPL_CLOUD_STATION ? (double)first + batch->station[i]
                                                   : (double)NAN;
 }
 
@@ -150,11 +148,56 @@ static void forget(struct spl_scan *scan, struct spl_stage *stage)
         scan->min[c] = INFINITY;
         scan->max[c] = -INFINITY;
     }
+    scan->points_inside = 0;
     atomic_store(&stage->done, 0);
 }
 
+/* Room for what a batch's points have beside: their scan's numbers, NULL where that is not kept; of a part which of
+ * them lie in its halo. */
+struct beside {
+    double *numbers;
+    uint8_t *halo;
+};
+
+/* Of a batch, from a scan whose points before it were `read`, what is to be kept. */
+static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
+                      struct spl_scan *scan, const struct spl_cloud_info *info, uint64_t read,
+                      const struct beside *beside, struct spl_error *err)
+{
+    const struct spl_part_rules *rules = scans->rules;
+    size_t count = p->count, first = rules ? scan->first_number : (size_t)(scan - scans->list);
+    bool stations;
+    spl_kept_has_scan(scans, &stations);
+    if (!rules && stations)
+        first = p->station_count;
+    if (beside->numbers)
+        number_scan(batch, info->attributes, stations, first, beside->numbers);
+    size_t inside = batch->count;
+    if (rules) /* where it is one of many parts of a large scan, nothing else is asked of the points of the others */
+        inside = spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers,
+                                 beside->halo);
+    int rc = spl_scan_grow(scan, batch, read, err);
+    if (!rc && batch->count)
+        rc = append(p, batch, info, info->attributes, p->station_count, beside->numbers, err);
+    if (!rc && rules && batch->count)
+        memcpy(p->halo + count, beside->halo, batch->count);
+    p->points_read += inside;
+    scan->points_inside += inside;
+    return rc;
+}
+
+/* What is skipped of a scan lies nowhere: one part of a job counts it. */
+static bool is_counted_here(const struct spl_scans *scans, const struct spl_scan *scan)
+{
+    double middle[3];
+    for (int c = 0; c < 3; c++)
+        middle[c] = scan->box[0][c] / 2 + scan->box[1][c] / 2;
+    return !scans->rules || spl_part_find(scans->rules, scan->box[0], scan->box[1], middle) == SPL_PART_INSIDE;
+}
+
 static int gather_file(struct spl_points *p, struct spl_point_batch *batch, const struct spl_scans *scans,
-                       struct spl_scan *scan, double *numbers, struct spl_stage *stage, struct spl_error *err)
+                       struct spl_scan *scan, const struct beside *beside, struct spl_stage *stage,
+                       struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     struct spl_cloud_options options = scans->how;
@@ -166,40 +209,44 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
-    uint64_t first = p->points_read;
+    uint64_t first = p->points_read, read = 0;
     size_t count = p->count;
     char name[128];
-    bool stations;
-    spl_kept_has_scan(scans, &stations);
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", info->points_expected);
-    /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is no
-     * point they alone do: beyond the bound of memory what is allocated takes room on disk, used or not. */
-    if (info->points_expected && !info->points_at_most && info->points_expected < SPL_POINTS_MAX - p->count)
+    /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is
+     * no point they alone do, as of a part: beyond the bound of memory what is allocated takes room on disk, used or
+     * not. */
+    if (info->points_expected && !scans->rules && !info->points_at_most &&
+        info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
     while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
         if (rc == SPL_CLOUD_AGAIN) {
             p->points_read = first;
             p->count = count;
+            read = 0;
             forget(scan, stage);
             scan->colors = scan->own_colors = info->colors;
             rc = 0;
             continue;
         }
-        spl_stage_add(stage, batch->count, 0);
-        rc = spl_scan_grow(scan, batch, p->points_read - first, err);
-        if (numbers)
-            number_scan(p, batch, attributes, stations, (size_t)(scan - scans->list), numbers);
-        if (!rc)
-            rc = append(p, batch, info, attributes, p->station_count, numbers, err);
+        size_t points = batch->count; /* of which some are not kept */
+        spl_stage_add(stage, points, 0);
+        rc = take_batch(p, batch, scans, scan, info, read, beside, err);
+        read += points;
         if (!rc)
             rc = spl_stage_check(stage, err);
     }
     info = spl_cloud_get_info(cloud);
     if (!rc && attributes & SPL_CLOUD_STATION)
         rc = keep_stations(p, info, err);
-    p->points_skipped += info->points_skipped;
+    if (is_counted_here(scans, scan))
+        p->points_skipped += info->points_skipped;
     memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
+    if (scans->rules) {
+        memset(scan->points_from, 0, sizeof scan->points_from);
+        scan->points_from[info->colors.from] = scan->points_inside;
+    }
     p->has_color |= attributes & SPL_CLOUD_COLOR;
     p->has_class |= attributes & SPL_CLOUD_CLASS;
     spl_stage_end(stage);
@@ -213,6 +260,9 @@ static void begin_points(struct spl_points *points, const struct spl_scans *scan
 {
     points->keep = scans->how.keep;
     points->spill = stage->spill;
+    points->has_halo = scans->rules != NULL;
+    points->cells = scans->rules ? scans->rules->cells : 0;
+    points->has_class = scans->rules && scans->rules->has_class;
     for (int s = 0; s < SPL_POINT_SCALARS; s++)
         points->scalar[s].spill = stage->spill;
 }
@@ -220,14 +270,14 @@ static void begin_points(struct spl_points *points, const struct spl_scans *scan
 /* One pass over all scans. One that breaks is taken out of the list; points mean nothing then, and the others are read
  * on only to find all that break. */
 static int gather(struct spl_points *points, struct spl_point_batch *batch, struct spl_scans *scans,
-                  double *numbers, struct spl_stage *stage, struct spl_error *err)
+                  const struct beside *beside, struct spl_stage *stage, struct spl_error *err)
 {
     int rc = SPL_OK;
     begin_points(points, scans, stage);
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_scan *scan = &scans->list[i];
         struct spl_error why = {0};
-        if (!(rc = gather_file(points, batch, scans, scan, numbers, stage, &why))) {
+        if (!(rc = gather_file(points, batch, scans, scan, beside, stage, &why))) {
             i++;
             continue;
         }
@@ -235,6 +285,36 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
         begin_points(points, scans, stage);
         if (!(rc = spl_inputs_leave_out(scans->inputs, scan->path, rc, &why, err)))
             spl_scans_remove(scans, i);
+    }
+    return rc;
+}
+
+static bool votes(int scalar)
+{
+    return scalar == SPL_SCALAR_RETURN || scalar == SPL_SCALAR_RETURNS || scalar == SPL_SCALAR_SCAN;
+}
+
+/* Those of a part are kept as those of all others, whatever values it has. */
+static int settle_as_ruled(struct spl_points *p, const struct spl_part_rules *rules, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (int s = 0; s < SPL_POINT_SCALARS && !rc && p->count; s++) {
+        struct spl_scalar_values *scalar = &p->scalar[s];
+        if (!(rules->scalars >> s & 1)) {
+            spl_spill_free(p->spill, scalar->values);
+            *scalar = (struct spl_scalar_values){0};
+            continue;
+        }
+        scalar->votes = votes(s);
+        if (!scalar->values) /* no point here has any */
+            rc = spl_scalar_add(scalar, p->capacity, p->count, NULL, 0, err);
+        if (!rc && !spl_scalar_settle_as(scalar, &rules->steps[s]))
+            rc = spl_fail_field(err, SPL_E_INPUT, "scalars",
+                                "the scans' \"%s\" is from %.17g to %.17g%s, unlike in the plan (from %.17g in %.17g a "
+                                "unit): make the plan anew",
+                                spl_kept_name(p->keep, s), scalar->min, scalar->max,
+                                scalar->missing ? " and missing in some" : "", rules->steps[s].first,
+                                rules->steps[s].steps_a_unit);
     }
     return rc;
 }
@@ -247,7 +327,7 @@ static int settle_scalars(struct spl_points *p, struct spl_error *err)
         struct spl_scalar_values *scalar = &p->scalar[s];
         if (!scalar->values)
             continue;
-        scalar->votes = s == SPL_SCALAR_RETURN || s == SPL_SCALAR_RETURNS || s == SPL_SCALAR_SCAN;
+        scalar->votes = votes(s);
         if (!spl_scalar_is_constant(scalar) || spl_kept_is_named(p->keep, s)) {
             rc = spl_scalar_settle(scalar, p->count, err);
         } else {
@@ -264,14 +344,17 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
                       struct spl_error *err)
 {
     struct spl_point_batch batch = {0};
-    double *numbers = NULL;
+    struct beside beside = {0};
     bool stations;
     int rc = spl_point_batch_init(&batch, batch_points, err);
-    if (!rc && spl_kept_has_scan(scans, &stations) && !(numbers = spl_alloc_raw(batch_points, sizeof *numbers, err)))
+    if (!rc && spl_kept_has_scan(scans, &stations) &&
+        !(beside.numbers = spl_alloc_raw(batch_points, sizeof *beside.numbers, err)))
+        rc = SPL_E_NOMEM;
+    if (!rc && scans->rules && !(beside.halo = spl_alloc_raw(batch_points, sizeof *beside.halo, err)))
         rc = SPL_E_NOMEM;
     for (bool again = !rc; again;) {
         size_t count = scans->count;
-        rc = gather(points, &batch, scans, numbers, stage, err);
+        rc = gather(points, &batch, scans, &beside, stage, err);
         again = !rc && scans->count < count;
         if (again) {
             spl_points_finish(points);
@@ -281,13 +364,14 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
         }
     }
     spl_point_batch_finish(&batch);
-    free(numbers);
+    free(beside.numbers);
+    free(beside.halo);
     if (!rc && !scans->count)
         rc = spl_inputs_fail_empty(scans->inputs, err);
     points->up[2] = 1;
     if (!rc)
-        rc = settle_scalars(points, err);
-    if (!rc && !points->count)
+        rc = scans->rules ? settle_as_ruled(points, scans->rules, err) : settle_scalars(points, err);
+    if (!rc && !points->count && !scans->rules)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
                       (unsigned long long)points->points_skipped);
@@ -310,6 +394,7 @@ void spl_points_finish(struct spl_points *points)
     spl_spill_free(points->spill, points->color_class);
     spl_spill_free(points->spill, points->station);
     spl_spill_free(points->spill, points->normal);
+    spl_spill_free(points->spill, points->halo);
     for (int s = 0; s < SPL_POINT_SCALARS; s++)
         spl_spill_free(points->spill, points->scalar[s].values);
     spl_spill_free(points->spill, points->radius);

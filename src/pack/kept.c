@@ -7,6 +7,7 @@
 
 #include "cloud/rows.h"
 #include "dataset/streams.h"
+#include "pack/job/rules.h"
 
 int spl_kept_read(struct spl_keep *keep, const char *list, struct spl_error *err)
 {
@@ -68,6 +69,10 @@ bool spl_kept_is_named(const struct spl_keep *keep, int scalar)
 bool spl_kept_has_scan(const struct spl_scans *scans, bool *stations)
 {
     *stations = false;
+    if (scans->rules) {
+        *stations = scans->rules->stations;
+        return scans->rules->has_scan;
+    }
     for (size_t i = 0; i < scans->count; i++)
         *stations |= scans->list[i].attributes & SPL_CLOUD_STATION;
     return scans->how.keep->scan || (!scans->how.keep->none && (*stations || scans->count > 1));

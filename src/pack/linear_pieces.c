@@ -18,7 +18,7 @@ static bool take_points(const struct spl_points *p, const struct spl_linear_leve
     double origin[3], inverse = 1 / l->cells.edge, limit = fmax(3 * line->across, 0.15);
     bool any = false;
     for (int c = 0; c < 3; c++)
-        origin[c] = p->bounds_min[c] + ((double)at[c] + 0.5 + line->middle[c]) * l->cells.edge;
+        origin[c] = p->cube_min[c] + ((double)at[c] + 0.5 + line->middle[c]) * l->cells.edge;
     for (size_t i = l->cells.cells[cell].begin; i < l->cells.cells[cell + 1].begin; i++) {
         double along = 0, squared = 0;
         for (int c = 0; c < 3; c++) {

@@ -1,5 +1,5 @@
-/* Medians of a few hundred radii, by sorting where somebody reads them in order, else, as quantiles of many, by dividing
- * the part that they lie in. An even count gives the upper of its two middle values, so a median is always a
+/* Medians of a few hundred radii, by sorting where somebody reads them in order, else, as quantiles of many, by
+ * dividing the part that they lie in. An even count gives the upper of its two middle values, so a median is always a
  * value of the sample. */
 #include "pack/median.h"
 

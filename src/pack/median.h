@@ -11,7 +11,7 @@ float spl_median(float *values, size_t count);
 enum { SPL_MIDDLE_MAX = 1024 };
 float spl_middle(const float *values, size_t count);
 
-/* The `nth` smallest, which comes to stand at its place, smaller ones before it and greater ones behind. None is NaN. */
+/* The `nth` smallest, which comes to stand at its place, smaller ones before it, greater ones behind. None is NaN. */
 double spl_nth(double *values, size_t count, size_t nth);
 
 #endif

@@ -84,11 +84,30 @@ static void find_cube(struct order *o, double high[3])
     }
 }
 
+/* Of a part: cells of all parts lie at the same places, up to those of as many levels as wires are looked for on. */
+static void align_cube(struct order *o)
+{
+    struct spl_points *p = o->points;
+    const double step = p->cells * SPL_CELLS_ALIGNED;
+    double size = step;
+    for (int c = 0; c < 3; c++) {
+        o->origin[c] = p->cube_min[c] = floor(p->bounds_min[c] / step) * step;
+        while (!(size > p->bounds_max[c] - o->origin[c]))
+            size *= 2;
+    }
+    p->cube_size = o->size = size;
+}
+
 static void find_whole_cube(struct order *o)
 {
     struct spl_points *p = o->points;
     find_cube(o, p->bounds_max);
     memcpy(p->bounds_min, o->origin, sizeof p->bounds_min);
+    memcpy(p->cube_min, o->origin, sizeof p->cube_min);
+    if (p->cells > 0) {
+        align_cube(o);
+        return;
+    }
     /* The next float up, as the container keeps it: the cube of the file is the cube of the keys. */
     p->cube_size = o->size = o->size > 0 ? nextafterf((float)o->size, INFINITY) : 1;
 }
@@ -483,6 +502,8 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
         rc = permute(&o, (void **)&points->station, sizeof *points->station, err);
     if (!rc)
         rc = permute(&o, (void **)&points->normal, sizeof *points->normal, err);
+    if (!rc)
+        rc = permute(&o, (void **)&points->halo, sizeof *points->halo, err);
     for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
         rc = permute(&o, &points->scalar[s].values, spl_scalar_bytes(&points->scalar[s]), err);
     spl_stage_finish(stage);

@@ -71,7 +71,7 @@ static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct s
     }
     out->dataset = part;
     out->points = points;
-    if (!rc && (rc = spl_build(options, inputs, p, out, p->stage, report, err)))
+    if (!rc && (rc = spl_build(options, inputs, NULL, p, out, p->stage, report, err)))
         unlink(part); /* where the points alone failed */
     if (!rc)
         rc = spl_passes_run(p, part, out->has_points ? points : NULL, err);
@@ -150,7 +150,7 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     if (!rc)
         rc = found.photos || found.maps || found.prune > 1
                  ? pack_passes(&p, &inputs, &out, report, err)
-                 : spl_build(&found, &inputs, NULL, &out, &stage, report, err);
+                 : spl_build(&found, &inputs, NULL, NULL, &out, &stage, report, err);
     if (!rc && out.drawing)
         rc = write_drawing(&found, &out, err);
     if (!rc && report)

@@ -13,6 +13,7 @@
 
 #define SPL_NO_STATION UINT16_MAX
 #define SPL_POINTS_MAX (UINT32_MAX - 1) /* of a dataset: indices have 32 bits */
+enum { SPL_CELLS_ALIGNED = 64 };  /* cells of a part: the cube begins at a multiple of so many */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
@@ -33,23 +34,36 @@ struct spl_points {
     struct spl_scalar_values scalar[SPL_POINT_SCALARS]; /* settled by spl_points_gather() */
     const struct spl_keep *keep;                        /* what they are called; borrowed */
     struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */
+    uint8_t *halo;               /* 1 beside the part that is packed (job/rules.h); NULL: none is */
     uint32_t *plane;             /* made by spl_planes_find(): index or SPL_NO_PLANE; NULL: not looked for */
     double (*stations)[16];      /* row-major station-to-world */
     uint32_t station_count;
     size_t station_capacity;
+    bool has_halo; /* of a part, so that halo grows with the others */
     bool has_color, has_class, no_surface;          /* the last: made by spl_bare_points() */
-    double bounds_min[3], bounds_max[3], cube_size; /* set by spl_points_order(); the cube starts at bounds_min */
+    double bounds_min[3], bounds_max[3]; /* set by spl_points_order() */
+    double cube_min[3], cube_size;       /* the cube that they are sorted in, of no other use; set by it too */
+    double cells;                        /* of a part: as of struct spl_part_rules; 0: of none */
     double (*eyes)[3]; /* set by spl_eyes_take() */
     size_t eye_count;
     double up[3]; /* unit vector; z, as spl_points_gather() leaves it, unless somebody knows better */
     uint64_t points_read, points_skipped, duplicates;
+    uint64_t halo_points; /* dropped by spl_part_drop_halo() */
 };
+
+/* A coordinate as it is kept: what is nearly 0 is 0, and so is -0; no two places are closer than floats relative to a
+ * node can tell. */
+static inline double spl_points_coordinate(double v)
+{
+    return v < 1e-15 && v > -1e-15 ? 0 : v;
+}
 
 /* SPL_E_LIMIT where the scans' headers say that they have more points than there can be, SPL_POINTS_MAX. */
 int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err);
 
 /* Reads all scans, and counts in them what came of each. SPL_E_INPUT when none has a usable point or a coordinate is
- * beyond SPL_COORDINATE_MAX. */
+ * beyond SPL_COORDINATE_MAX. Of a part (scans->rules) it reads what is in it and in its halo, which may be nothing, and
+ * keeps attributes as the rules say; points_read are those inside then. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err);
 

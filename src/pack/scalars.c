@@ -276,6 +276,20 @@ int spl_scalar_settle(struct spl_scalar_values *scalar, size_t count, struct spl
     return SPL_OK;
 }
 
+bool spl_scalar_settle_as(struct spl_scalar_values *scalar, const struct spl_scalar_steps *steps)
+{
+    scalar->plain = steps->plain;
+    scalar->first = steps->first;
+    scalar->steps_a_unit = steps->steps_a_unit;
+    if (scalar->min > scalar->max)
+        return !steps->plain;
+    if (steps->plain && (scalar->missing || scalar->decimals > 0))
+        return false;
+    double least = rint(scalar->min * steps->steps_a_unit) - steps->first;
+    double most = rint(scalar->max * steps->steps_a_unit) - steps->first;
+    return least >= 0 && most <= most_steps;
+}
+
 uint32_t spl_scalar_number(const struct spl_scalar_values *scalar, size_t i)
 {
     double v = get(scalar->values, scalar->storage, i);

@@ -17,6 +17,12 @@ enum { SPL_SCALAR_SCAN = SPL_SCALAR_COUNT, SPL_POINT_SCALARS };
 
 enum spl_storage { SPL_STORE_U8, SPL_STORE_U16, SPL_STORE_I32, SPL_STORE_F32, SPL_STORE_F64 };
 
+/* How values become numbers. */
+struct spl_scalar_steps {
+    bool plain; /* whole, >= 0, without missing ones: numbers are the values */
+    double first, steps_a_unit; /* number = value × steps_a_unit, rounded, - first */
+};
+
 struct spl_scalar_values {
     struct spl_spill *spill; // where values lie, borrowed; NULL: in memory
     void *values;     // owned; NULL = no point has any
@@ -46,6 +52,9 @@ bool spl_scalar_is_constant(const struct spl_scalar_values *scalar);
  * 2^16 steps over what is left of the values without the outer hundredths (2^24 where they are no floats), or as many
  * as fit 32 bits where all together are much more than that. */
 int spl_scalar_settle(struct spl_scalar_values *scalar, size_t count, struct spl_error *err);
+
+/* Takes these instead. false where a value has no number then, or one is missing that must not. */
+bool spl_scalar_settle_as(struct spl_scalar_values *scalar, const struct spl_scalar_steps *steps);
 
 /* Of point `i`: a number, or SPL_STREAM_NONE. Any thread. */
 uint32_t spl_scalar_number(const struct spl_scalar_values *scalar, size_t i);

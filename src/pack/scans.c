@@ -45,9 +45,8 @@ void spl_scans_share(struct spl_scans *scans)
     spl_part_share(scans);
 }
 
-/* `fields`: room for the names of the scan's, or NULL. */
-static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
-                struct spl_error *err)
+int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
+                  struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
     int rc = spl_cloud_open(path, options, &cloud, err);
@@ -68,7 +67,10 @@ static int look(struct spl_scan *scan, const char *path, const struct spl_cloud_
                               .points_expected =
                                   info->points_expected ? info->points_expected : info->file_bytes / bytes_a_line,
                               .min = {INFINITY, INFINITY, INFINITY},
-                              .max = {-INFINITY, -INFINITY, -INFINITY}};
+                              .max = {-INFINITY, -INFINITY, -INFINITY},
+                              .has_box = info->has_bounds,
+                              .stations = info->station_count};
+    memcpy(scan->box, info->bounds, sizeof scan->box);
     if (fields)
         snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
     spl_cloud_take_coordinates(cloud, &scan->coordinates);
@@ -91,7 +93,7 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
     for (size_t i = 0; !rc && i < inputs->count; i++) {
         struct spl_error why = {0};
         char *fields = scans->count ? NULL : scans->fields;
-        if ((rc = look(&scans->list[scans->count], inputs->paths[i], &scans->how, fields, &why)))
+        if ((rc = spl_scan_open(&scans->list[scans->count], inputs->paths[i], &scans->how, fields, &why)))
             rc = spl_inputs_leave_out(inputs, inputs->paths[i], rc, &why, err);
         else
             scans->count++;

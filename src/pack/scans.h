@@ -11,6 +11,8 @@
 
 #define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
 
+struct spl_part_rules;
+
 struct spl_scan {
     const char *path, *name;            /* borrowed; the name is the path's last part */
     const char *format, *named;         /* as of struct spl_cloud_info */
@@ -26,6 +28,11 @@ struct spl_scan {
     uint64_t max_points;       /* its share of a part; 0 = all */
     uint64_t points_from[3];   /* that were read, by struct spl_cloud_colors.from */
     double min[3], max[3];     /* of their coordinates; nothing while there is no point */
+    double box[2][3];          /* least and most of them as the header says, or a job knows; where has_box */
+    bool has_box;
+    uint32_t stations;         /* that the header names */
+    uint32_t first_number;     /* of a job: of its points' scan, or of its first station */
+    uint64_t points_inside;    /* likewise: of the part, once read */
 };
 
 enum { SPL_SCANS_FIELDS = 400 };
@@ -36,6 +43,7 @@ struct spl_scans {
     size_t count;
     struct spl_cloud_options how;  /* each is read so, but for colours and what follows from a part; of all together
                                     * at most max_points. `keep` is not NULL */
+    const struct spl_part_rules *rules; // may be NULL: all points are read; borrowed
     char fields[SPL_SCANS_FIELDS]; /* names of the first scan's */
 };
 
@@ -44,6 +52,10 @@ struct spl_scans {
  */
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
                    struct spl_stage *stage, struct spl_error *err);
+
+/* The part of it that opens one. `fields`: room for the names of the scan's, or NULL. */
+int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
+                  struct spl_error *err);
 
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
 void spl_scans_remove(struct spl_scans *scans, size_t place);

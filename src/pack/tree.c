@@ -116,7 +116,7 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
     size_t capacity = 0, most = most_points(tree, points);
     struct spl_tree_node root = {.end = points->count, .frame_size = points->cube_size};
     for (int c = 0; c < 3; c++)
-        root.frame_low[c] = points->bounds_min[c];
+        root.frame_low[c] = points->cube_min[c];
     tree->spill = points->spill;
     int rc = add_node(tree, &capacity, &root, err);
     for (uint32_t i = 0; !rc && i < tree->count; i++) {

@@ -1,12 +1,15 @@
 """deploy/pack: a survey in parts, by make for real; the task of a Slurm array as bash runs it, or, with --slurm, an array of
 a slurmctld and a slurmd of this test's own; the fields of the Kubernetes job, and what it asks of splatd.
 
-Parts are the bytes that `splatd pack` makes of the same tiles, whatever failed, was killed or ran twice on the way."""
+Parts are the bytes that they are when packed one after the other in a job of the same scans elsewhere, whatever failed, was
+killed or ran twice on the way, and so is what they are joined to."""
 import contextlib
+import json
 import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -20,122 +23,169 @@ from kubernetes_shapes import shape_of
 
 SPLATD = os.environ["SPLATD_BINARY"]
 PACK = ROOT / "deploy/pack"
-TILES, A_PART, PARTS = 5, 2, 3
+SCANS, PARTS = 3, 4
 
 
 class Survey:
-    """Five tiles, one with a blank in its name, in a folder beside an empty one for the parts."""
+    """Scans that overlap, one with a blank in its name, a job of them, and the same job elsewhere with its parts as they must be."""
 
     def __init__(self, top):
-        self.tiles, self.packed, self.bin = top / "ti les", top / "packed", top / "bin"
-        for folder in self.tiles, self.packed, self.bin:
+        self.scans, self.job, self.bin, self.truth = top / "sc ans", top / "the job", top / "bin", top / "truth"
+        for folder in self.scans, self.bin:
             folder.mkdir()
-        for i in range(TILES):
-            subprocess.run([SPLATD, "synth", "courtyard", "--points", "2000", "--seed", str(i + 1), "--format", "ply", "-o",
+        for i in range(SCANS):
+            subprocess.run([SPLATD, "synth", "courtyard", "--points", "3000", "--seed", str(i + 1), "--format", "ply", "-o",
                             str(top / "scan")], check=True, stderr=subprocess.DEVNULL)
-            (top / "scan/courtyard.ply").rename(self.tiles / f"tile {i}.ply")
+            (top / "scan/courtyard.ply").rename(self.scans / f"scan {i}.ply")
         (self.bin / "splatd").symlink_to(SPLATD)
-        for part in range(PARTS):  # what parts must be
-            names = sorted(self.tiles.iterdir())[part * A_PART:(part + 1) * A_PART]
-            subprocess.run([SPLATD, "pack", *map(str, names), "-o", str(top / f"part-{part}.spld")], check=True,
-                           stderr=subprocess.DEVNULL)
-        self.truth = [(top / f"part-{part}.spld").read_bytes() for part in range(PARTS)]
+        for job in self.job, self.truth:
+            said = self.run("--plan", PARTS, self.scans, "-o", job)
+            assert said.returncode == 0 and f"{PARTS} parts of" in said.stdout, said.stdout
+            assert f"--array=0-{PARTS - 1} deploy/pack/slurm.sbatch {job}" in said.stdout, said.stdout
+        for part in range(PARTS):
+            assert self.run("--part", part, self.truth).returncode == 0
+        assert self.run("--join", self.truth).returncode == 0
 
     def environment(self, **more):
         return {**os.environ, "PATH": f"{self.bin}:{os.environ['PATH']}", **more}
 
-    def make(self, *words, splatd=SPLATD, a_part=A_PART, **more):
-        return subprocess.run(["make", "-f", PACK / "Makefile", f"TILES={self.tiles}", f"PACKED={self.packed}",
-                               f"TILES_A_PART={a_part}", f"SPLATD={splatd}", *words], text=True, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, env=self.environment(**more))
+    def run(self, *words, **more):
+        return subprocess.run([SPLATD, "pack", *map(str, words)], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              env=self.environment(**more))
+
+    def make(self, *words, splatd=SPLATD, **more):
+        return subprocess.run(["make", "-f", PACK / "Makefile", f"JOB={self.job}", f"SPLATD={splatd}", *words], text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=self.environment(**more))
 
     def part(self, number):
-        return self.packed / f"part-{number}.spld"
+        return self.job / f"part-{number}.spld"
 
-    def check(self):
-        for part in range(PARTS):
-            assert self.part(part).read_bytes() == self.truth[part], part
-        assert not list(self.packed.glob("*.part*")), list(self.packed.iterdir())
+    def check(self, joined=False):
+        names = [f"part-{part}.spld" for part in range(PARTS)] + ["all.spld"] * joined
+        for name in names:
+            assert (self.job / name).read_bytes() == (self.truth / name).read_bytes(), name
+        assert sorted(p.name for p in self.job.iterdir()) == sorted(names + ["job.json"]), list(self.job.iterdir())
 
     def forget(self):
-        for part in range(PARTS):
-            self.part(part).unlink(missing_ok=True)
-
-
-def times(survey):
-    return [survey.part(part).stat().st_mtime_ns for part in range(PARTS)]
+        for file in self.job.glob("*.spld"):
+            file.unlink()
 
 
 def check_make(survey):
-    made = survey.make("-j2")
-    assert made.returncode == 0 and "3 parts: 0 to 2" in made.stdout, made.stdout
-    survey.check()
-    before = times(survey)
+    made = survey.make("-j2", LC_ALL="de_DE.UTF-8")
+    assert made.returncode == 0 and f"a collection of {PARTS} tiles" in made.stdout, made.stdout
+    survey.check(joined=True)
+    before = [survey.part(part).stat().st_ino for part in range(PARTS)]
     made = survey.make()
-    assert made.returncode == 0 and times(survey) == before, made.stdout
-    time.sleep(0.02)
-    (survey.tiles / "tile 2.ply").touch()
-    made = survey.make()
-    after = times(survey)
-    assert made.returncode == 0 and [a > b for a, b in zip(after, before)] == [False, True, False], made.stdout
+    assert made.returncode == 0 and "part-1.spld: part 1 is there, whole and of this plan" in made.stdout, made.stdout
+    assert [survey.part(part).stat().st_ino for part in range(PARTS)] == before
+    survey.check(joined=True)
+    (survey.job / "all.spld").unlink()
+    survey.part(1).unlink()
+    made = survey.make("join")
+    assert made.returncode and f"1 of {PARTS} parts are missing: 1;" in made.stdout, made.stdout
+
+
+def check_at_once(survey):
+    """Each part twice, all at the same time."""
+    survey.forget()
+    running = [subprocess.Popen([SPLATD, "pack", "--part", str(part), survey.job, "--threads", "1"], stderr=subprocess.DEVNULL)
+               for part in list(range(PARTS)) * 2]
+    for process in running:
+        assert process.wait(60) == 0
     survey.check()
 
 
 def check_failures(survey):
-    """Of one tile that is broken, and of a process that is killed, only its own part is missing, until the next run."""
+    """Of a scan that changed, only parts that read it are missing; of a process that is killed its own, until the next run."""
     survey.forget()
-    whole = (survey.tiles / "tile 4.ply").read_bytes()
-    (survey.tiles / "tile 4.ply").write_bytes(whole[:-100])
+    scan = survey.scans / f"scan {SCANS - 1}.ply"
+    whole = scan.read_bytes()
+    scan.write_bytes(whole[:-100])
     made = survey.make("-k")
-    assert made.returncode and "tile 4.ply" in made.stdout, made.stdout
-    assert not survey.part(2).exists() and survey.part(0).exists() and survey.part(1).exists(), made.stdout
-    (survey.tiles / "tile 4.ply").write_bytes(whole)
-    survey.part(0).unlink()
+    assert made.returncode and f"scan {SCANS - 1}.ply: has {len(whole) - 100} bytes, and {len(whole)} when" in made.stdout, made.stdout
+    scan.write_bytes(whole)
     killer = survey.bin / "killed"
-    killer.write_text(f'#!/bin/sh\n"{SPLATD}" "$@" & sleep 0.02; kill -9 $!; exit 137\n')
-    killer.chmod(0o755)
-    made = survey.make("-k", splatd=killer)
-    assert made.returncode, made.stdout  # whichever was done before it was killed is whole
-    for part in range(PARTS):
-        assert not survey.part(part).exists() or survey.part(part).read_bytes() == survey.truth[part], part
+    for delay in "0.01", "0.03", "0.06", "0.1":
+        killer.write_text(f'#!/bin/sh\n"{SPLATD}" "$@" & sleep {delay}; kill -9 $!; exit 137\n')
+        killer.chmod(0o755)
+        made = survey.make("-k", "parts", splatd=killer)
+        assert made.returncode, made.stdout  # whichever was done before it was killed is whole
+        for part in range(PARTS):
+            name = f"part-{part}.spld"
+            assert not survey.part(part).exists() or survey.part(part).read_bytes() == (survey.truth / name).read_bytes(), part
     made = survey.make()
     assert made.returncode == 0, made.stdout
-    survey.check()
+    survey.check(joined=True)
+
+
+def check_headers(survey, top):
+    """Of many LAS scans headers alone are read. One whose box is a lie, too small or with a stray, costs no point."""
+    folder, job = top / "las", top / "las job"
+    folder.mkdir()
+    for i in range(9):
+        subprocess.run([SPLATD, "synth", "courtyard", "--points", "2000", "--seed", str(i + 1), "--format", "las", "-o",
+                        str(top / "scan")], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        (top / "scan/courtyard.las").rename(folder / f"{i}.las")
+    for name, place, value in ("0.las", 179, None), ("1.las", 195, 1e9):  # the most of x is nearly its least; of y far away
+        las = bytearray((folder / name).read_bytes())
+        least = struct.unpack_from("<d", las, place + 8)[0]
+        struct.pack_into("<d", las, place, least + 0.5 if value is None else value)
+        (folder / name).write_bytes(las)
+    planned = survey.run("--plan", 2, folder, "-o", job)
+    assert planned.returncode == 0 and "counting" not in planned.stdout, planned.stdout
+    counted = survey.run("--plan", 3, folder, "-o", top / "counted")
+    assert counted.returncode == 0 and "counting" in counted.stdout, counted.stdout
+    assert survey.run("--part", 1, job).returncode == 0 and survey.run("--part", 0, job).returncode == 0
+    assert survey.run("--join", job).returncode == 0
+    assert survey.run(folder, "-o", top / "whole.spld").returncode == 0
+    whole, joined = (json.loads(subprocess.run([SPLATD, "info", "--json", path], check=True, stdout=subprocess.PIPE).stdout)
+                     for path in (top / "whole.spld", job / "all.spld"))
+    for field in "points", "leaf_splats", "bounds", "unit":
+        assert whole[field] == joined[field], (field, whole[field], joined[field])
+    assert {s["name"] for s in whole["streams"]} <= {s["name"] for s in joined["streams"]}, joined["streams"]
 
 
 def check_refusals(survey):
-    for words, said in ((["TILES=/nowhere"], "/nowhere is no folder"), (["PACKED="], "PACKED= is not one folder"),
-                        (["TILES_A_PART=0"], "TILES_A_PART=0 is no number above 0"), (["TILES=" + str(survey.bin)], "has no scan"),
-                        (["PACKED=" + str(survey.tiles)], "has no blank")):
+    for words, said in ((["JOB=/nowhere"], "JOB=/nowhere is no job"), (["JOB="], "JOB= is no job"),
+                        (["JOB=" + str(survey.scans)], "is no job: splatd pack --plan N SCANS -o JOB makes one")):
         made = survey.make(*words)
         assert made.returncode and said in made.stdout, (words, made.stdout)
-    made = survey.make("lists", a_part=3)  # two parts: the third is of no list any more
-    assert made.returncode == 0 and "part-2.spld is of no list any more" in made.stdout, made.stdout
-    assert not (survey.packed / "tiles/2.txt").exists()
-    survey.part(2).unlink()
-    assert survey.make().returncode == 0
-    survey.check()
+    for words, said in ((("--plan", 2, survey.scans), "--plan needs a folder for the job"),
+                        (("--plan", 2, "-o", "job"), "--plan needs at least one scan"),
+                        (("--plan", 2, survey.scans, "-o", survey.scans), "holds something else than a job"),
+                        (("--plan", 2, "--prune", 3, survey.scans, "-o", survey.bin / "j"), "--prune cannot be split"),
+                        (("--plan", 2, "--part", 3, survey.scans, "-o", survey.bin / "j"), "are three steps"),
+                        (("--part", 0, survey.job, "--keep", "none"), "--keep is decided by the plan"),
+                        (("--part", 0, survey.job, "-o", "a.spld"), "leave out -o"),
+                        (("--part", 0), "--part takes one folder"), (("--join", survey.job, survey.job), "--join takes one folder"),
+                        (("--join", survey.job, "--memory", 99), "--memory is decided by the plan"),
+                        (("--join", survey.scans), "a job is a folder that"), (("--part", PARTS, survey.job), "and none of number"),
+                        (("--join", survey.job, "-o", survey.bin / "a.spld"), "lies in another folder than"),
+                        (("--halo", 1, survey.scans, "-o", survey.bin / "a.spld"), "--halo is of parts")):
+        said_of = survey.run(*words)
+        assert said_of.returncode == 2 or said_of.returncode == 1, (words, said_of.stdout)
+        assert said in said_of.stdout, (words, said_of.stdout)
+    assert list(survey.bin.iterdir()) == [survey.bin / "splatd"] or not (survey.bin / "j").exists()
 
 
 def task(survey, part, *options, **more):
-    return subprocess.run(["bash", PACK / "slurm.sbatch", survey.packed, *options], text=True, stdout=subprocess.PIPE,
+    return subprocess.run(["bash", PACK / "slurm.sbatch", survey.job, *options], text=True, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, env=survey.environment(SLURM_ARRAY_TASK_ID=str(part), **more))
 
 
 def check_task(survey):
     survey.forget()
-    for part in 2, 0, 1, 1:
+    for part in 2, 0, 1, 3, 1:
         done = task(survey, part, SLURM_MEM_PER_NODE="512", SLURM_CPUS_PER_TASK="2")
         assert done.returncode == 0, done.stdout
-    assert "is there" in done.stdout, done.stdout
+    assert "part 1 is there" in done.stdout, done.stdout
     survey.check()
     missing = task(survey, 7)
-    assert missing.returncode == 1 and "7.txt is not there" in missing.stdout, missing.stdout
+    assert missing.returncode == 2 and "and none of number 7" in missing.stdout, missing.stdout
     survey.part(0).unlink()
-    assert task(survey, 0, "--points-only").returncode == 0  # options reach splatd
-    assert survey.part(0).read_bytes() != survey.truth[0]
-    survey.part(0).unlink()
-    assert task(survey, 0).returncode == 0
+    assert task(survey, 0, "--memory", "64").returncode == 0  # options reach splatd
+    assert task(survey, 0, "--points-only").returncode == 2
     survey.check()
 
 
@@ -148,7 +198,7 @@ def check_job(survey):
     [container] = job["spec"]["template"]["spec"]["containers"]
     [mount] = container["volumeMounts"]
     [env] = container["env"]
-    args = [word.replace(mount["mountPath"] + "/packed", str(survey.packed)).replace(f"$({env['name']})", "1")
+    args = [word.replace(mount["mountPath"] + "/job", str(survey.job)).replace(f"$({env['name']})", "1")
             for word in container["args"]]
     survey.part(1).unlink()
     subprocess.run([SPLATD, *args], check=True, stderr=subprocess.DEVNULL)
@@ -217,13 +267,13 @@ def check_slurm(survey, top):
         environment = {**environment, "PATH": survey.environment()["PATH"]}
         for turn in range(2):
             subprocess.run(["sbatch", "--wait", f"--array=0-{PARTS - 1}", "--cpus-per-task=1", "--mem=512", f"--output={top}/%a.log",
-                            PACK / "slurm.sbatch", survey.packed], env=environment, check=True, timeout=120)
+                            PACK / "slurm.sbatch", survey.job], env=environment, check=True, timeout=120)
             for part in range(PARTS):
                 print(f"task {part}:", (top / f"{part}.log").read_text().strip().split("\n")[-1])
             survey.check()
             survey.part(turn).unlink()  # as if it had been killed
     survey.make()
-    survey.check()
+    survey.check(joined=True)
 
 
 if "--slurm" in sys.argv and not (shutil.which("slurmctld") and shutil.which("munged") and os.geteuid() == 0):
@@ -236,8 +286,10 @@ with tempfile.TemporaryDirectory() as folder:
         with tempfile.TemporaryDirectory() as place:
             check_slurm(survey, pathlib.Path(place))
     else:
+        check_at_once(survey)
         check_failures(survey)
         check_refusals(survey)
+        check_headers(survey, pathlib.Path(folder))
         check_task(survey)
         check_job(survey)
 print("parts are whole")

@@ -42,7 +42,7 @@ struct search {
 
 static uint64_t key_of(const struct spl_points *p, size_t i)
 {
-    return spl_points_key(p, i, p->bounds_min, p->cube_size);
+    return spl_points_key(p, i, p->cube_min, p->cube_size);
 }
 
 /* How many triples the smallest cell that holds both keys leaves open. */

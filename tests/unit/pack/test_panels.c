@@ -53,6 +53,7 @@ static void make(struct scene *s, const double (*position)[3], const uint32_t *p
             p->bounds_min[c] = fmin(p->bounds_min[c], position[i][c]);
             p->bounds_max[c] = fmax(i ? p->bounds_max[c] : -1e30, position[i][c]);
         }
+        p->cube_min[c] = p->bounds_min[c];
         p->cube_size = fmax(p->cube_size, p->bounds_max[c] - p->bounds_min[c]);
     }
 }
@@ -104,7 +105,7 @@ static void make_sorted(struct scene *s, struct sample *samples, size_t count, c
         make(s, (const double(*)[3])position, plane, count, normals, planes);
         for (size_t i = 0; i < count; i++) {
             s->points.color_class[i] = samples[i].color;
-            samples[i].key = spl_points_key(&s->points, i, s->points.bounds_min, s->points.cube_size);
+            samples[i].key = spl_points_key(&s->points, i, s->points.cube_min, s->points.cube_size);
         }
         if (!round)
             qsort(samples, count, sizeof *samples, compare_samples);

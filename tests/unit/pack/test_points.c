@@ -40,8 +40,8 @@ static void test_order_sorts_and_drops(void **state)
         double(*position)[3] = shape_points((enum shape)shape, count, 1);
         struct spl_points p = sorted((const double(*)[3])position, count, 2);
         for (size_t i = 1; i < p.count; i++)
-            assert_true(spl_points_key(&p, i - 1, p.bounds_min, p.cube_size) <=
-                        spl_points_key(&p, i, p.bounds_min, p.cube_size));
+            assert_true(spl_points_key(&p, i - 1, p.cube_min, p.cube_size) <=
+                        spl_points_key(&p, i, p.cube_min, p.cube_size));
         for (size_t i = 0; i < p.count; i++)
             for (int c = 0; c < 3; c++)
                 assert_true(p.axis[c][i] == position[p.color_class[i]][c]);

@@ -1,0 +1,110 @@
+/* The parts of a job as a collection, once all are there. The caller's thread. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/memory.h"
+#include "dataset/dataset.h"
+#include "pack/job/part.h"
+
+/* "3, 7-9 and 12" of what is missing, cut where it is long. */
+struct missing {
+    char text[300];
+    uint32_t count, first, last;
+};
+
+static void add_run(struct missing *m)
+{
+    size_t used = strlen(m->text);
+    const char *comma = used ? ", " : "";
+    if (used > sizeof m->text - 40) {
+        if (m->text[used - 1] != '.')
+            snprintf(m->text + used, sizeof m->text - used, ", ...");
+    } else if (m->first == m->last)
+        snprintf(m->text + used, sizeof m->text - used, "%s%u", comma, m->first);
+    else
+        snprintf(m->text + used, sizeof m->text - used, "%s%u-%u", comma, m->first, m->last);
+}
+
+static void add_missing(struct missing *m, uint32_t number)
+{
+    if (m->count++ && number == m->last + 1) {
+        m->last = number;
+        return;
+    }
+    if (m->count > 1)
+        add_run(m);
+    m->first = m->last = number;
+}
+
+static int check_dataset(const struct spl_job *job, uint32_t number, const char *path, struct spl_error *err)
+{
+    const struct spl_dataset_opening how = {.tables_bytes = 1};
+    struct spl_dataset *dataset = NULL;
+    bool older;
+    int rc = spl_dataset_open_as(path, &how, &dataset, err);
+    if (!rc)
+        rc = spl_part_recognise(job, number, spl_dataset_get_meta(dataset), path, &older, err);
+    spl_dataset_close(dataset);
+    return rc;
+}
+
+static bool is_marked(const struct spl_job *job, uint32_t number)
+{
+    char *path = spl_job_part_path(job, number, true);
+    json_t *mark = path ? json_load_file(path, JSON_REJECT_DUPLICATES, NULL) : NULL;
+    bool older, is = mark && !spl_part_recognise(job, number, mark, path, &older, NULL);
+    json_decref(mark);
+    free(path);
+    return is;
+}
+
+/* Fills `paths` with those of parts that have points. */
+static int find_parts(const struct spl_job *job, char **paths, size_t *count, struct spl_error *err)
+{
+    struct missing missing = {0};
+    int rc = SPL_OK;
+    for (uint32_t k = 0; !rc && k < job->part_count; k++) {
+        char *path = spl_job_part_path(job, k, false);
+        if (!path)
+            return spl_fail(err, SPL_E_NOMEM, "out of memory for the names of parts");
+        if (!access(path, F_OK)) {
+            paths[(*count)++] = path;
+            rc = check_dataset(job, k, path, err);
+            continue;
+        }
+        free(path);
+        if (!is_marked(job, k))
+            add_missing(&missing, k);
+    }
+    if (rc || !missing.count)
+        return rc;
+    add_run(&missing);
+    return spl_fail_field(
+        err, SPL_E_NOT_FOUND, "part",
+        "%.300s: %u of %u parts are missing: %s; make each with \"splatd pack --part K %.200s\", on any "
+        "machine",
+        job->folder, missing.count, job->part_count, missing.text, job->folder);
+}
+
+int spl_job_join(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err)
+{
+    struct spl_collect_options o = *options;
+    size_t count = 0;
+    char **paths = spl_alloc(job->part_count, sizeof *paths, err);
+    int rc = paths ? find_parts(job, paths, &count, err) : SPL_E_NOMEM;
+    if (!rc && !count)
+        rc = spl_fail_field(err, SPL_E_INPUT, "part",
+                            "%.300s: no part has a point; the headers of the scans promised some", job->folder);
+    o.inputs = (const char *const *)paths;
+    o.input_count = count;
+    o.title = o.title ? o.title : job->options.title;
+    o.description = o.description ? o.description : job->options.description;
+    if (!rc)
+        rc = spl_collect(&o, err);
+    for (size_t i = 0; i < count; i++)
+        free(paths[i]);
+    free(paths);
+    return rc;
+}
