@@ -19,7 +19,7 @@ struct spl_neighbours {
     spl_near_find_of *find;
 };
 
-static enum spl_neighbours_set most_set = SPL_NEIGHBOURS_AVX512;
+static _Atomic enum spl_neighbours_set most_set = SPL_NEIGHBOURS_AVX512; /* for tests */
 
 static void find_base(const struct spl_boxes *boxes, const struct spl_points *points, size_t i, unsigned k,
                       struct spl_nearest *nearest)
