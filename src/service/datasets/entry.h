@@ -66,7 +66,7 @@ struct spl_catalog_entry {
 
     struct spl_replica replicas[SPL_DEVICES_MAX];
     unsigned replicas_left;     // owned by: loop, until the last unref; that are to be loaded, or to be let go of
-    unsigned home;              // owned by: loop; number of the device that draws it where none has less to do
+    unsigned home;              // owned by: loop; the device that draws its first piece where none has less to do
     enum spl_entry_state state; // owned by: loop
     struct spl_error err;       // owned by: loop
 };

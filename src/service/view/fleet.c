@@ -178,13 +178,32 @@ void spl_fleet_destroy(struct spl_fleet *fleet)
     free(fleet);
 }
 
+/* The device that a job goes to where all have as little to do: each holds the pages of the places that it is asked
+ * for, so the dataset is cut along its longest side into as many pieces as there are devices, of which its home has the
+ * first. */
+static size_t find_home(const struct spl_fleet *fleet, const struct spl_job *job)
+{
+    if (!job->entry)
+        return 0;
+    const struct spl_dataset_info *info = job->entry->info;
+    const double *low = info->bounds_min, *high = info->bounds_max;
+    int longest = 0;
+    for (int c = 1; c < 3; c++)
+        if (high[c] - low[c] > high[longest] - low[longest])
+            longest = c;
+    double length = high[longest] - low[longest], from = job->request.view.camera.eye[longest] - low[longest];
+    double piece = length > 0 && from > 0 ? from / length * (double)fleet->count : 0;
+    return job->entry->home + (piece < (double)fleet->count ? (size_t)piece : fleet->count - 1);
+}
+
 /* Where a job goes, of those that were not `tried`; NULL: none can draw it. */
 static struct spl_pipeline *choose(struct spl_fleet *fleet, const struct spl_job *job, uint32_t tried)
 {
     struct spl_pipeline *best = NULL;
     uint64_t least = UINT64_MAX;
+    const size_t home = find_home(fleet, job);
     for (size_t i = 0; i < fleet->count; i++) {
-        size_t device = (i + (job->entry ? job->entry->home : 0)) % fleet->count; // from home on
+        size_t device = (i + home) % fleet->count;
         struct spl_pipeline *pipeline = fleet->pipelines[device];
         struct spl_pipeline_status status;
         if (tried >> device & 1 || spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY ||

@@ -36,21 +36,27 @@ static struct spl_job *take_job(struct spl_fleet *fleet)
     return job;
 }
 
-/* A version of a small dataset; the caller owns its reference. */
-static struct spl_catalog_entry *open_entry(void)
+/* A version of a dataset of one splat, or of two that lie apart; the caller owns its reference. */
+static struct spl_catalog_entry *open_splats(size_t count)
 {
     char path[256] = "";
     struct spl_catalog_entry *entry = NULL;
-    const struct make_splat splat = {.normal = {1, 0, 0}, .radius = 1};
+    const struct make_splat splats[2] = {{.normal = {1, 0, 0}, .radius = 1},
+                                         {.normal = {1, 0, 0}, .radius = 1, .position = {2, 90, -5}}};
     make_folder(path);
     strcat(path, "/one.spld");
-    make_dataset_file(path, &splat, 1, 1);
+    make_dataset_file(path, splats, count, 1);
     assert_int_equal(spl_catalog_entry_open(path, path, &(struct spl_dataset_opening){.verify = true}, &entry, NULL),
                      0);
     unlink(path);
     *strrchr(path, '/') = '\0';
     rmdir(path);
     return entry;
+}
+
+static struct spl_catalog_entry *open_entry(void)
+{
+    return open_splats(1);
 }
 
 static struct spl_catalog_entry *take_change(struct spl_fleet *fleet)
@@ -219,7 +225,7 @@ static void finish_all(struct spl_fleet *fleet, int jobs)
     }
 }
 
-/* The device with the least to do; of those alike, the dataset's home. */
+/* The device with the least to do; of those alike, the home of the dataset, all of which is at one place here. */
 static void views_go_where_the_least_waits(void **state)
 {
     (void)state;
@@ -250,6 +256,34 @@ static void views_go_where_the_least_waits(void **state)
     assert_int_equal(counters.frames, 8);
     for (int i = 0; i < 2; i++)
         spl_catalog_entry_unref(entries[i]);
+    unsetenv("FAKE_FRAME_MS");
+    spl_fleet_destroy(fleet);
+}
+
+/* Of an idle fleet: by where the eye is along the dataset's longest side, beyond whose ends it counts as at them. */
+static void places_of_a_dataset_have_homes(void **state)
+{
+    (void)state;
+    setenv("FAKE_FRAME_MS", "50", 1);
+    struct spl_fleet *fleet = start_on("fake:0,fake:1,fake:2", 9);
+    struct spl_catalog_entry *before = open_entry(), *entry = open_splats(2);
+    spl_fleet_add(fleet, before); // whose home is the first
+    assert_ptr_equal(take_change(fleet), before);
+    spl_fleet_add(fleet, entry);
+    assert_ptr_equal(take_change(fleet), entry);
+    static const struct {
+        double y;
+        size_t device;
+    } places[] = {{-1e12, 1}, {0, 1}, {29, 1}, {31, 2}, {59, 2}, {61, 0}, {90, 0}, {1e12, 0}};
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        struct spl_job *job = make_job_of(entry);
+        job->request.view.camera.eye[1] = places[i].y;
+        assert_int_equal(spl_fleet_submit(fleet, job, NULL), 0);
+        assert_true(look(fleet, places[i].device).samples_inside > 0);
+        finish_all(fleet, 1);
+    }
+    spl_catalog_entry_unref(before);
+    spl_catalog_entry_unref(entry);
     unsetenv("FAKE_FRAME_MS");
     spl_fleet_destroy(fleet);
 }
@@ -446,6 +480,7 @@ int main(void)
         cmocka_unit_test(versions_come_and_go_while_the_device_is_lost),
         cmocka_unit_test(a_fleet_ends_with_versions_in_every_state),
         cmocka_unit_test(views_go_where_the_least_waits),
+        cmocka_unit_test(places_of_a_dataset_have_homes),
         cmocka_unit_test(all_queues_are_full_before_a_view_is_refused),
         cmocka_unit_test(a_lost_device_leaves_the_others),
         cmocka_unit_test(a_device_that_is_gone_is_given_up),
