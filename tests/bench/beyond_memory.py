@@ -1,5 +1,6 @@
 """What a bound of memory costs a pack and a service: the same scan packed within each bound, with the memory that the process
-took over its time; the dataset opened, and a random tour of it with all of the device's memory and with a part.
+took over its time; the dataset opened, and a random tour of it, one view after the other, with all of the
+device's memory, with a part, and with such a part on each of two devices.
 
 usage: beyond_memory.py SCAN FOLDER [--memory none,4G,1G] [--device-memory 512M] [--places 40]
                         [--threads N] [--keep]
@@ -142,8 +143,10 @@ def tour(dataset, count, device_memory):
     print("\n| device memory | opened and listed, s | resident then, MB | median view, ms | 90 % of views, ms | views/s | pages that "
           "made room |\n|---|---|---|---|---|---|---|")
     pictures, rates = {}, {}
-    for limit in ("", device_memory):
-        service = Service(dataset, *(["--memory-limit", limit] if limit else []))
+    two = f"{device_memory} on each of two devices"
+    for limit, options in (("all", []), (device_memory, ["--memory-limit", device_memory]),
+                           (two, ["--memory-limit", device_memory, "--device", "vulkan:0,vulkan:0"])):
+        service = Service(dataset, *options)
         at_start = resident(service.process.pid)
         times, bodies = [], []
         for eye, target in places(dataset, count):
@@ -153,11 +156,12 @@ def tour(dataset, count, device_memory):
         evicted = service.status()["counters"]["pages_evicted"]
         service.end()
         pictures[limit], rates[limit] = bodies, 1000 * count / sum(times)
-        print(f"| {limit or 'all'} | {service.opened_s:.2f} | {at_start / 1e6:.0f} | {statistics.median(times):.0f} | "
+        print(f"| {limit} | {service.opened_s:.2f} | {at_start / 1e6:.0f} | {statistics.median(times):.0f} | "
               f"{sorted(times)[int(0.9 * count)]:.0f} | {rates[limit]:.2f} | {evicted} |", flush=True)
-    same = sum(a == b for a, b in zip(*pictures.values()))
-    print(f"\nWith {device_memory} {rates[device_memory] / rates['']:.2f} of the rate; {same} of {count} pictures are the same, the "
-          "others are coarser somewhere.")
+    same = {limit: sum(a == b for a, b in zip(pictures["all"], bodies)) for limit, bodies in pictures.items()}
+    print(f"\nWith {device_memory} {rates[device_memory] / rates['all']:.2f} of the rate, on each of two devices "
+          f"{rates[two] / rates['all']:.2f}; of {count} pictures {same[device_memory]} and {same[two]} are the same, the others "
+          "are coarser somewhere.")
 
 
 def main():
