@@ -8,7 +8,7 @@
 #include "shared.h"
 
 /* Four floats: an item as a whole, of which the last means nothing. */
-typedef float spl_floats __attribute__((vector_size(16), may_alias));
+typedef float spl_floats __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int32_t spl_marks __attribute__((vector_size(16)));
 _Static_assert(sizeof(struct spl_cut) == sizeof(spl_floats), "an item is three floats and an index");
 

@@ -56,14 +56,19 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
 static void grow_box(struct spl_node *node, const struct spl_splat *splats, double (*position)[3],
                      const struct spl_chunk *chunk)
 {
-    double slack = 1.001 * ((double)chunk->step + chunk->radius_step);
-    for (uint32_t i = 0; i < chunk->count; i++)
-        for (int c = 0; c < 3; c++) {
-            double reach =
-                fmax(splats[i].radius, spl_chunk_line_width(chunk) / 2) + slack + 1e-6 * fabs(position[i][c]);
-            node->box_min[c] = fminf(node->box_min[c], (float)(position[i][c] - reach));
-            node->box_max[c] = fmaxf(node->box_max[c], (float)(position[i][c] + reach));
+    double slack = 1.001 * ((double)chunk->step + chunk->radius_step), half = spl_chunk_line_width(chunk) / 2;
+    for (int c = 0; c < 3; c++) {
+        float low = node->box_min[c], high = node->box_max[c];
+        for (uint32_t i = 0; i < chunk->count; i++) {
+            double radius = (double)splats[i].radius > half ? (double)splats[i].radius : half;
+            double reach = radius + slack + 1e-6 * fabs(position[i][c]);
+            float from = (float)(position[i][c] - reach), to = (float)(position[i][c] + reach);
+            low = from < low ? from : low;
+            high = to > high ? to : high;
         }
+        node->box_min[c] = low;
+        node->box_max[c] = high;
+    }
 }
 
 /* Without a surface a chunk's splats are all as large as their mean, which takes no bits. */

@@ -155,7 +155,7 @@ static void add_to(struct cluster *k, const struct spl_inner_splat *s)
     k->length += s->radius;
     k->linear += s->linear ? w : 0;
     k->uncertainty += w * s->uncertainty;
-    k->largest = fmaxf(k->largest, s->radius);
+    k->largest = s->radius > k->largest ? s->radius : k->largest;
     uint8_t classification = s->color_class >> 24;
     if (k->votes == 0)
         k->classification = classification;

@@ -54,34 +54,68 @@ struct spl_moments spl_moments_of(const struct spl_points *p, size_t i, const st
     return moments;
 }
 
+/* Moments as vectors: of count and sums, and of squares. */
+typedef float spl_four __attribute__((vector_size(16), aligned(4), may_alias));
+typedef float spl_eight __attribute__((vector_size(32), aligned(4), may_alias));
+/* What begins with a count, by the rows and the columns of squares. */
+#define BY_ROW(v) __builtin_shufflevector(v, v, 1, 1, 1, 2, 2, 3, 0, 0)
+#define BY_COLUMN(v) __builtin_shufflevector(v, v, 1, 2, 3, 2, 3, 3, 0, 0)
+
 /* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost.
  */
-static struct spl_moments widen(const struct spl_vicinity *v, size_t i)
+static inline __attribute__((always_inline)) void widen_any(const struct spl_vicinity *v, size_t i,
+                                                            struct spl_moments *out)
 {
     const struct spl_points *p = v->points;
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
-    struct spl_moments wide = v->moments[i - v->begin];
+    *out = v->moments[i - v->begin];
+    spl_four sums = *(const spl_four *)&out->count;
+    spl_eight squares = *(const spl_eight *)out->square;
     for (unsigned a = 0; a < v->k && list[a] != UINT32_MAX; a++) {
         size_t j = list[a];
         if (j < v->begin || j >= v->end)
             continue;
         const struct spl_moments *m = &v->moments[j - v->begin];
-        float d[3];
-        for (int c = 0; c < 3; c++) {
-            d[c] = (float)(p->axis[c][j] - p->axis[c][i]);
-            wide.sum[c] += m->sum[c] + m->count * d[c];
-        }
-        for (int e = 0; e < 6; e++)
-            wide.square[e] += m->square[e] + d[row[e]] * m->sum[column[e]] + m->sum[row[e]] * d[column[e]] +
-                              m->count * d[row[e]] * d[column[e]];
-        wide.count += m->count;
+        const spl_eight apart = {0, (float)(p->axis[0][j] - p->axis[0][i]), (float)(p->axis[1][j] - p->axis[1][i]),
+                                 (float)(p->axis[2][j] - p->axis[2][i])};
+        const spl_eight of = *(const spl_eight *)&m->count;
+        const spl_eight row_apart = BY_ROW(apart), column_apart = BY_COLUMN(apart);
+        sums += *(const spl_four *)&m->count + m->count * (spl_four){apart[0], apart[1], apart[2], apart[3]};
+        squares += *(const spl_eight *)m->square + row_apart * BY_COLUMN(of) + BY_ROW(of) * column_apart +
+                   m->count * row_apart * column_apart;
     }
-    return wide;
+    *(spl_four *)&out->count = sums;
+    *(spl_eight *)out->square = squares;
 }
 
-static double at_least_0(double v)
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static void widen_avx2(const struct spl_vicinity *v, size_t i, struct spl_moments *out)
 {
-    return v > 0 ? v : 0;
+    widen_any(v, i, out);
+}
+#endif
+
+/* Compiled twice; contraction is off, so both give the same bits. */
+static void widen(const struct spl_vicinity *v, size_t i, struct spl_moments *out)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        widen_avx2(v, i, out);
+        return;
+    }
+#endif
+    widen_any(v, i, out);
+}
+
+/* Neither is NaN, which fmin() and fmax() look for. */
+static double smaller(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
 }
 
 static struct spl_spread spread_of(const struct spl_moments *moments)
@@ -92,7 +126,7 @@ static struct spl_spread spread_of(const struct spl_moments *moments)
         m[e] = moments->square[e] / n - (double)moments->sum[row[e]] * moments->sum[column[e]] / (n * n);
     spl_eigen_symmetric(m, spread.sigma, spread.normal, most);
     for (int c = 0; c < 3; c++)
-        spread.sigma[c] = sqrt(at_least_0(spread.sigma[c]));
+        spread.sigma[c] = sqrt(larger(spread.sigma[c], 0));
     return spread;
 }
 
@@ -121,7 +155,7 @@ static void spread_some(const struct spl_moments *const moments[], unsigned coun
     spl_eigen_symmetric_eight((const double(*)[lanes])m, sigma, normal);
     for (unsigned a = 0; a < count; a++)
         for (int c = 0; c < 3; c++) {
-            spreads[a]->sigma[c] = sqrt(at_least_0(sigma[c][a]));
+            spreads[a]->sigma[c] = sqrt(larger(sigma[c][a], 0));
             spreads[a]->normal[c] = normal[c][a];
         }
 }
@@ -193,8 +227,7 @@ static double roundness(const struct spl_spread *spread)
     if (spread->sigma[1] < linear_below * spread->sigma[2])
         return 0;
     double t = (spread->sigma[0] / spread->sigma[1] - round_from) / (round_to - round_from);
-    t = at_least_0(t);
-    t = t < 1 ? t : 1;
+    t = smaller(1, larger(0, t));
     return t * t * (3 - 2 * t);
 }
 
@@ -214,7 +247,7 @@ void spl_radius_spread(const struct spl_vicinity *v, size_t begin, size_t end, s
     }
     for (size_t i = begin; i < end; i++) {
         if (roundness(&spreads->own[i - begin]) > 0) {
-            around[count] = widen(v, i);
+            widen(v, i, &around[count]);
             from[count] = &around[count];
             to[count++] = &spreads->wide[i - begin];
         }
@@ -265,17 +298,17 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
             memcpy(normal, around->normal, sizeof around->normal);
             *round = wide_round;
         }
-        volume = fmin(1, *round / volume_from) * fmin(1, fmax(0, (growth - fades) / (lasts - fades)));
+        volume = smaller(1, *round / volume_from) * smaller(1, larger(0, (growth - fades) / (lasts - fades)));
     }
     if (volume > 0)
-        radius = fmin(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
+        radius = smaller(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
     eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
     *edge = !flat && place.open; /* noise alone leaves no quarter empty */
     if (*round > 0.1)
         return radius;
     if (!linear && !place.open)
-        return fmax(radius, fmin(0.7 * place.gap, 2 * radius));
+        return larger(radius, smaller(0.7 * place.gap, 2 * radius));
 
     spl_neighbours_find(v->neighbours, i, v->wide, near);
     if (linear) {
@@ -284,17 +317,17 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
         bool surface = wide.sigma[1] >= linear_below * wide.sigma[2] && roundness(&wide) == 0;
         eighths(p, i, near->index, near->count, wide.normal, coplanar, nearest);
         if (!surface || place_of(nearest).on_line) /* a wire: its points are 2 reach / n apart */
-            return fmin(radius, fmax(1.5 * reach / n, 2 * spread->sigma[1]));
+            return smaller(radius, larger(1.5 * reach / n, 2 * spread->sigma[1]));
         memcpy(normal, wide.normal, sizeof wide.normal);
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
     *edge |= place.open;
-    radius *= sqrt(fmax(place.filled, 0.25));
+    radius *= sqrt(larger(place.filled, 0.25));
     if (!place.one_sided)
-        return fmax(radius, fmin(0.65 * place.gap, 3 * radius));
-    return fmin(fmax(at_border * radius, fmin(0.5 * place.gap, 3 * radius)),
-                along_border * least_radius(p, i, list, v->k));
+        return larger(radius, smaller(0.65 * place.gap, 3 * radius));
+    return smaller(larger(at_border * radius, smaller(0.5 * place.gap, 3 * radius)),
+                   along_border * least_radius(p, i, list, v->k));
 }
 
 bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)

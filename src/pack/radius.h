@@ -7,6 +7,7 @@
 /* What a point's neighbours sum up to, relative to the point. */
 struct spl_moments {
     float count, sum[3], square[6]; /* xx xy xz yy yz zz; the point itself counts and adds nothing */
+    float unused[2];                /* vectors are read whole */
 };
 
 struct spl_moments spl_moments_of(const struct spl_points *points, size_t i, const struct spl_nearest *near);

@@ -9,6 +9,7 @@
  * there is no surface. */
 #include "pack/points.h"
 
+#include <malloc.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -255,7 +256,8 @@ static int allocate(struct surface *s, struct spl_error *err)
     return s->neighbours ? 0 : SPL_E_NOMEM;
 }
 
-static void finish(struct surface *s)
+/* What clip lines are not made of. */
+static void finish_blocks(struct surface *s)
 {
     for (size_t b = 0; s->blocks && b < s->block_count; b++) {
         spl_unsettled_finish(&s->blocks[b].unsettled);
@@ -269,9 +271,19 @@ static void finish(struct surface *s)
     }
     free(s->blocks);
     free(s->scratch);
-    spl_spill_free(s->points->spill, s->label);
-    spl_spill_free(s->points->spill, s->edge);
     free(s->components);
+    spl_spill_free(s->points->spill, s->label);
+    s->blocks = NULL;
+    s->scratch = NULL;
+    s->components = NULL;
+    s->label = NULL;
+    malloc_trim(0); /* a tenth of what there is, in pieces, which would stay until the end */
+}
+
+static void finish(struct surface *s)
+{
+    finish_blocks(s);
+    spl_spill_free(s->points->spill, s->edge);
     spl_neighbours_destroy(s->neighbours);
 }
 
@@ -316,6 +328,7 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
     for (size_t b = 0; b < s.block_count; b++)
         spl_settle_store(points, &s.blocks[b].unsettled);
     spl_stage_finish(stage);
+    finish_blocks(&s);
     if (s.edge)
         rc = spl_clip_lines(points, s.neighbours, s.wide, s.edge, stage, err);
 done:

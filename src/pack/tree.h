@@ -53,6 +53,9 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
 int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, struct spl_stage *stage,
                      struct spl_error *err);
 
+/* Frees the splats of inner nodes, which nobody reads any more; how many they were stays. */
+void spl_tree_drop_splats(struct spl_tree *tree);
+
 void spl_tree_finish(struct spl_tree *tree);
 
 #endif
