@@ -141,9 +141,10 @@ int spl_part_recognise(const struct spl_job *job, uint32_t number, const json_t 
     return SPL_OK;
 }
 
-/* What lies under the part's names. *replace: may be written over. */
+/* What lies under the part's names. */
 struct there {
-    bool done, replace;
+    bool done;    /* the part, or the mark that it has no point */
+    bool replace; /* a dataset that is none of this plan any more */
 };
 
 static int look_at_dataset(const struct spl_job *job, uint32_t number, const char *path,
@@ -243,6 +244,8 @@ int spl_job_pack(const struct spl_job *job, uint32_t number, const struct spl_pa
         rc = look_at_dataset(job, number, path, options, &there, err);
     if (!rc && !there.done)
         look_at_mark(job, number, mark, &there);
+    if (!rc && there.done && there.replace) /* killed before what the mark stands for was removed */
+        unlink(path);
     *outcome = SPL_PART_WAS_THERE;
     if (!rc && !there.done) {
         rc = build(&part, options, path, &empty, report, err);
