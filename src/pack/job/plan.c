@@ -73,13 +73,18 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
 }
 
 /* Whether headers say all that there is to be known: LAS is the format whose values are whole numbers, but for fields
- * that are kept by name. */
+ * that are kept by name. How unevenly a scan's points lie in its box they do not say, which in many small boxes evens
+ * out. */
 static bool headers_tell(const struct planning *p)
 {
     bool tell = p->scans.count / scans_a_part >= p->options->parts && !p->keep.count;
+    uint64_t points = 0;
+    for (size_t i = 0; tell && i < p->scans.count; i++)
+        points += p->scans.list[i].counted ? p->scans.list[i].points_expected : 0;
     for (size_t i = 0; tell && i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
-        tell = scan->has_box && !(scan->attributes & SPL_CLOUD_STATION);
+        tell = scan->has_box && !(scan->attributes & SPL_CLOUD_STATION) &&
+               (!scan->counted || scan->points_expected <= points / p->options->parts / 2);
         for (int c = 0; c < 3 && tell; c++)
             tell = fabs(scan->box[0][c]) <= SPL_COORDINATE_MAX && fabs(scan->box[1][c]) <= SPL_COORDINATE_MAX;
     }
