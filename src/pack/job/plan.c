@@ -16,6 +16,7 @@
 #include "pack/job/stamp.h"
 #include "pack/job/survey.h"
 #include "pack/kept.h"
+#include "pack/maps/pictures.h"
 #include "pack/said.h"
 #include "pack/warn.h"
 
@@ -263,6 +264,23 @@ static int take_options(struct planning *p, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Nobody asked for what scans bring along, so it is no reason to refuse them. */
+static int mention_panoramas(const struct planning *p, struct spl_error *err)
+{
+    const struct spl_pack_options *o = &p->options->pack;
+    struct spl_map_sources found = {0};
+    if (!o->maps || !o->warn)
+        return SPL_OK;
+    int rc = spl_map_sources_find((const char *const *)p->inputs.paths, p->inputs.count, &found, err);
+    if (!rc && found.count)
+        spl_pack_warn(o->warn, o->progress_context,
+                      "%.300s%s: the panoramas that lie there are left, since maps of stations cannot be split into "
+                      "parts; --no-panoramas says so",
+                      found.paths[0], found.count > 1 ? " and others" : "");
+    spl_map_sources_finish(&found);
+    return rc;
+}
+
 static int plan(struct planning *p, struct spl_error *err)
 {
     const struct spl_pack_options *o = &p->options->pack;
@@ -275,7 +293,9 @@ static int plan(struct planning *p, struct spl_error *err)
     if (rc)
         return rc;
     spl_inputs_sort(&p->inputs);
-    rc = spl_scans_init(&p->scans, &p->inputs, &how, &p->stage, err);
+    rc = mention_panoramas(p, err);
+    if (!rc)
+        rc = spl_scans_init(&p->scans, &p->inputs, &how, &p->stage, err);
     if (!rc)
         rc = spl_kept_check(&p->scans, err);
     if (!rc)

@@ -393,7 +393,15 @@ static void test_what_cannot_be_split_is_refused(void **state)
     plan_well("rough", &rough, 8);
     pack_well("rough", 3, 2, SPL_PART_MADE);
     assert_int_equal(access(in_folder("refused"), F_OK), -1); /* nothing is left of what fails */
-    plan_well("found", &(struct spl_pack_options){.maps = &found}, 2); /* nobody asked for those */
+    /* nobody asked for those that lie beside a scan */
+    assert_int_equal(mkdir(in_folder("panoramas"), 0777), 0);
+    folder_put_text("panoramas/panoramas.json", "{}");
+    said[0] = '\0';
+    plan_well("found", &(struct spl_pack_options){.maps = &found, .warn = hear}, 2);
+    assert_non_null(strstr(said, "panoramas: the panoramas that lie there are left"));
+    said[0] = '\0';
+    plan_well("found", &(struct spl_pack_options){.warn = hear}, 2);
+    assert_null(strstr(said, "panoramas"));
 }
 
 static void test_nothing_is_left_of_what_fails(void **state)
