@@ -166,7 +166,7 @@ static void number_scans(struct planning *p)
     rules->steps[SPL_SCALAR_SCAN] = (struct spl_scalar_steps){!missing, 0, 1};
 }
 
-static int take_input(struct planning *p, const struct spl_scan *scan, struct spl_error *err)
+static int take_input(struct planning *p, struct spl_scan *scan, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     struct spl_job_input *input = &job->inputs[job->input_count];
@@ -179,9 +179,13 @@ static int take_input(struct planning *p, const struct spl_scan *scan, struct sp
     input->points = scan->points_inside;
     input->colors = scan->colors;
     input->first_number = scan->first_number;
-    for (int c = 0; c < 3 && input->points; c++) {
-        input->box[0][c] = scan->min[c];
-        input->box[1][c] = scan->max[c];
+    input->block_rows = scan->blocks.rows;
+    input->block_count = scan->blocks.boxes ? scan->blocks.count : 0;
+    input->blocks = (double(*)[6])scan->blocks.boxes;
+    scan->blocks.boxes = NULL;
+    for (int c = 0; c < 3 && input->points; c++) { /* as the packer keeps them */
+        input->box[0][c] = spl_points_coordinate(scan->min[c]);
+        input->box[1][c] = spl_points_coordinate(scan->max[c]);
     }
     return rc;
 }
@@ -354,6 +358,8 @@ int spl_job_plan(const struct spl_plan_options *options, struct spl_job *job, bo
     if (rc)
         spl_job_finish(job);
     free(p.cells);
+    for (size_t i = 0; p.scans.list && i < p.scans.count; i++)
+        free((void *)p.scans.list[i].blocks.boxes);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
     spl_inputs_finish(&p.inputs);
