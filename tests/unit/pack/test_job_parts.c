@@ -38,8 +38,11 @@ static void write_scan(int scan)
     for (int i = 0; i < points; i++) {
         double x = 500000 + 14 * scan + 20 * uniform(&random), y = 5400000 + 10 * uniform(&random);
         fprintf(f, "%.5f %.5f %.5f %d %d 90", x, y, 0.2 * sin(x) + 0.002 * uniform(&random), 60 * scan, i % 200);
-        fprintf(f, scan ? " %.2f" : "", 100 * scan + i % 50 + 0.25);
-        fprintf(f, scan == 2 ? " %d\n" : "\n", 2 + i % 3);
+        if (scan)
+            fprintf(f, " %.2f", 100 * scan + i % 50 + 0.25);
+        if (scan == 2)
+            fprintf(f, " %d", 2 + i % 3);
+        fputc('\n', f);
     }
     assert_int_equal(fclose(f), 0);
 }
@@ -213,7 +216,8 @@ static void test_the_collection_has_what_a_pack_of_all_has(void **state)
         inputs[i] = paths[i];
     }
     snprintf(output, sizeof output, "%s", in_folder("whole.spld"));
-    struct spl_pack_options options = {.size = sizeof options, .inputs = inputs, .input_count = scans, .output = output, .threads = 2};
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = inputs, .input_count = scans, .output = output, .threads = 2};
     assert_int_equal(spl_pack(&options, NULL, NULL), 0);
     if (spl_dataset_open(in_job("one", "all.spld"), true, &all, &err) || spl_dataset_open(output, true, &whole, &err))
         fail_msg("%s", err.message);
@@ -386,7 +390,8 @@ static void test_what_cannot_be_split_is_refused(void **state)
     assert_string_equal(err.field, "keep");
     assert_int_equal(plan("refused", &(struct spl_pack_options){0}, 10001, &same, NULL), SPL_E_USAGE);
     /* a tenth of the whole, which no part is as long as */
-    const struct spl_pack_options rough = {.primitives = SPL_PRIMITIVES_ALL, .error = 4}, bold = {.primitives = SPL_PRIMITIVES_ALL, .error = 5};
+    const struct spl_pack_options rough = {.primitives = SPL_PRIMITIVES_ALL, .error = 4};
+    const struct spl_pack_options bold = {.primitives = SPL_PRIMITIVES_ALL, .error = 5};
     err = (struct spl_error){0};
     assert_int_equal(plan("refused", &bold, 8, &same, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "error");
