@@ -210,6 +210,13 @@ int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struc
     return batch->count > 0;
 }
 
+int spl_cloud_seek(struct spl_cloud *cloud, uint64_t row, struct spl_error *err)
+{
+    spl_assert(cloud->info.rows && row <= cloud->info.rows && !cloud->part);
+    cloud->row = row;
+    return cloud->reader->seek_row(cloud, row, err);
+}
+
 void spl_cloud_take_coordinates(struct spl_cloud *cloud, struct spl_cloud_coordinates *out)
 {
     *out = cloud->info.coordinates;

@@ -80,6 +80,7 @@ struct spl_cloud_info {
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
     bool points_at_most; /* of points_expected some may be cells of a grid that saw nothing, which are skipped */
     uint64_t points_behind; /* that the file has room for behind those that its header counts: not read; 0 mostly */
+    uint64_t rows;            /* that spl_cloud_seek() can go to; 0: it cannot */
     uint64_t points_total;    /* with those that max_points leaves out; 0 = unknown, never where it is set */
     uint64_t file_bytes;
     uint32_t station_count;         /* grows while a PTX is read; final at the end */
@@ -144,6 +145,11 @@ uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
  * SPL_CLOUD_AGAIN where a point is brighter than sampled colours let expect: nothing that was read holds, info has the
  * right white, and the next batch is the first one. SPL_E_CANCELLED. */
 int spl_cloud_read(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err);
+
+/* Goes to a row of the file, of which each is a point, where the format has rows that can be gone to (info.rows > 0)
+ * and no part of them was asked for; the next batch begins there. Cheap, but that LAZ decodes its chunk from the
+ * beginning. */
+int spl_cloud_seek(struct spl_cloud *cloud, uint64_t row, struct spl_error *err);
 
 /* Moves what the header says of its coordinates to the caller, who releases it with spl_crs_finish(). */
 void spl_cloud_take_coordinates(struct spl_cloud *cloud, struct spl_cloud_coordinates *out);

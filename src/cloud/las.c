@@ -197,6 +197,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     cloud->slow_rows = compressed;
     if (compressed && (code = open_stream(cloud, &format, points_at, err)) < 0)
         return code;
+    if (!compressed || spl_laz_stream_get_table(las->stream))
+        cloud->info.rows = las->count;
     if (compressed &&
         (code = spl_copc_take_levels(cloud, records, las->stream, cloud->options->max_points, &las->count, err)) < 0)
         return code;
@@ -273,6 +275,18 @@ static int las_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     return count > 0;
 }
 
+static int las_seek_row(struct spl_cloud *cloud, uint64_t row, struct spl_error *err)
+{
+    struct las *las = cloud->state;
+    (void)err;
+    las->next = row;
+    if (las->stream)
+        spl_laz_stream_seek(las->stream, row, false);
+    else
+        spl_source_seek(&cloud->source, las->start + row * las->record_bytes);
+    return SPL_OK;
+}
+
 static int las_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
 {
     struct las *las = cloud->state;
@@ -292,4 +306,10 @@ static void las_close(struct spl_cloud *cloud)
 }
 
 const struct spl_cloud_reader spl_las_reader = {
-    .format = "LAS", .open = las_open, .rows = las_rows, .seek = las_seek, .close = las_close};
+    .format = "LAS",
+    .open = las_open,
+    .rows = las_rows,
+    .seek = las_seek,
+    .seek_row = las_seek_row,
+    .close = las_close,
+};

@@ -267,8 +267,10 @@ static int ply_open(struct spl_cloud *cloud, struct spl_error *err)
     snprintf(cloud->info.version, sizeof cloud->info.version, "1.0, %s", kinds[ply->header.format]);
     ply->start = spl_source_tell(&cloud->source);
     ply->start_line = cloud->source.line;
-    if (ply->header.format != SPL_PLY_ASCII && !vertices(ply)->lists)
+    if (ply->header.format != SPL_PLY_ASCII && !vertices(ply)->lists) {
         cloud->sampling = SPL_SAMPLE_INTENSITY;
+        cloud->info.rows = vertices(ply)->count;
+    }
     cloud->info.points_expected = vertices(ply)->count;
     return check_byte_order(cloud, err);
 }
@@ -308,6 +310,15 @@ static int ply_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     return rows->count > 0;
 }
 
+static int ply_seek_row(struct spl_cloud *cloud, uint64_t row, struct spl_error *err)
+{
+    struct ply *ply = cloud->state;
+    (void)err;
+    ply->next = row;
+    spl_source_seek(&cloud->source, ply->start + row * vertices(ply)->row_bytes);
+    return SPL_OK;
+}
+
 /* Rows of text or with lists cannot be found but by reading: those only rewind (sampling is for fixed-size rows). */
 static int ply_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
 {
@@ -320,4 +331,5 @@ static int ply_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
     return SPL_OK;
 }
 
-const struct spl_cloud_reader spl_ply_reader = {.format = "PLY", .open = ply_open, .rows = ply_rows, .seek = ply_seek};
+const struct spl_cloud_reader spl_ply_reader = {
+    .format = "PLY", .open = ply_open, .rows = ply_rows, .seek = ply_seek, .seek_row = ply_seek_row};

@@ -14,6 +14,8 @@ struct spl_cloud_reader {
     int (*rows)(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit, struct spl_error *err);
     /* Goes to about part / parts of the points, exactly to the first when part is 0. */
     int (*seek)(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err);
+    /* Goes to a row, of info.rows. NULL where none can be gone to. */
+    int (*seek_row)(struct spl_cloud *cloud, uint64_t row, struct spl_error *err);
     /* Releases what the state holds, not the state. May be NULL. Called whenever there is a state, also after a failed
      * open. */
     void (*close)(struct spl_cloud *cloud);

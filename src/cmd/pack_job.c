@@ -59,6 +59,13 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
     return SPL_OK;
 }
 
+/* Of a file whose rows can be gone to, those of the part. */
+static uint64_t bytes_read(const struct spl_job *job, uint32_t part, const struct spl_job_input *input)
+{
+    double share = (double)spl_job_rows(job, part, input) / (double)(input->points ? input->points : 1);
+    return (uint64_t)(share * (double)input->bytes);
+}
+
 static void print_plan(const struct spl_job *job, bool unchanged)
 {
     uint64_t points = 0, halo = 0, most = 0, read = 0, bytes = 0;
@@ -69,7 +76,7 @@ static void print_plan(const struct spl_job *job, bool unchanged)
         uint64_t own = 0, scans = 0;
         for (size_t i = 0; i < job->input_count; i++)
             if (spl_job_reads(job, k, &job->inputs[i])) {
-                own += job->inputs[i].bytes;
+                own += bytes_read(job, k, &job->inputs[i]);
                 scans++;
             }
         halo += part->halo_points;

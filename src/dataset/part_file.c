@@ -1,4 +1,5 @@
-/* Everything goes into PATH.part-PID, which the file's own lock says is in use; a rename makes it PATH. Owned by one
+/* Everything goes into PATH.part-PID, which the file's own lock says is in use; a rename makes it PATH. In containers
+ * that share a folder every process has the number 1: where the name is in use, another one is taken. Owned by one
  * thread at a time. */
 #include "dataset/part_file.h"
 
@@ -13,19 +14,41 @@
 
 #include "base/file.h"
 
+enum { names_most = 64 };
+
+static int name(const char *path, unsigned in_use, char **out)
+{
+    int length = in_use ? asprintf(out, "%s.part-%ld-%u", path, (long)getpid(), in_use)
+                        : asprintf(out, "%s.part-%ld", path, (long)getpid());
+    if (length >= 0)
+        return SPL_OK;
+    *out = NULL;
+    return SPL_E_NOMEM;
+}
+
+/* Of what a killed process of the same number left. */
+static int empty(struct spl_part_file *file, struct spl_error *err)
+{
+    if (!ftruncate(file->fd, 0))
+        return SPL_OK;
+    int rc = spl_fail_errno(err, errno, "cannot empty %s", file->part_path);
+    spl_part_file_finish(file);
+    return rc;
+}
+
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err)
 {
     *file = (struct spl_part_file){.path = strdup(path), .fd = -1};
     int rc = SPL_E_NOMEM;
-    if (!file->path || asprintf(&file->part_path, "%s.part-%ld", path, (long)getpid()) < 0) {
-        file->part_path = NULL;
-        spl_fail(err, rc, "out of memory for the name of %s", path);
-        goto failed;
-    }
     spl_file_sweep(path, ".part-[0-9]*");
-    for (;;) { /* again where another's sweep came before our lock */
+    for (unsigned in_use = 0;;) { /* again where another's sweep came before our lock */
         struct stat st;
-        file->fd = open(file->part_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+        free(file->part_path);
+        if (!file->path || name(path, in_use, &file->part_path)) {
+            spl_fail(err, rc, "out of memory for the name of %s", path);
+            goto failed;
+        }
+        file->fd = open(file->part_path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (file->fd < 0) {
             const char *slash = strrchr(path, '/');
             if (errno == ENOENT && slash)
@@ -35,10 +58,13 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
                 rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
             goto failed;
         }
-        flock(file->fd, LOCK_EX | LOCK_NB); /* in use; file systems without locks are not swept either */
-        if (fstat(file->fd, &st) || st.st_nlink)
-            return SPL_OK;
+        /* in use; file systems without locks are not swept either */
+        if (flock(file->fd, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK && in_use < names_most)
+            in_use++;
+        else if (fstat(file->fd, &st) || st.st_nlink)
+            return empty(file, err);
         close(file->fd);
+        file->fd = -1;
     }
 failed:
     spl_part_file_finish(file);

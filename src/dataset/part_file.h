@@ -15,8 +15,8 @@ struct spl_part_file {
     bool committed;
 };
 
-/* Creates PATH.part-PID beside `path`, and removes those that killed processes left of it. On failure there is nothing
- * to finish. */
+/* Creates PATH.part-PID beside `path`, PATH.part-PID-N where another process of this number writes there too, and
+ * removes those that killed processes left of it. On failure there is nothing to finish. */
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err);
 
 int spl_part_file_write(struct spl_part_file *file, uint64_t offset, const void *data, size_t bytes,

@@ -186,6 +186,34 @@ static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const
     return rc;
 }
 
+/* The next batch of a scan, of whose rows those up to `*row` are read or left; as spl_cloud_read(). */
+static int read_batch(struct spl_cloud *cloud, struct spl_point_batch *batch, const struct spl_scans *scans,
+                      const struct spl_scan *scan, uint64_t *row, uint64_t *end, struct spl_error *err)
+{
+    const struct spl_part_blocks *blocks = &scan->blocks;
+    const size_t capacity = batch->capacity;
+    uint64_t begin;
+    if (!blocks->boxes) {
+        int rc = spl_cloud_read(cloud, batch, err);
+        *row += rc == 1 ? batch->count : 0;
+        return rc;
+    }
+    batch->count = 0;
+    if (*row >= *end) {
+        if (!spl_part_next_rows(scans->rules, blocks, *row, &begin, end))
+            return 0;
+        *row = begin;
+        int rc = spl_cloud_seek(cloud, begin, err);
+        if (rc < 0)
+            return rc;
+    }
+    batch->capacity = *end - *row < capacity ? (size_t)(*end - *row) : capacity;
+    int rc = spl_cloud_read(cloud, batch, err);
+    batch->capacity = capacity;
+    *row += rc == 1 ? batch->count : 0;
+    return rc;
+}
+
 /* What is skipped of a scan lies nowhere: one part of a job counts it. */
 static bool is_counted_here(const struct spl_scans *scans, const struct spl_scan *scan)
 {
@@ -209,22 +237,22 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         return rc;
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     uint32_t attributes = info->attributes;
-    uint64_t first = p->points_read, read = 0;
+    uint64_t first = p->points_read, row = 0, end = 0;
     size_t count = p->count;
     char name[128];
     snprintf(name, sizeof name, "reading %.100s", scan->name);
-    spl_stage_begin(stage, name, "points", info->points_expected);
+    spl_stage_begin(stage, name, "points", scans->rules ? scan->points_expected : info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is
      * no point they alone do, as of a part: beyond the bound of memory what is allocated takes room on disk, used or
      * not. */
     if (info->points_expected && !scans->rules && !info->points_at_most &&
         info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);
-    while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
+    while (!rc && (rc = read_batch(cloud, batch, scans, scan, &row, &end, err)) > 0) {
         if (rc == SPL_CLOUD_AGAIN) {
             p->points_read = first;
             p->count = count;
-            read = 0;
+            row = end = 0;
             forget(scan, stage);
             scan->colors = scan->own_colors = info->colors;
             rc = 0;
@@ -232,8 +260,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
         }
         size_t points = batch->count; /* of which some are not kept */
         spl_stage_add(stage, points, 0);
-        rc = take_batch(p, batch, scans, scan, info, read, beside, err);
-        read += points;
+        rc = take_batch(p, batch, scans, scan, info, row - points, beside, err);
         if (!rc)
             rc = spl_stage_check(stage, err);
     }

@@ -69,7 +69,8 @@ int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_clou
                               .min = {INFINITY, INFINITY, INFINITY},
                               .max = {-INFINITY, -INFINITY, -INFINITY},
                               .has_box = info->has_bounds,
-                              .stations = info->station_count};
+                              .stations = info->station_count,
+                              .rows = info->rows};
     memcpy(scan->box, info->bounds, sizeof scan->box);
     if (fields)
         snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);

@@ -7,11 +7,10 @@
 
 #include "cloud/cloud.h"
 #include "pack/inputs.h"
+#include "pack/job/rules.h"
 #include "pack/stage.h"
 
 #define SPL_COORDINATE_MAX 1e12 /* as far as a camera can be */
-
-struct spl_part_rules;
 
 struct spl_scan {
     const char *path, *name;            /* borrowed; the name is the path's last part */
@@ -31,8 +30,10 @@ struct spl_scan {
     double box[2][3];          /* least and most of them as the header says, or a job knows; where has_box */
     bool has_box;
     uint32_t stations;         /* that the header names */
+    uint64_t rows;             /* as of struct spl_cloud_info */
     uint32_t first_number;     /* of a job: of its points' scan, or of its first station */
     uint64_t points_inside;    /* likewise: of the part, once read */
+    struct spl_part_blocks blocks; /* likewise: which of its rows are read */
 };
 
 enum { SPL_SCANS_FIELDS = 400 };

@@ -49,6 +49,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memcpy(rules.max, job.parts[k].max, sizeof rules.max);
         for (size_t i = 0; i < job.input_count && i < 8; i++) {
             const struct spl_job_input *input = &job.inputs[i];
+            if (spl_job_rows(&job, k, input) > input->points)
+                abort();
             if (spl_part_find(&rules, input->box[0], input->box[1], input->box[0]) == SPL_PART_INSIDE &&
                 input->points && !spl_job_reads(&job, k, input))
                 abort();

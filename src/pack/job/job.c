@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 bool spl_job_reads(const struct spl_job *job, uint32_t part, const struct spl_job_input *input)
 {
@@ -12,6 +13,21 @@ bool spl_job_reads(const struct spl_job *job, uint32_t part, const struct spl_jo
         reaches &=
             input->box[0][c] <= box->max[c] + job->rules.halo && input->box[1][c] >= box->min[c] - job->rules.halo;
     return reaches;
+}
+
+uint64_t spl_job_rows(const struct spl_job *job, uint32_t part, const struct spl_job_input *input)
+{
+    struct spl_part_rules rules = job->rules;
+    const struct spl_part_blocks blocks = {(const double(*)[6])input->blocks, input->block_count, input->block_rows,
+                                           input->points};
+    uint64_t row = 0, begin, end, rows = 0;
+    if (!spl_job_reads(job, part, input) || !input->blocks)
+        return spl_job_reads(job, part, input) ? input->points : 0;
+    memcpy(rules.min, job->parts[part].min, sizeof rules.min);
+    memcpy(rules.max, job->parts[part].max, sizeof rules.max);
+    for (; spl_part_next_rows(&rules, &blocks, row, &begin, &end); row = end)
+        rows += end - begin;
+    return rows;
 }
 
 char *spl_job_part_path(const struct spl_job *job, uint32_t part, bool mark)
@@ -25,6 +41,7 @@ void spl_job_finish(struct spl_job *job)
     for (size_t i = 0; i < job->input_count; i++) {
         free(job->inputs[i].path);
         free(job->inputs[i].file);
+        free(job->inputs[i].blocks);
     }
     free(job->inputs);
     free(job->parts);

@@ -18,9 +18,12 @@ struct spl_job_input {
     char *path; // owned: as it is written, relative to the job's folder
     char *file; // owned: the same to open
     uint64_t bytes;
-    uint64_t ends;    /* hash of its first and last 64 KiB */
-    uint64_t points;  /* that its header says, or that were counted; 0: no part reads it */
-    double box[2][3]; /* likewise: least and most of coordinates, finite; a header's may be wrong */
+    uint64_t ends;       /* hash of its first and last 64 KiB */
+    uint64_t points;     /* that its header says, or that were counted; 0: no part reads it */
+    double box[2][3];    /* likewise: least and most of coordinates, finite; a header's may be wrong */
+    uint64_t block_rows; /* where the file's rows can be gone to: points of a block, the last of which has the rest */
+    double (*blocks)[6]; // owned: least and most of x, y, z of each; NULL: all of the file is read
+    size_t block_count;
     struct spl_cloud_colors colors;
     uint32_t first_number; /* its own, or that of its first station */
 };
@@ -61,6 +64,9 @@ int spl_job_write(const struct spl_job *job, struct spl_error *err);
 
 /* Whether the input reaches into the part or its halo. */
 bool spl_job_reads(const struct spl_job *job, uint32_t part, const struct spl_job_input *input);
+
+/* Points of it that the part reads then. */
+uint64_t spl_job_rows(const struct spl_job *job, uint32_t part, const struct spl_job_input *input);
 
 /* The path of part `part`, or of the mark that it has no point; free(). NULL: no memory. */
 char *spl_job_part_path(const struct spl_job *job, uint32_t part, bool mark);

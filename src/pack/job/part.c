@@ -42,6 +42,26 @@ static int check_input(const struct spl_job_input *input, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Of a file that has blocks, which of them are read: *scan has the rows of the file that was opened. */
+static int choose_rows(const struct spl_part *part, const struct spl_job_input *input, struct spl_scan *scan,
+                       struct spl_error *err)
+{
+    uint64_t row = 0, begin, end;
+    if (!input->blocks)
+        return SPL_OK;
+    if (scan->rows != input->points)
+        return spl_fail_field(err, SPL_E_INPUT, "points",
+                              "%.300s: has %llu points, and %llu when the plan was made: make the plan and all parts "
+                              "anew",
+                              input->file, (unsigned long long)scan->rows, (unsigned long long)input->points);
+    scan->blocks = (struct spl_part_blocks){(const double(*)[6])input->blocks, input->block_count, input->block_rows,
+                                            input->points};
+    scan->points_expected = 0;
+    for (; spl_part_next_rows(&part->rules, &scan->blocks, row, &begin, &end); row = end)
+        scan->points_expected += end - begin;
+    return SPL_OK;
+}
+
 int spl_part_open(const struct spl_part *part, struct spl_scans *scans, struct spl_system *system,
                   struct spl_inputs *inputs, const struct spl_cloud_options *how, struct spl_stage *stage,
                   struct spl_error *err)
@@ -72,7 +92,9 @@ int spl_part_open(const struct spl_part *part, struct spl_scans *scans, struct s
         scan->colors = scan->own_colors = input->colors;
         memcpy(scan->box, input->box, sizeof scan->box);
         scan->first_number = input->first_number;
-        rc = spl_stage_check(stage, err);
+        rc = choose_rows(part, input, scan, err);
+        if (!rc)
+            rc = spl_stage_check(stage, err);
     }
     spl_stage_end(stage);
     if (!rc && job->crs && !(system->crs = strdup(job->crs)))
@@ -141,9 +163,10 @@ int spl_part_recognise(const struct spl_job *job, uint32_t number, const json_t 
     return SPL_OK;
 }
 
-/* What lies under the part's names. *replace: may be written over. */
+/* What lies under the part's names. */
 struct there {
-    bool done, replace;
+    bool done;    /* the part, or the mark that it has no point */
+    bool replace; /* a dataset that is none of this plan any more */
 };
 
 static int look_at_dataset(const struct spl_job *job, uint32_t number, const char *path,
@@ -243,6 +266,8 @@ int spl_job_pack(const struct spl_job *job, uint32_t number, const struct spl_pa
         rc = look_at_dataset(job, number, path, options, &there, err);
     if (!rc && !there.done)
         look_at_mark(job, number, mark, &there);
+    if (!rc && there.done && there.replace) /* killed before what the mark stands for was removed */
+        unlink(path);
     *outcome = SPL_PART_WAS_THERE;
     if (!rc && !there.done) {
         rc = build(&part, options, path, &empty, report, err);

@@ -16,6 +16,7 @@
 #include "pack/job/stamp.h"
 #include "pack/job/survey.h"
 #include "pack/kept.h"
+#include "pack/maps/pictures.h"
 #include "pack/said.h"
 #include "pack/warn.h"
 
@@ -73,13 +74,18 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
 }
 
 /* Whether headers say all that there is to be known: LAS is the format whose values are whole numbers, but for fields
- * that are kept by name. */
+ * that are kept by name. How unevenly a scan's points lie in its box they do not say, which in many small boxes evens
+ * out. */
 static bool headers_tell(const struct planning *p)
 {
     bool tell = p->scans.count / scans_a_part >= p->options->parts && !p->keep.count;
+    uint64_t points = 0;
+    for (size_t i = 0; tell && i < p->scans.count; i++)
+        points += p->scans.list[i].counted ? p->scans.list[i].points_expected : 0;
     for (size_t i = 0; tell && i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
-        tell = scan->has_box && !(scan->attributes & SPL_CLOUD_STATION);
+        tell = scan->has_box && !(scan->attributes & SPL_CLOUD_STATION) &&
+               (!scan->counted || scan->points_expected <= points / p->options->parts / 2);
         for (int c = 0; c < 3 && tell; c++)
             tell = fabs(scan->box[0][c]) <= SPL_COORDINATE_MAX && fabs(scan->box[1][c]) <= SPL_COORDINATE_MAX;
     }
@@ -160,7 +166,7 @@ static void number_scans(struct planning *p)
     rules->steps[SPL_SCALAR_SCAN] = (struct spl_scalar_steps){!missing, 0, 1};
 }
 
-static int take_input(struct planning *p, const struct spl_scan *scan, struct spl_error *err)
+static int take_input(struct planning *p, struct spl_scan *scan, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     struct spl_job_input *input = &job->inputs[job->input_count];
@@ -173,9 +179,13 @@ static int take_input(struct planning *p, const struct spl_scan *scan, struct sp
     input->points = scan->points_inside;
     input->colors = scan->colors;
     input->first_number = scan->first_number;
-    for (int c = 0; c < 3 && input->points; c++) {
-        input->box[0][c] = scan->min[c];
-        input->box[1][c] = scan->max[c];
+    input->block_rows = scan->blocks.rows;
+    input->block_count = scan->blocks.boxes ? scan->blocks.count : 0;
+    input->blocks = (double(*)[6])scan->blocks.boxes;
+    scan->blocks.boxes = NULL;
+    for (int c = 0; c < 3 && input->points; c++) { /* as the packer keeps them */
+        input->box[0][c] = spl_points_coordinate(scan->min[c]);
+        input->box[1][c] = spl_points_coordinate(scan->max[c]);
     }
     return rc;
 }
@@ -258,6 +268,23 @@ static int take_options(struct planning *p, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Nobody asked for what scans bring along, so it is no reason to refuse them. */
+static int mention_panoramas(const struct planning *p, struct spl_error *err)
+{
+    const struct spl_pack_options *o = &p->options->pack;
+    struct spl_map_sources found = {0};
+    if (!o->maps || !o->warn)
+        return SPL_OK;
+    int rc = spl_map_sources_find((const char *const *)p->inputs.paths, p->inputs.count, &found, err);
+    if (!rc && found.count)
+        spl_pack_warn(o->warn, o->progress_context,
+                      "%.300s%s: the panoramas that lie there are left, since maps of stations cannot be split into "
+                      "parts; --no-panoramas says so",
+                      found.paths[0], found.count > 1 ? " and others" : "");
+    spl_map_sources_finish(&found);
+    return rc;
+}
+
 static int plan(struct planning *p, struct spl_error *err)
 {
     const struct spl_pack_options *o = &p->options->pack;
@@ -270,7 +297,9 @@ static int plan(struct planning *p, struct spl_error *err)
     if (rc)
         return rc;
     spl_inputs_sort(&p->inputs);
-    rc = spl_scans_init(&p->scans, &p->inputs, &how, &p->stage, err);
+    rc = mention_panoramas(p, err);
+    if (!rc)
+        rc = spl_scans_init(&p->scans, &p->inputs, &how, &p->stage, err);
     if (!rc)
         rc = spl_kept_check(&p->scans, err);
     if (!rc)
@@ -329,6 +358,8 @@ int spl_job_plan(const struct spl_plan_options *options, struct spl_job *job, bo
     if (rc)
         spl_job_finish(job);
     free(p.cells);
+    for (size_t i = 0; p.scans.list && i < p.scans.count; i++)
+        free((void *)p.scans.list[i].blocks.boxes);
     spl_system_finish(&p.system);
     spl_scans_finish(&p.scans);
     spl_inputs_finish(&p.inputs);

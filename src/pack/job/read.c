@@ -200,6 +200,29 @@ static int read_colors(const struct reader *r, const json_t *of, struct spl_clou
     return rc;
 }
 
+/* Rows in blocks, and all of their boxes, of which none is empty. */
+static int read_blocks(const struct reader *r, const json_t *of, struct spl_job_input *input)
+{
+    const json_t *list = json_object_get(of, "blocks");
+    int rc = read_count(r, of, "block_rows", count_most, &input->block_rows);
+    if (rc || json_is_null(list))
+        return rc;
+    const uint64_t points = input->points, rows = input->block_rows;
+    const size_t count = json_array_size(list) / 6;
+    if (!rows || !count || json_array_size(list) % 6 || count != (points + rows - 1) / rows)
+        return fail(r, "blocks", "must be null, or an array of six numbers for each \"block_rows\" of the points");
+    if (!(input->blocks = spl_alloc_raw(count, sizeof *input->blocks, r->err)))
+        return SPL_E_NOMEM;
+    input->block_count = count;
+    for (size_t i = 0; i < 6 * count; i++) {
+        const json_t *v = json_array_get(list, i);
+        input->blocks[i / 6][i % 6] = json_number_value(v);
+        if (!json_is_number(v) || !(fabs(json_number_value(v)) <= SPL_COORDINATE_MAX))
+            return fail(r, "blocks", "must be numbers from %g to %g", -SPL_COORDINATE_MAX, SPL_COORDINATE_MAX);
+    }
+    return SPL_OK;
+}
+
 static int read_input(const struct reader *r, const json_t *of, const char *folder, struct spl_job_input *input)
 {
     const char *path = NULL;
@@ -214,6 +237,7 @@ static int read_input(const struct reader *r, const json_t *of, const char *fold
     rc = rc ? rc : read_place(r, of, "max", (double)NAN, input->box[1]);
     rc = rc ? rc : read_colors(r, json_object_get(of, "colors"), &input->colors);
     rc = rc ? rc : read_count(r, of, "first_number", UINT32_MAX, &number);
+    rc = rc ? rc : read_blocks(r, of, input);
     for (int c = 0; !rc && c < 3; c++)
         if (!(input->box[0][c] <= input->box[1][c]))
             rc = fail(r, "min", "must be at most \"max\"");
@@ -238,7 +262,7 @@ static int read_inputs(struct reader *r, const json_t *root, struct spl_job *job
     if (!(job->inputs = spl_alloc(count, sizeof *job->inputs, r->err)))
         return SPL_E_NOMEM;
     int rc = SPL_OK;
-    for (; !rc && job->input_count < count; job->input_count += !rc) {
+    for (; !rc && job->input_count < count; job->input_count++) { /* one that fails is freed with the others */
         snprintf(r->where, sizeof r->where, "inputs[%zu]: ", job->input_count);
         rc = read_input(r, json_array_get(list, job->input_count), job->folder, &job->inputs[job->input_count]);
     }

@@ -19,6 +19,29 @@ enum spl_part_place spl_part_find(const struct spl_part_rules *rules, const doub
     return inside ? SPL_PART_INSIDE : near ? SPL_PART_HALO : SPL_PART_OUTSIDE;
 }
 
+static bool reaches(const struct spl_part_rules *rules, const double box[6])
+{
+    bool reaches = true;
+    for (int c = 0; c < 3; c++)
+        reaches &= box[c] <= rules->max[c] + rules->halo && box[3 + c] >= rules->min[c] - rules->halo;
+    return reaches;
+}
+
+bool spl_part_next_rows(const struct spl_part_rules *rules, const struct spl_part_blocks *blocks, uint64_t row,
+                        uint64_t *begin, uint64_t *end)
+{
+    size_t block = (size_t)(row / blocks->rows), after;
+    while (block < blocks->count && !reaches(rules, blocks->boxes[block]))
+        block++;
+    if (row >= blocks->total || block >= blocks->count)
+        return false;
+    for (after = block + 1; after < blocks->count && reaches(rules, blocks->boxes[after]);)
+        after++;
+    *begin = block * blocks->rows > row ? block * blocks->rows : row;
+    *end = after < blocks->count ? after * blocks->rows : blocks->total;
+    return true;
+}
+
 size_t spl_part_filter(const struct spl_part_rules *rules, const double low[3], const double high[3],
                        struct spl_point_batch *batch, uint32_t scalars, double *numbers, uint8_t *halo)
 {

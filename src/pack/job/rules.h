@@ -28,6 +28,17 @@ enum spl_part_place { SPL_PART_OUTSIDE, SPL_PART_INSIDE, SPL_PART_HALO };
 enum spl_part_place spl_part_find(const struct spl_part_rules *rules, const double low[3], const double high[3],
                                   const double at[3]);
 
+/* Of a scan whose rows can be gone to, the blocks that reach into a part or its halo, one run after the other. */
+struct spl_part_blocks {
+    const double (*boxes)[6]; /* least and most of x, y, z of each; borrowed. NULL: all is read */
+    size_t count;
+    uint64_t rows, total; /* of each but the last, of the scan */
+};
+
+/* The next run of rows from `row` on, *begin to *end; false: there is none. Pure. */
+bool spl_part_next_rows(const struct spl_part_rules *rules, const struct spl_part_blocks *blocks, uint64_t row,
+                        uint64_t *begin, uint64_t *end);
+
 /* Leaves what is inside or in the halo, in its order; `numbers` (may be NULL) has a value a point too; `halo` is filled
  * with 1 for each point that is left and lies there. `scalars` are the batch's. Returns how many are inside. */
 struct spl_point_batch;

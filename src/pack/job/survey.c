@@ -9,8 +9,11 @@
 
 #include "base/memory.h"
 #include "pack/kept.h"
+#include "pack/points.h"
 
 enum { batch_points = 65536, sample_most = 1 << 20 };
+/* Rows of a block at least, and as many blocks as a plan has room for: of each scan, of all of them. */
+enum { block_rows = 1 << 14, blocks_least = 4, blocks_most = 4096, blocks_some = 64, blocks_of_all = 1 << 16 };
 
 struct survey {
     struct spl_scans *scans;
@@ -61,6 +64,47 @@ static void forget(struct spl_scan *scan)
     }
 }
 
+static int begin_blocks(const struct survey *s, struct spl_scan *scan, struct spl_error *err)
+{
+    struct spl_part_blocks *blocks = &scan->blocks;
+    size_t most = blocks_of_all / s->scans->count;
+    most = most < blocks_some ? blocks_some : most > blocks_most ? blocks_most : most;
+    *blocks = (struct spl_part_blocks){.rows = block_rows, .total = scan->rows};
+    while (scan->rows / blocks->rows >= most)
+        blocks->rows *= 2;
+    blocks->count = (size_t)((scan->rows + blocks->rows - 1) / blocks->rows);
+    if (blocks->count < blocks_least)
+        return SPL_OK;
+    double(*boxes)[6] = spl_alloc_raw(blocks->count, sizeof *boxes, err);
+    for (size_t i = 0; boxes && i < blocks->count; i++)
+        for (int c = 0; c < 3; c++) {
+            boxes[i][c] = INFINITY;
+            boxes[i][3 + c] = -INFINITY;
+        }
+    blocks->boxes = (const double(*)[6])boxes;
+    return boxes ? SPL_OK : SPL_E_NOMEM;
+}
+
+/* Of points that are rows, the first of which is `row`. */
+static void add_to_blocks(const struct spl_part_blocks *blocks, const struct spl_point_batch *batch, uint64_t row)
+{
+    double(*boxes)[6] = (double(*)[6])blocks->boxes;
+    for (size_t i = 0; boxes && i < batch->count; i++) {
+        size_t block = (size_t)((row + i) / blocks->rows);
+        for (int c = 0; block < blocks->count && c < 3; c++) {
+            double v = spl_points_coordinate(batch->position[i][c]);
+            boxes[block][c] = v < boxes[block][c] ? v : boxes[block][c];
+            boxes[block][3 + c] = v > boxes[block][3 + c] ? v : boxes[block][3 + c];
+        }
+    }
+}
+
+static void drop_blocks(struct spl_scan *scan)
+{
+    free((void *)scan->blocks.boxes);
+    scan->blocks = (struct spl_part_blocks){0};
+}
+
 static int read_scan(struct survey *s, struct spl_scan *scan, struct spl_error *err)
 {
     struct spl_cloud *cloud = NULL;
@@ -75,6 +119,7 @@ static int read_scan(struct survey *s, struct spl_scan *scan, struct spl_error *
     const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
     snprintf(name, sizeof name, "counting %.100s", scan->name);
     spl_stage_begin(s->stage, name, "points", info->points_expected);
+    rc = begin_blocks(s, scan, err);
     while (!rc && (rc = spl_cloud_read(cloud, &s->batch, err)) > 0) {
         if (rc == SPL_CLOUD_AGAIN) { /* what was counted of it weighs twice, which is a matter of balance */
             forget(scan);
@@ -84,6 +129,7 @@ static int read_scan(struct survey *s, struct spl_scan *scan, struct spl_error *
             continue;
         }
         rc = add_batch(s, scan, read, info->scalars, err);
+        add_to_blocks(&scan->blocks, &s->batch, read);
         read += s->batch.count;
         spl_stage_add(s->stage, s->batch.count, 0);
         if (!rc)
@@ -93,6 +139,8 @@ static int read_scan(struct survey *s, struct spl_scan *scan, struct spl_error *
     scan->stations = info->station_count;
     memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
     scan->points_inside = read;
+    if (rc || read != scan->rows || info->points_skipped)
+        drop_blocks(scan);
     spl_stage_end(s->stage);
     s->stage->name = "";
     spl_cloud_destroy(cloud);

@@ -52,18 +52,29 @@ static json_t *describe_attributes(const struct spl_job *job)
     return all;
 }
 
+/* Least and most of x, y and z of one block after the other; null where there are none. */
+static json_t *describe_blocks(const struct spl_job_input *input)
+{
+    json_t *all = input->blocks ? json_array() : json_null();
+    for (size_t i = 0; all && i < input->block_count; i++)
+        for (int c = 0; c < 6; c++)
+            json_array_append_new(all, json_real(input->blocks[i][c]));
+    return all;
+}
+
 /* For the id a file is its name: where it lies changes no part. */
 static json_t *describe_input(const struct spl_job_input *input, bool for_id)
 {
     char ends[24];
     const struct spl_cloud_colors *colors = &input->colors;
     snprintf(ends, sizeof ends, "%016" PRIx64, input->ends);
-    return json_pack("{s:s, s:I, s:s, s:I, s:o, s:o, s:{s:s, s:f, s:f, s:b, s:b, s:b}, s:I}", "path",
+    return json_pack("{s:s, s:I, s:s, s:I, s:o, s:o, s:{s:s, s:f, s:f, s:b, s:b, s:b}, s:I, s:I, s:o}", "path",
                      for_id ? spl_input_name(input->path) : input->path, "bytes", (json_int_t)input->bytes, "ends",
                      ends, "points", (json_int_t)input->points, "min", place(input->box[0]), "max",
                      place(input->box[1]), "colors", "from", spl_job_color_names[colors->from], "black", colors->black,
                      "white", colors->white, "guessed", (int)colors->guessed, "blank", (int)colors->blank, "sampled",
-                     (int)colors->sampled, "first_number", (json_int_t)input->first_number);
+                     (int)colors->sampled, "first_number", (json_int_t)input->first_number, "block_rows",
+                     (json_int_t)input->block_rows, "blocks", describe_blocks(input));
 }
 
 static json_t *describe_part(const struct spl_job_box *part)

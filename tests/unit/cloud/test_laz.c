@@ -294,6 +294,43 @@ static void sampled_colors_are_the_same(void **state)
         }
 }
 
+/* Wherever reading goes on, it is with the points that lie there; of chunks that can only be found one after the other
+ * it cannot be said where. */
+static void rows_are_gone_to(void **state)
+{
+    static const uint32_t chunks[] = {2000, 2000, 2000, 2000, 2000, 2000, 0};
+    static const uint64_t rows[] = {0, 1, 5999, 2000, 11999, 3, 12000, 4100, 4100};
+    (void)state;
+    for (int table = LAZ_TABLE_USUAL; table <= LAZ_TABLE_MISSING; table += LAZ_TABLE_MISSING - LAZ_TABLE_USUAL) {
+        struct spl_laz_format format = laz_format(3, 0, 2, 2000);
+        uint8_t *records = laz_make_records(&format, colored, 12);
+        struct laz_out file = laz_write_file(&format, 3, records, chunks, (enum laz_table)table);
+        struct spl_cloud *cloud;
+        struct spl_point_batch all, some;
+        struct spl_error err = {0};
+        write_scratch(file.bytes, file.count);
+        assert_int_equal(spl_point_batch_init(&all, colored, NULL), 0);
+        assert_int_equal(spl_point_batch_init(&some, 700, NULL), 0);
+        if (spl_cloud_open(scratch_path(), NULL, &cloud, &err) || spl_cloud_read(cloud, &all, &err) != 1)
+            fail_msg("%s", err.message);
+        assert_int_equal(all.count, colored);
+        assert_int_equal(spl_cloud_get_info(cloud)->rows, table == LAZ_TABLE_USUAL ? colored : 0);
+        for (size_t i = 0; table == LAZ_TABLE_USUAL && i < sizeof rows / sizeof *rows; i++) {
+            const size_t left = colored - (size_t)rows[i], wanted = left < 700 ? left : 700;
+            assert_int_equal(spl_cloud_seek(cloud, rows[i], &err), 0);
+            assert_int_equal(spl_cloud_read(cloud, &some, &err), wanted > 0);
+            assert_int_equal(some.count, wanted);
+            assert_memory_equal(some.position, all.position + rows[i], wanted * sizeof *some.position);
+            assert_memory_equal(some.color, all.color + rows[i], wanted * sizeof *some.color);
+        }
+        spl_cloud_destroy(cloud);
+        spl_point_batch_finish(&all);
+        spl_point_batch_finish(&some);
+        free(file.bytes);
+        free(records);
+    }
+}
+
 /* In the middle of a file, of chunks side by side and one after the other. */
 static void reading_is_cancelled(void **state)
 {
@@ -336,6 +373,7 @@ int main(void)
         cmocka_unit_test(wrong_chunks_are_named),
         cmocka_unit_test(wrong_tables_are_named_or_done_without),
         cmocka_unit_test(sampled_colors_are_the_same),
+        cmocka_unit_test(rows_are_gone_to),
         cmocka_unit_test(reading_is_cancelled),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);

@@ -16,6 +16,7 @@
 
 #include "base/memory.h"
 #include "dataset/dataset.h"
+#include "dataset/part_file.h"
 #include "dataset/writer.h"
 #include "support/make_dataset.h"
 
@@ -126,6 +127,49 @@ static void test_replaced_while_mapped(void **state)
 }
 
 /* Every write of finish fails in turn, as on a full disk. */
+static void expect_target(const char *bytes)
+{
+    char have[16] = {0};
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    assert_int_equal(fread(have, 1, sizeof have, file), strlen(bytes));
+    assert_string_equal(have, bytes);
+    fclose(file);
+}
+
+/* Of containers that share a folder, where each process has the same number. */
+static void test_two_writers_of_one_number(void **state)
+{
+    (void)state;
+    struct spl_part_file first, second;
+    struct spl_error err = {0};
+    size_t files = files_in_folder();
+    bool there = !access(path, F_OK);
+    if (spl_part_file_init(&first, path, &err) || spl_part_file_write(&first, 0, "of the first", 12, &err) ||
+        spl_part_file_init(&second, path, &err))
+        fail_msg("%s", err.message);
+    assert_string_not_equal(first.part_path, second.part_path);
+    assert_int_equal(spl_part_file_write(&second, 0, "other", 5, NULL), 0);
+    assert_int_equal(spl_part_file_commit(&first, NULL), 0);
+    spl_part_file_finish(&first);
+    expect_target("of the first");
+    assert_int_equal(spl_part_file_commit(&second, NULL), 0);
+    spl_part_file_finish(&second);
+    expect_target("other");
+    assert_int_equal(files_in_folder(), files + !there);
+    /* what a killed one of this number left is written over */
+    FILE *left = fopen(part_path, "wb");
+    fputs("longer than what comes", left);
+    fclose(left);
+    assert_int_equal(spl_part_file_init(&first, path, NULL), 0);
+    assert_int_equal(spl_part_file_write(&first, 0, "short", 5, NULL), 0);
+    assert_int_equal(spl_part_file_commit(&first, NULL), 0);
+    spl_part_file_finish(&first);
+    expect_target("short");
+    assert_int_equal(files_in_folder(), files + !there);
+    unlink(path);
+}
+
 static void test_full_disk(void **state)
 {
     (void)state;
@@ -231,6 +275,7 @@ int main(void)
         cmocka_unit_test(test_pages),
         cmocka_unit_test(test_unfinished_leaves_the_old_file),
         cmocka_unit_test(test_replaced_while_mapped),
+        cmocka_unit_test(test_two_writers_of_one_number),
         cmocka_unit_test(test_full_disk),
         cmocka_unit_test(test_bad_targets),
         cmocka_unit_test(test_refused_memory),

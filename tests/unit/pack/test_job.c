@@ -212,6 +212,28 @@ static void test_points_outside_of_their_scans_box_are_of_one_part(void **state)
                      SPL_PART_INSIDE);
 }
 
+/* Of a part's blocks and those in its halo each row once, in runs. */
+static void test_rows_of_a_part_come_in_runs(void **state)
+{
+    (void)state;
+    double boxes[9][6]; /* along x; the last is short */
+    const struct spl_part_rules rules = {.min = {2.5, -9, -9}, .max = {4.5, 9, 9}, .halo = 0.4};
+    const struct spl_part_blocks blocks = {(const double(*)[6])boxes, 9, 100, 850};
+    static const double at[9] = {0, 2, 9, 3, 4.8, 4.9, 5, 2.0, 3};
+    uint64_t begin, end, row = 0;
+    for (int i = 0; i < 9; i++)
+        memcpy(boxes[i], (double[6]){at[i], 0, 0, at[i] + 0.5, 1, 1}, sizeof boxes[i]);
+    static const uint64_t runs[][2] = {{100, 200}, {300, 600}, {700, 850}};
+    for (size_t i = 0; i < 3; i++, row = end) {
+        assert_true(spl_part_next_rows(&rules, &blocks, row, &begin, &end));
+        assert_int_equal(begin, runs[i][0]);
+        assert_int_equal(end, runs[i][1]);
+    }
+    assert_false(spl_part_next_rows(&rules, &blocks, row, &begin, &end));
+    assert_true(spl_part_next_rows(&rules, &blocks, 450, &begin, &end)); /* amid a run */
+    assert_true(begin == 450 && end == 600);
+}
+
 static void test_the_halo_is_dropped(void **state)
 {
     (void)state;
@@ -400,6 +422,9 @@ static struct spl_job some_job(void)
             .points = 1000,
             .first_number = (uint32_t)i,
             .box = {{-1, 0.1, 2}, {3, 1e9 / 3, 2}},
+            .block_rows = 400,
+            .block_count = 3,
+            .blocks = calloc(3, sizeof(double[6])),
             .colors = {
                 .from = i ? SPL_COLORS_RGB : SPL_COLORS_INTENSITY, .black = -0.1, .white = 65535, .guessed = true}};
         job.parts[i] = (struct spl_job_box){.min = {i ? 0.7 : -INFINITY, -INFINITY, -INFINITY},
@@ -407,6 +432,7 @@ static struct spl_job some_job(void)
                                             .points = 500,
                                             .halo_points = 7};
     }
+    job.inputs[0].blocks[0][0] = 7.5;
     struct spl_error err = {0};
     if (spl_job_name(&job, &err))
         fail_msg("%s", err.message);
@@ -440,6 +466,7 @@ static void test_a_job_comes_back_as_it_was(void **state)
     assert_int_equal(back.rules.scalars, job.rules.scalars);
     assert_memory_equal(&back.rules.steps[SPL_SCALAR_KEPT].first, &job.rules.steps[SPL_SCALAR_KEPT].first,
                         2 * sizeof(double));
+    assert_memory_equal(back.inputs[0].blocks, job.inputs[0].blocks, 3 * sizeof *job.inputs[0].blocks);
     assert_memory_equal(back.inputs[1].box, job.inputs[1].box, sizeof job.inputs[1].box);
     assert_true(back.inputs[0].ends == job.inputs[0].ends && back.inputs[0].colors.black == -0.1);
     assert_int_equal(back.inputs[0].colors.from, SPL_COLORS_INTENSITY);
@@ -544,6 +571,15 @@ static void test_what_is_no_job_is_refused(void **state)
         {"\"blank\": false", "\"blank\": 0", "blank"},
         {"\"sampled\": false", "\"sampled\": 0", "sampled"},
         {"\"first_number\": 0", "\"first_number\": 4294967296", "first_number"},
+        {"\"block_rows\": 400", "\"block_rows\": 0", "blocks"},
+        {"\"block_rows\": 400", "\"block_rows\": 500", "blocks"},
+        {"\"block_rows\": 400", "\"block_rows\": -1", "block_rows"},
+        {"\"block_rows\": 400", "\"block_rows\": 9007199254740992", "blocks"},
+        {"\"blocks\": [", "\"blocks\": [0,", "blocks"},
+        {"\"blocks\": [", "\"blocks\": {}, \"b\": [", "blocks"},
+        {"\"blocks\": [\n    7.5", "\"blocks\": [null", "blocks"},
+        {"\"blocks\": [\n    7.5", "\"blocks\": [1e13", "blocks"},
+        {"\"blocks\": [\n    7.5", "\"blocks\": [7.25", "id"},
         /* what holds by itself, but is another plan than its id says */
         {"\"points\": 500", "\"points\": 501", "id"},
         {"\"black\": -0.10000000000000001", "\"black\": -0.2", "id"},
@@ -587,6 +623,7 @@ int main(void)
         cmocka_unit_test(test_strays_and_flat_clouds_are_cut_too),
         cmocka_unit_test(test_spacing_is_that_of_surfaces),
         cmocka_unit_test(test_points_outside_of_their_scans_box_are_of_one_part),
+        cmocka_unit_test(test_rows_of_a_part_come_in_runs),
         cmocka_unit_test(test_the_halo_is_dropped),
         cmocka_unit_test(test_cells_of_parts_lie_at_the_same_places),
         cmocka_unit_test(test_paths_are_relative),
