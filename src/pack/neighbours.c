@@ -31,10 +31,11 @@ enum spl_neighbours_set spl_neighbours_limit(enum spl_neighbours_set most)
 {
     most_set = most;
 #if defined(__x86_64__)
-    if (most >= SPL_NEIGHBOURS_AVX512 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-        __builtin_cpu_supports("bmi"))
+    const bool bits = __builtin_cpu_supports("bmi") && __builtin_cpu_supports("popcnt");
+    if (most >= SPL_NEIGHBOURS_AVX512 && bits && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
         return SPL_NEIGHBOURS_AVX512;
-    if (most >= SPL_NEIGHBOURS_AVX2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi"))
+    if (most >= SPL_NEIGHBOURS_AVX2 && bits && __builtin_cpu_supports("avx2"))
         return SPL_NEIGHBOURS_AVX2;
 #endif
     return SPL_NEIGHBOURS_BASE;
