@@ -1,8 +1,25 @@
 /* How the values of attributes, and heights, are distributed over all tiles' leaves, from what each tile says of its
- * own: kinds by their counts, else every interval between two quantiles as so many values in its middle. The caller's
- * thread. */
+ * own: kinds by their counts, else every interval between two quantiles as so many values that lie evenly in it. The
+ * last one is cut at the 99th percentile: a few values far off, as of uncertainties, would have all of it otherwise. The
+ * caller's thread. */
+#include <math.h>
+
 #include "dataset/values.h"
 #include "pack/collect/collect.h"
+
+/* `upto` of the values of all lie below `high`; those that were not given yet, *given, lie evenly from `low` on. */
+static int spread(struct spl_values *to, double low, double high, uint64_t upto, uint64_t *given, struct spl_error *err)
+{
+    enum { places = 8 };
+    const uint64_t before = *given, weight = upto > before ? upto - before : 0;
+    int rc = SPL_OK;
+    for (uint64_t i = 0; !rc && i < places; i++) {
+        uint64_t own = weight * (i + 1) / places - weight * i / places;
+        rc = spl_values_add(to, low + (high - low) * ((double)i + 0.5) / places, own, err);
+    }
+    *given = before + weight;
+    return rc;
+}
 
 static int add(struct spl_values *to, const struct spl_stream_values *from, struct spl_error *err)
 {
@@ -12,11 +29,16 @@ static int add(struct spl_values *to, const struct spl_stream_values *from, stru
     for (uint32_t i = 0; !rc && i < from->kind_count; i++)
         rc = spl_values_add(to, from->kinds[i].value, from->kinds[i].count, err);
     to->too_many_kinds |= !from->kind_count;
-    for (uint64_t q = 0, given = 0; !rc && !from->kind_count && q < SPL_VALUES_QUANTILES; q++) {
-        const uint64_t weight = from->count * (q + 1) / SPL_VALUES_QUANTILES - given;
-        const double *ends = &from->quantiles[q];
-        rc = spl_values_add(to, ends[0] + (ends[1] - ends[0]) / 2, weight, err);
-        given += weight;
+    uint64_t given = 0;
+    for (uint32_t q = 0; !rc && !from->kind_count && q < SPL_VALUES_QUANTILES; q++) {
+        const double *ends = &from->quantiles[q], share = (double)(q + 1) / SPL_VALUES_QUANTILES;
+        const bool last = q + 1 == SPL_VALUES_QUANTILES;
+        const double p99 = fmin(fmax(from->p99, ends[0]), ends[1]);
+        if (last)
+            rc = spread(to, ends[0], p99, (uint64_t)llround(0.99 * (double)from->count), &given, err);
+        if (!rc)
+            rc = spread(to, last ? p99 : ends[0], ends[1],
+                        last ? from->count : (uint64_t)llround(share * (double)from->count), &given, err);
     }
     if (!rc && !from->kind_count) { /* the ends that there are, of which the middles know nothing */
         to->least = fmin(to->least, from->quantiles[0]);
