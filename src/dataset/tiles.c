@@ -80,9 +80,11 @@ static int fail_tile(const struct spl_dataset *dataset, const struct spl_tile *t
 {
     const size_t length = name ? strlen(name) : 0;
     const char *rest = length && !strncmp(message, name, length) ? message + length : message;
-    return spl_fail(err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
-                    "%s: its tile %s cannot be read: %s; put it back, or make the collection anew, with splatd collect",
-                    spl_dataset_get_name(dataset), tile->file, rest + strspn(rest, ": "));
+    return spl_fail(
+        err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
+        "%s: its tile %s cannot be read: %s; put it back, or make the collection anew (splatd collect; of a "
+        "job splatd pack --join)",
+        spl_dataset_get_name(dataset), tile->file, rest + strspn(rest, ": "));
 }
 
 /* Under the lock. */
@@ -95,7 +97,9 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
     int rc = path ? spl_dataset_open_as(path, &how, &own, &why) : SPL_E_NOMEM;
     const char *what = rc ? NULL : judge(dataset, tile, own);
     if (what)
-        rc = spl_fail(err, SPL_E_CORRUPT, "%s: its tile %s %s: make the collection anew, with splatd collect",
+        rc = spl_fail(err, SPL_E_CORRUPT,
+                      "%s: its tile %s %s: make the collection anew (splatd collect; of a job splatd "
+                      "pack --join)",
                       spl_dataset_get_name(dataset), tile->file, what);
     else if (rc)
         rc = fail_tile(dataset, tile, rc, path, why.message, err);

@@ -92,8 +92,13 @@ static int append_scalars(struct spl_points *p, const struct spl_point_batch *ba
     return rc;
 }
 
+/* Of a scan's stations: the first one's, and what they are all below. */
+struct numbers {
+    uint32_t first, end;
+};
+
 static int append(struct spl_points *p, const struct spl_point_batch *batch, const struct spl_cloud_info *info,
-                  uint32_t attributes, uint32_t first_station, const double *scan, struct spl_error *err)
+                  uint32_t attributes, const struct numbers *stations, const double *scan, struct spl_error *err)
 {
     int rc = reserve(p, batch->count, attributes, err);
     if (!rc)
@@ -109,8 +114,8 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
             color = batch->color[i][0] | (uint32_t)batch->color[i][1] << 8 | (uint32_t)batch->color[i][2] << 16;
         p->color_class[at] = color | (uint32_t)batch->classification[i] << 24;
         if (p->station) {
-            uint32_t station = first_station + batch->station[i];
-            bool known = attributes & SPL_CLOUD_STATION && station < SPL_NO_STATION;
+            uint32_t station = stations->first + batch->station[i];
+            bool known = attributes & SPL_CLOUD_STATION && station < stations->end;
             p->station[at] = known ? (uint16_t)station : SPL_NO_STATION;
         }
         for (int c = 0; p->normal && c < 3; c++)
@@ -121,14 +126,14 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
     return 0;
 }
 
-static int keep_stations(struct spl_points *p, const struct spl_cloud_info *info, struct spl_error *err)
+static int keep_stations(struct spl_points *p, const double *poses, uint32_t count, struct spl_error *err)
 {
-    if (!info->station_count)
+    if (!count)
         return 0;
-    if (spl_array_reserve(p->stations, p->station_capacity, (size_t)p->station_count + info->station_count, err))
+    if (spl_array_reserve(p->stations, p->station_capacity, (size_t)p->station_count + count, err))
         return SPL_E_NOMEM;
-    memcpy(p->stations + p->station_count, info->stations, info->station_count * sizeof *p->stations);
-    p->station_count += info->station_count;
+    memcpy(p->stations + p->station_count, poses, count * sizeof *p->stations);
+    p->station_count += count;
     return 0;
 }
 
@@ -166,6 +171,8 @@ static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const
 {
     const struct spl_part_rules *rules = scans->rules;
     size_t count = p->count, first = rules ? scan->first_number : (size_t)(scan - scans->list);
+    const struct numbers own = rules && rules->stations ? (struct numbers){scan->first_number, rules->pose_count}
+                                                        : (struct numbers){p->station_count, SPL_NO_STATION};
     bool stations;
     spl_kept_has_scan(scans, &stations);
     if (!rules && stations)
@@ -174,11 +181,11 @@ static int take_batch(struct spl_points *p, struct spl_point_batch *batch, const
         number_scan(batch, info->attributes, stations, first, beside->numbers);
     size_t inside = batch->count;
     if (rules) /* where it is one of many parts of a large scan, nothing else is asked of the points of the others */
-        inside = spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers,
-                                 beside->halo);
+        inside =
+            spl_part_filter(rules, scan->box[0], scan->box[1], batch, info->scalars, beside->numbers, beside->halo);
     int rc = spl_scan_grow(scan, batch, read, err);
     if (!rc && batch->count)
-        rc = append(p, batch, info, info->attributes, p->station_count, beside->numbers, err);
+        rc = append(p, batch, info, info->attributes, &own, beside->numbers, err);
     if (!rc && rules && batch->count)
         memcpy(p->halo + count, beside->halo, batch->count);
     p->points_read += inside;
@@ -265,8 +272,8 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
             rc = spl_stage_check(stage, err);
     }
     info = spl_cloud_get_info(cloud);
-    if (!rc && attributes & SPL_CLOUD_STATION)
-        rc = keep_stations(p, info, err);
+    if (!rc && attributes & SPL_CLOUD_STATION && !(scans->rules && scans->rules->stations))
+        rc = keep_stations(p, (const double *)info->stations, info->station_count, err);
     if (is_counted_here(scans, scan))
         p->points_skipped += info->points_skipped;
     memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
@@ -381,7 +388,10 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
         rc = SPL_E_NOMEM;
     for (bool again = !rc; again;) {
         size_t count = scans->count;
-        rc = gather(points, &batch, scans, &beside, stage, err);
+        if (scans->rules && scans->rules->stations)
+            rc = keep_stations(points, (const double *)scans->rules->poses, scans->rules->pose_count, err);
+        if (!rc)
+            rc = gather(points, &batch, scans, &beside, stage, err);
         again = !rc && scans->count < count;
         if (again) {
             spl_points_finish(points);

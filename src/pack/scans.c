@@ -115,6 +115,7 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
 void spl_scans_remove(struct spl_scans *scans, size_t place)
 {
     spl_crs_finish(&scans->list[place].coordinates);
+    free(scans->list[place].poses);
     scans->count--;
     memmove(&scans->list[place], &scans->list[place + 1], (scans->count - place) * sizeof *scans->list);
 }
@@ -138,8 +139,10 @@ int spl_scan_grow(struct spl_scan *scan, const struct spl_point_batch *batch, ui
 
 void spl_scans_finish(struct spl_scans *scans)
 {
-    for (size_t i = 0; scans->list && i < scans->count; i++)
+    for (size_t i = 0; scans->list && i < scans->count; i++) {
         spl_crs_finish(&scans->list[i].coordinates);
+        free(scans->list[i].poses);
+    }
     free(scans->list);
     *scans = (struct spl_scans){0};
 }

@@ -29,7 +29,8 @@ struct spl_scan {
     double min[3], max[3];     /* of their coordinates; nothing while there is no point */
     double box[2][3];          /* least and most of them as the header says, or a job knows; where has_box */
     bool has_box;
-    uint32_t stations;         /* that the header names */
+    uint32_t stations;         /* that the header names; after a survey all that it has, and where they are: */
+    double (*poses)[16];       // owned; NULL: not surveyed, or none
     uint64_t rows;             /* as of struct spl_cloud_info */
     uint32_t first_number;     /* of a job: of its points' scan, or of its first station */
     uint64_t points_inside;    /* likewise: of the part, once read */

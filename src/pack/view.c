@@ -16,7 +16,7 @@
 static bool view_from_camera(const struct spl_points *p, struct spl_default_view *view)
 {
     enum { sample_max = 100000 };
-    if (!p->station_count || p->station[0] == SPL_NO_STATION)
+    if (!p->station_count || !p->station || p->station[0] == SPL_NO_STATION)
         return false;
     const double *pose = p->stations[0];
     double depth = 0;

@@ -130,9 +130,11 @@ static void announce(struct spl_service *service)
 {
     const struct spl_catalog *catalog = &service->library->catalog;
     struct spl_pipeline_status status;
-    spl_fleet_get_status(service->views->fleet, &status);
-    spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
-                 status.device.driver, status.device.software ? ", software" : "");
+    for (size_t i = spl_fleet_get_count(service->views->fleet); i-- > 0;) { // the first stays in `status`
+        spl_pipeline_get_status(spl_fleet_get(service->views->fleet, i), &status);
+        spl_log_info("rendering on %s:%u %s (%s)%s", status.device.backend, status.device.index, status.device.name,
+                     status.device.driver, status.device.software ? ", software" : "");
+    }
     for (size_t i = 0; i < catalog->count; i++) {
         const struct spl_catalog_entry *entry = catalog->slots[i].current;
         if (entry)

@@ -31,7 +31,10 @@ def test_the_bytes_are_those_of_one_device():
             two = together(len(views), lambda i: d.ask(VIEW + views[i]))
             for view, a, b in zip(views, one, two):
                 assert (b.status, b.body == a.body, b.headers["ETag"] == a.headers["ETag"]) == (200, True, True), view
-        assert all(device["frame_ms"] > 0 for device in d.status()["devices"]), "one drew everything"
+        status = d.status()
+        assert all(device["frames"] > 0 for device in status["devices"]), "one drew everything"
+        assert sum(device["frames"] for device in status["devices"]) == status["counters"]["frames"]
+        assert sum("rendering on " in line for line in d.lines) == 2
 
 
 def test_views_are_drawn_side_by_side():

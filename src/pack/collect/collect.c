@@ -93,6 +93,21 @@ static int check_meta(const struct spl_collect *c, const json_t *meta, struct sp
                                 c->count, pages, bytes, SPL_META_BYTES_MAX - others);
 }
 
+/* Which station saw a point, as far as it is known: what a default view is found by. */
+static int know_stations(struct spl_points *p, struct spl_error *err)
+{
+    const struct spl_scalar_values *scan = &p->scalar[SPL_SCALAR_SCAN];
+    if (!p->station_count || (p->station_count > 1 && !scan->values))
+        return SPL_OK;
+    if (!(p->station = spl_alloc_raw(p->count ? p->count : 1, sizeof *p->station, err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < p->count; i++) {
+        uint32_t station = p->station_count > 1 ? spl_scalar_number(scan, i) : 0;
+        p->station[i] = station < p->station_count ? (uint16_t)station : SPL_NO_STATION;
+    }
+    return SPL_OK;
+}
+
 static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, const struct spl_pack_options *said,
                  struct spl_dataset_writer *writer, struct spl_emitted *emitted, struct spl_error *err)
 {
@@ -102,6 +117,8 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     unsigned neighbours;
     spl_unit_parse(c->unit, &unit_m);
     int rc = spl_pack_check(said, &neighbours, &chunk, err);
+    if (!rc)
+        rc = know_stations(&c->points, err);
     if (!rc)
         rc = spl_default_view_find(&c->points, unit_m, c->has_sides, spl_thread_count(said->threads), &view, err);
     if (rc)

@@ -35,6 +35,8 @@ struct spl_collect_stream {
     int scalar;                 /* of struct spl_points; negative: -1 - SPL_STREAM_CLASS, … */
 };
 
+enum { SPL_COLLECT_JOB_MAX = 32 };
+
 struct spl_collect {
     const struct spl_collect_options *options;
     struct spl_stage *stage;
@@ -53,6 +55,7 @@ struct spl_collect {
     struct spl_keep keep;
 
     bool has_sides; /* of every tile */
+    char job[SPL_COLLECT_JOB_MAX]; /* of all tiles, where they are parts of one; else "" */
     double bounds[2][3];
     struct spl_points points;
     struct spl_wires wires;

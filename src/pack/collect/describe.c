@@ -54,6 +54,14 @@ static json_t *list_sources(const struct spl_collect *c)
     return sources;
 }
 
+static json_t *describe_pose(const double pose[16])
+{
+    json_t *numbers = json_array();
+    for (int i = 0; i < 16; i++)
+        json_array_append_new(numbers, json_real(pose[i]));
+    return numbers;
+}
+
 json_t *spl_collect_describe(const struct spl_collect *c, const struct spl_tree *tree, uint32_t first,
                              const struct spl_default_view *view)
 {
@@ -61,24 +69,27 @@ json_t *spl_collect_describe(const struct spl_collect *c, const struct spl_tree 
     for (size_t i = 0; i < c->count; i++)
         splats += tree->nodes[first + i].splat_count;
     double radius = find_radius(c, tree, first, splats);
-    json_t *tiles = json_array(), *sources = list_sources(c), *meta = NULL;
+    json_t *tiles = json_array(), *sources = list_sources(c), *stations = json_array(), *meta = NULL;
     bool failed = !(radius > 0);
+    for (uint32_t s = 0; s < c->points.station_count; s++)
+        failed |= json_array_append_new(stations, describe_pose(c->points.stations[s])) != 0;
     for (size_t i = 0; i < c->count; i++)
         failed |= json_object_set_new(c->tiles[i].entry, "node", json_integer((json_int_t)(first + i))) ||
                   json_array_append(tiles, c->tiles[i].entry);
     if (!failed)
         meta = json_pack("{s:I, s:I, s:i, s:f, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f, s:[f, f]}, s:{s:b, s:b}, s:s, s:O?,"
-                         " s:o, s:[], s:o}",
+                         " s:o, s:o, s:o}",
                          "points", (json_int_t)splats, "leaf_splats", (json_int_t)splats, "levels", (int)tree->levels,
                          "splat_radius", radius, "bounds", "min", vector(c->bounds[0]), "max", vector(c->bounds[1]),
                          "default_view", "eye", vector(view->eye), "target", vector(view->target), "up",
                          vector(view->up), "fov", view->fov, "fit", view->fit[0], view->fit[1], "attributes", "color",
                          (int)c->points.has_color, "surface", (int)c->has_surface, "unit", c->unit, "crs", c->crs,
-                         "sources", sources, "stations", "tiles", tiles);
+                         "sources", sources, "stations", stations, "tiles", tiles);
     if (!meta) {
         if (failed) {
             json_decref(tiles);
             json_decref(sources);
+            json_decref(stations);
         }
         return NULL;
     }

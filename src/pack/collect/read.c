@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "pack/collect/collect.h"
 
 /* What no collection has, whatever the other tiles are. */
@@ -54,6 +55,46 @@ static void take_first(struct spl_collect *c, const struct spl_dataset_info *inf
     memcpy(c->points.up, c->up_vector, sizeof c->points.up);
     memcpy(c->bounds[0], info->bounds_min, sizeof c->bounds[0]);
     memcpy(c->bounds[1], info->bounds_max, sizeof c->bounds[1]);
+}
+
+/* Where stations stand, as long as all tiles know the same ones, by the same numbers. */
+static int take_stations(struct spl_collect *c, const struct spl_dataset_info *info, struct spl_error *err)
+{
+    const size_t bytes = info->station_count * sizeof *info->stations;
+    if (!info->station_count || info->stations_of_maps)
+        return SPL_OK;
+    if (!(c->points.stations = spl_alloc_raw(info->station_count, sizeof *c->points.stations, err)))
+        return SPL_E_NOMEM;
+    memcpy(c->points.stations, info->stations, bytes);
+    c->points.station_count = info->station_count;
+    return SPL_OK;
+}
+
+static void compare_stations(struct spl_collect *c, const struct spl_dataset_info *info)
+{
+    const size_t bytes = info->station_count * sizeof *info->stations;
+    if (info->station_count != c->points.station_count || (bytes && memcmp(info->stations, c->points.stations, bytes)))
+        c->points.station_count = 0;
+}
+
+/* The id of the job that the tile is a part of; NULL: none. */
+static const char *get_job(const json_t *meta)
+{
+    return json_string_value(json_object_get(json_object_get(meta, "job"), "id"));
+}
+
+/* Parts of two plans have points in common, or lack some. */
+static int compare_jobs(const struct spl_collect *c, const struct spl_collect_tile *tile, const json_t *meta,
+                        struct spl_error *err)
+{
+    const char *job = get_job(meta);
+    if (!strcmp(job ? job : "", c->job))
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_INPUT, "inputs",
+                          "%.160s is %s%.16s, and %.120s %s%.16s; parts of a plan are put together by themselves: "
+                          "\"splatd pack --part K JOB\" of each that is older, then \"splatd pack --join JOB\"",
+                          tile->path, job ? "a part of plan " : "no part of a plan", job ? job : "", c->first,
+                          *c->job ? "one of plan " : "is none", c->job);
 }
 
 static const char *text_of(const json_t *crs)
@@ -110,12 +151,12 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
                                                          (json_int_t)(rows[p + 1].first_chunk - rows[p].first_chunk),
                                                          (json_int_t)(rows[p + 1].first_id - rows[p].first_id),
                                                          (json_int_t)spl_dataset_get_page_bytes(dataset, p))) != 0;
-    json_t *entry = json_pack(
-        "{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:{s:o, s:o}, s:o}", "file", tile->name, "version",
-        version, "node", (json_int_t)0, "levels", (json_int_t)i->levels, "points", (json_int_t)i->points, "leaf_splats",
-        (json_int_t)i->leaf_splats, "splats", (json_int_t)i->splats, "pieces", (json_int_t)i->pieces, "panels",
-        (json_int_t)i->panels, "panel_points", (json_int_t)i->panel_points, "meshes", (json_int_t)i->meshes, "bounds",
-        "min", vector(i->bounds_min), "max", vector(i->bounds_max), "pages", pages);
+    json_t *entry = json_pack("{s:s, s:s, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:{s:o, s:o}, s:o}", "file",
+                              tile->name, "version", version, "node", (json_int_t)0, "levels", (json_int_t)i->levels,
+                              "points", (json_int_t)i->points, "leaf_splats", (json_int_t)i->leaf_splats, "splats",
+                              (json_int_t)i->splats, "pieces", (json_int_t)i->pieces, "panels", (json_int_t)i->panels,
+                              "panel_points", (json_int_t)i->panel_points, "meshes", (json_int_t)i->meshes, "bounds",
+                              "min", vector(i->bounds_min), "max", vector(i->bounds_max), "pages", pages);
     failed |= !entry || json_object_set_new(entry, "splat_radius", json_real(i->splat_radius)) != 0;
     failed |= !entry || json_object_set_new(entry, "mesh_points", json_integer((json_int_t)i->mesh_points)) != 0;
     if (!failed)
@@ -152,10 +193,16 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const json_t *meta = spl_dataset_get_meta(dataset);
     rc = check(tile, info, err);
-    if (!rc && !c->first)
+    if (!rc && !c->first) {
         take_first(c, info, meta);
-    else if (!rc)
+        snprintf(c->job, sizeof c->job, "%s", get_job(meta) ? get_job(meta) : "");
+        rc = take_stations(c, info, err);
+    } else if (!rc) {
+        compare_stations(c, info);
         rc = compare(c, tile, info, meta, err);
+        if (!rc)
+            rc = compare_jobs(c, tile, meta, err);
+    }
     if (!rc)
         rc = spl_collect_take_streams(c, dataset, tile->path, err);
     if (!rc)

@@ -1,7 +1,7 @@
 /* How the values of attributes, and heights, are distributed over all tiles' leaves, from what each tile says of its
  * own: kinds by their counts, else every interval between two quantiles as so many values that lie evenly in it. The
- * last one is cut at the 99th percentile: a few values far off, as of uncertainties, would have all of it otherwise. The
- * caller's thread. */
+ * last one is cut at the 99th percentile: a few values far off, as of uncertainties, would have all of it otherwise.
+ * The caller's thread. */
 #include <math.h>
 
 #include "dataset/values.h"

@@ -45,6 +45,7 @@ void spl_job_finish(struct spl_job *job)
     }
     free(job->inputs);
     free(job->parts);
+    free(job->poses);
     free(job->folder);
     json_decref(job->document);
     *job = (struct spl_job){0};

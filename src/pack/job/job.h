@@ -42,6 +42,7 @@ struct spl_job {
     double unit_m;                /* as of struct spl_system */
     const char *crs;              // borrowed; may be NULL
     struct spl_part_rules rules;  /* but for the box */
+    double (*poses)[16];          // owned: rules.poses
     struct spl_job_input *inputs; // owned
     size_t input_count;
     struct spl_job_box *parts; // owned

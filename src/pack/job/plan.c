@@ -17,6 +17,7 @@
 #include "pack/job/survey.h"
 #include "pack/kept.h"
 #include "pack/maps/pictures.h"
+#include "pack/points.h"
 #include "pack/said.h"
 #include "pack/warn.h"
 
@@ -144,6 +145,31 @@ static int count_points(struct planning *p, struct spl_error *err)
     return rc;
 }
 
+/* Where they stand, by their numbers: a part reads some of the scans, and knows all stations. */
+static int take_stations(struct planning *p, struct spl_error *err)
+{
+    struct spl_job *job = p->job;
+    uint32_t count = 0;
+    for (size_t i = 0; i < p->scans.count; i++)
+        count += p->scans.list[i].poses ? p->scans.list[i].stations : 0;
+    if (!count)
+        return SPL_OK;
+    if (count >= SPL_NO_STATION)
+        return spl_fail_field(err, SPL_E_LIMIT, "inputs", "%u stations are more than the %u that a dataset may have",
+                              count, SPL_NO_STATION - 1);
+    if (!(job->poses = spl_alloc_raw(count, sizeof *job->poses, err)))
+        return SPL_E_NOMEM;
+    job->rules.poses = (const double(*)[16])job->poses;
+    for (size_t i = 0; i < p->scans.count; i++) {
+        const struct spl_scan *scan = &p->scans.list[i];
+        if (!scan->poses)
+            continue;
+        memcpy(job->poses + job->rules.pose_count, scan->poses, scan->stations * sizeof *scan->poses);
+        job->rules.pose_count += scan->stations;
+    }
+    return SPL_OK;
+}
+
 /* Which scan a point is of is kept as in a pack of all. */
 static void number_scans(struct planning *p)
 {
@@ -206,9 +232,14 @@ static int take_inputs(struct planning *p, struct spl_error *err)
     return rc;
 }
 
-/* A part may be small beside what primitives may be off, where the whole is not. */
+/* A part may be small beside what primitives may be off, where the whole is not; and of its own noise and spacing each
+ * would choose another. */
 static int check_error(const struct planning *p, struct spl_error *err)
 {
+    if (p->options->pack.primitives != SPL_PRIMITIVES_OFF && !(p->options->pack.error > 0))
+        return spl_fail_field(err, SPL_E_USAGE, "error",
+                              "--primitives in parts needs one bound for all of them: say how far a primitive may be "
+                              "off its points, such as --error 5mm");
     const double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
     const struct spl_bound bound = {.error = p->options->pack.error / unit, .unit_m = unit};
     struct spl_points all = {.bounds_min = {INFINITY, INFINITY, INFINITY},
@@ -310,6 +341,8 @@ static int plan(struct planning *p, struct spl_error *err)
         spl_scans_compare(&p->scans, o->warn, o->progress_context);
     if (!rc)
         number_scans(p);
+    if (!rc)
+        rc = take_stations(p, err);
     if (!rc)
         rc = take_inputs(p, err);
     if (!rc)

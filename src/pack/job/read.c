@@ -14,9 +14,11 @@
 #include <unistd.h>
 
 #include "base/memory.h"
+#include "geom/station.h"
 #include "pack/inputs.h"
 #include "pack/job/names.h"
 #include "pack/kept.h"
+#include "pack/points.h"
 #include "pack/scans.h"
 
 enum { file_most = 512 << 20, text_most = 8 << 20 };
@@ -296,6 +298,29 @@ static int read_parts(struct reader *r, const json_t *root, struct spl_job *job)
     return rc;
 }
 
+static int read_poses(struct reader *r, const json_t *root, struct spl_job *job)
+{
+    const json_t *list = json_object_get(root, "poses");
+    const size_t count = json_array_size(list);
+    if (!json_is_array(list) || count >= SPL_NO_STATION)
+        return fail(r, "poses", "must be an array of at most %d matrices", SPL_NO_STATION - 1);
+    if (count && !(job->poses = spl_alloc_raw(count, sizeof *job->poses, r->err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < count; i++) {
+        const json_t *pose = json_array_get(list, i);
+        bool good = json_array_size(pose) == 16;
+        for (size_t k = 0; good && k < 16; k++) {
+            good = json_is_number(json_array_get(pose, k));
+            job->poses[i][k] = json_number_value(json_array_get(pose, k));
+        }
+        if (!good || spl_station_judge(job->poses[i]))
+            return fail(r, "poses", "must be 4 x 4 matrices of finite numbers, whose last row is 0, 0, 0, 1");
+    }
+    job->rules.poses = (const double(*)[16])job->poses;
+    job->rules.pose_count = (uint32_t)count;
+    return SPL_OK;
+}
+
 static bool is_power_of_two(double v)
 {
     int exponent;
@@ -322,6 +347,7 @@ static int read_all(struct reader *r, const json_t *root, struct spl_job *job)
     rc = rc ? rc : read_bool(r, root, "class", &job->rules.has_class);
     rc = rc ? rc : read_bool(r, root, "scan", &job->rules.has_scan);
     rc = rc ? rc : read_bool(r, root, "stations", &job->rules.stations);
+    rc = rc ? rc : read_poses(r, root, job);
     rc = rc ? rc : read_options(r, root, &job->options);
     rc = rc ? rc : read_attributes(r, root, job);
     rc = rc ? rc : read_parts(r, root, job);

@@ -16,6 +16,8 @@ struct spl_part_rules {
     bool has_class;   /* any of the job's scans has one */
     bool has_scan;    /* points know the number of their scan, */
     bool stations;    /* which is that of their station */
+    const double (*poses)[16]; /* of all stations of the job, by their numbers; borrowed. NULL: it has none */
+    uint32_t pose_count;
     uint32_t scalars; /* bit 1 << place in struct spl_points, of those that are kept; how, the next says */
     struct spl_scalar_steps steps[SPL_POINT_SCALARS];
 };

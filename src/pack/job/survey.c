@@ -137,6 +137,12 @@ static int read_scan(struct survey *s, struct spl_scan *scan, struct spl_error *
     }
     info = spl_cloud_get_info(cloud);
     scan->stations = info->station_count;
+    if (!rc && info->station_count) {
+        if ((scan->poses = spl_alloc_raw(info->station_count, sizeof *scan->poses, err)))
+            memcpy(scan->poses, info->stations, info->station_count * sizeof *scan->poses);
+        else
+            rc = SPL_E_NOMEM;
+    }
     memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
     scan->points_inside = read;
     if (rc || read != scan->rows || info->points_skipped)

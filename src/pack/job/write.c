@@ -77,6 +77,18 @@ static json_t *describe_input(const struct spl_job_input *input, bool for_id)
                      (json_int_t)input->block_rows, "blocks", describe_blocks(input));
 }
 
+static json_t *describe_poses(const struct spl_part_rules *rules)
+{
+    json_t *all = json_array();
+    for (uint32_t s = 0; s < rules->pose_count; s++) {
+        json_t *pose = json_array();
+        for (int i = 0; i < 16; i++)
+            json_array_append_new(pose, json_real(rules->poses[s][i]));
+        json_array_append_new(all, pose);
+    }
+    return all;
+}
+
 static json_t *describe_part(const struct spl_job_box *part)
 {
     return json_pack("{s:o, s:o, s:I, s:I}", "min", place(part->min), "max", place(part->max), "points",
@@ -92,13 +104,14 @@ static json_t *describe(const struct spl_job *job, bool for_id)
         failed |= json_array_append_new(inputs, describe_input(&job->inputs[i], for_id)) != 0;
     for (uint32_t k = 0; k < job->part_count; k++)
         failed |= json_array_append_new(parts, describe_part(&job->parts[k])) != 0;
-    json_t *all = json_pack(
-        "{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o}", "format", SPL_JOB_FORMAT,
-        "format_version", SPL_JOB_VERSION, "id", for_id ? "" : job->id, "title", for_id ? NULL : job->options.title,
-        "description", for_id ? NULL : job->options.description, "unit_m", job->unit_m, "crs", job->crs, "halo",
-        job->rules.halo, "cells", job->rules.cells, "class", (int)job->rules.has_class, "scan",
-        (int)job->rules.has_scan, "stations", (int)job->rules.stations, "options", describe_options(&job->options),
-        "attributes", describe_attributes(job), "parts", parts, "inputs", inputs);
+    json_t *all =
+        json_pack("{s:s, s:i, s:s, s:s?, s:s?, s:f, s:s?, s:f, s:f, s:b, s:b, s:b, s:o, s:o, s:o, s:o, s:o}", "format",
+                  SPL_JOB_FORMAT, "format_version", SPL_JOB_VERSION, "id", for_id ? "" : job->id, "title",
+                  for_id ? NULL : job->options.title, "description", for_id ? NULL : job->options.description, "unit_m",
+                  job->unit_m, "crs", job->crs, "halo", job->rules.halo, "cells", job->rules.cells, "class",
+                  (int)job->rules.has_class, "scan", (int)job->rules.has_scan, "stations", (int)job->rules.stations,
+                  "poses", describe_poses(&job->rules), "options", describe_options(&job->options), "attributes",
+                  describe_attributes(job), "parts", parts, "inputs", inputs);
     if (failed) {
         json_decref(all);
         return NULL;

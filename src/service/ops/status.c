@@ -50,6 +50,7 @@ static json_t *describe_pipeline(struct spl_pipeline *pipeline)
     set(json, "device_bytes", count(status.device_bytes));
     set(json, "device_limit_bytes", count(status.device_limit_bytes));
     set(json, "queue_length", count(status.render_length + status.large_length));
+    set(json, "frames", count(status.frames));
     set(json, "frame_ms", json_real(status.frame_ms));
     return json;
 }

@@ -324,6 +324,7 @@ void spl_fleet_get_status(struct spl_fleet *fleet, struct spl_pipeline_status *s
             status->device = one.device;
             status->frame_ms = one.frame_ms;
         }
+        status->frames += one.frames;
         status->device_bytes += one.device_bytes;
         status->device_limit_bytes += one.device_limit_bytes;
         status->pages_pending += one.pages_pending;

@@ -112,6 +112,7 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     spl_frame_end(job->steps, &job->frame);
     job->steps = NULL;
     gpu->frames++;
+    atomic_store(&pipeline->frames, gpu->frames);
     spl_count(pipeline->options.counters, frames);
     follow(&pipeline->frame_ns, job->frame_ns);
     if (job->frame.stats.pages_loaded)

@@ -297,6 +297,7 @@ void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_
         .large_samples = pipeline->large_load.samples,
         .large_samples_max = pipeline->options.samples_max,
         .large_bytes = pipeline->large_load.bytes,
+        .frames = atomic_load(&pipeline->frames),
         .frame_ms = (double)atomic_load(&pipeline->frame_ns) / SPL_NS_PER_MS,
     };
     pthread_mutex_lock(&pipeline->mutex);

@@ -145,6 +145,7 @@ struct spl_pipeline_status {
     size_t render_length, render_capacity, encode_length, encode_capacity;
     size_t large_length;                                    /* views, from submit() to take() */
     uint64_t large_samples, large_samples_max, large_bytes; /* theirs */
+    uint64_t frames;                                        /* that were drawn */
     double frame_ms;                                        /* moving mean */
 };
 void spl_pipeline_get_status(struct spl_pipeline *pipeline, struct spl_pipeline_status *status);

@@ -40,6 +40,7 @@ struct spl_pipeline {
     bool gpu_started, large_started, stopped;
     atomic_size_t in_flight; /* jobs inside; bounded, so that `done` always has room */
     _Atomic uint64_t device_bytes, device_limit_bytes, pages_pending, renderer;
+    _Atomic uint64_t frames;            /* that were drawn */
     _Atomic uint64_t frame_ns, turn_ns; /* moving means: of a frame, and of a turn, a tile at most */
     _Atomic uint64_t moved_ns;          /* when a thread last began or ended a step of its work */
     atomic_int state;                   /* enum spl_pipeline_state */

@@ -411,6 +411,11 @@ static struct spl_job some_job(void)
     job.rules.steps[SPL_SCALAR_INTENSITY] = (struct spl_scalar_steps){true, 0, 1};
     job.rules.steps[SPL_SCALAR_KEPT] = (struct spl_scalar_steps){false, -12345, 0x1p20};
     job.rules.steps[SPL_SCALAR_SCAN] = (struct spl_scalar_steps){true, 0, 1};
+    job.poses = calloc(2, sizeof *job.poses);
+    for (int i = 0; i < 32; i++)
+        job.poses[i / 16][i % 16] = i % 16 == 15 ? 1 : i % 16 == 3 ? 0.1 + i / 16 : i % 5 == 0 && i < 16;
+    job.rules.poses = (const double(*)[16])job.poses;
+    job.rules.pose_count = 2;
     job.inputs = calloc(2, sizeof *job.inputs);
     job.parts = calloc(2, sizeof *job.parts);
     for (int i = 0; i < 2; i++) {
@@ -520,6 +525,10 @@ static void test_what_is_no_job_is_refused(void **state)
         {"\"class\": true", "\"class\": 1", "class"},
         {"\"scan\": true", "\"scan\": \"yes\"", "scan"},
         {"\"stations\": false", "\"station\": false", "stations"},
+        {"\"poses\": [", "\"poses\": 3, \"p\": [", "poses"},
+        {"\"poses\": [", "\"poses\": [[1, 2], ", "poses"},
+        {"1.1000000000000001", "1e300", "poses"},
+        {"1.1000000000000001", "\"1\"", "poses"},
         {"\"options\": {", "\"options\": 3, \"o\": {", "options"},
         {"\"columns\": null", "\"columns\": 3", "columns"},
         {"\"keep\": \"gps_time\"", "\"keep\": \"a,b,c,d,e,f,g,h,i,j,k\"", "keep"},

@@ -369,6 +369,89 @@ static void test_parts_without_points_leave_a_mark(void **state)
         fail_msg("%s", err.message);
 }
 
+/* Ground round a scanner at (40 k, 2, 1.5); numbers in a file are the scanner's own. */
+static void write_station(int k)
+{
+    char name[32];
+    uint64_t random = (uint64_t)k + 3;
+    snprintf(name, sizeof name, "station-%d.ptx", k);
+    FILE *f = fopen(in_folder(name), "wb");
+    assert_non_null(f);
+    fprintf(f, "60\n60\n%d 2 1.5\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n%d 2 1.5 1\n", 40 * k, 40 * k);
+    for (int i = 0; i < 60 * 60; i++)
+        fprintf(f, "%.4f %.4f -1.5 0.5 %d 90 9\n", 24 * uniform(&random) - 12, 8 * uniform(&random) - 4, i % 250);
+    assert_int_equal(fclose(f), 0);
+}
+
+static void check_stations(const char *path, uint64_t least)
+{
+    struct spl_dataset *dataset;
+    assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), 0);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    assert_int_equal(info->station_count, scans);
+    for (int k = 0; k < scans; k++)
+        assert_true(info->stations[k][3] == 40 * k && info->stations[k][11] == 1.5);
+    int stream = spl_dataset_find_stream(dataset, "scan");
+    assert_true(stream >= 0);
+    const struct spl_stream_values *values = spl_dataset_info_get_values(info, (uint32_t)stream);
+    assert_true(values->kind_count >= 1 && values->kind_count <= scans);
+    for (uint32_t i = 0; i < values->kind_count; i++) {
+        assert_true(values->kinds[i].value < scans);
+        assert_true(values->kinds[i].count >= least);
+    }
+    assert_true(least < 2 || values->kind_count == scans);
+    spl_dataset_close(dataset);
+}
+
+/* By their numbers, though a part reads the scans of some alone; and the collection looks as a pack of all does. */
+static void test_all_parts_know_all_stations(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_job job;
+    bool same;
+    char output[700], paths[scans][700];
+    const char *inputs[scans];
+    for (int k = 0; k < scans; k++) {
+        char name[32];
+        write_station(k);
+        snprintf(name, sizeof name, "station-%d.ptx", k);
+        snprintf(paths[k], sizeof paths[k], "%s", in_folder(name));
+        inputs[k] = paths[k];
+    }
+    snprintf(output, sizeof output, "%s", in_folder("stations"));
+    struct spl_plan_options options = {
+        .pack = {.size = sizeof options.pack, .inputs = inputs, .input_count = scans, .output = output, .threads = 1},
+        .parts = scans,
+        .halo = 0.5};
+    if (spl_job_plan(&options, &job, &same, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(job.rules.pose_count, scans);
+    spl_job_finish(&job);
+    for (uint32_t k = 0; k < scans; k++) {
+        pack_well("stations", k, 1, SPL_PART_MADE);
+        check_stations(in_job("stations", part_name(k, "spld")), 1);
+    }
+    if (join("stations", &err))
+        fail_msg("%s", err.message);
+    check_stations(in_job("stations", "all.spld"), 3000);
+
+    /* of two plans, whatever names they have */
+    struct spl_collect_options mixed = {.size = sizeof mixed, .threads = 1, .input_count = 2};
+    const char *tiles[2];
+    char tile[2][800];
+    assert_int_equal(link(in_job("joined", "part-0.spld"), in_job("stations", "other.spld")), 0);
+    snprintf(tile[0], sizeof tile[0], "%s", in_job("stations", "other.spld"));
+    snprintf(tile[1], sizeof tile[1], "%s", in_job("stations", "part-0.spld"));
+    for (int i = 0; i < 2; i++)
+        tiles[i] = tile[i];
+    mixed.inputs = tiles;
+    mixed.output = in_job("stations", "mixed.spld");
+    assert_int_equal(spl_collect(&mixed, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "inputs");
+    unlink(tile[0]);
+}
+
 static void test_what_cannot_be_split_is_refused(void **state)
 {
     (void)state;
@@ -397,6 +480,10 @@ static void test_what_cannot_be_split_is_refused(void **state)
     assert_int_equal(plan("refused", &(struct spl_pack_options){.keep = "amplitude"}, 2, &same, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "keep");
     assert_int_equal(plan("refused", &(struct spl_pack_options){0}, 10001, &same, NULL), SPL_E_USAGE);
+    err = (struct spl_error){0};
+    const struct spl_pack_options unsaid = {.primitives = SPL_PRIMITIVES_ALL};
+    assert_int_equal(plan("refused", &unsaid, 2, &same, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "error");
     /* a tenth of the whole, which no part is as long as */
     const struct spl_pack_options rough = {.primitives = SPL_PRIMITIVES_ALL, .error = 4};
     const struct spl_pack_options bold = {.primitives = SPL_PRIMITIVES_ALL, .error = 5};
@@ -456,6 +543,7 @@ int main(void)
         cmocka_unit_test(test_inputs_that_vanish_or_change_are_named),
         cmocka_unit_test(test_joining_names_what_is_missing_or_foreign),
         cmocka_unit_test(test_parts_without_points_leave_a_mark),
+        cmocka_unit_test(test_all_parts_know_all_stations),
         cmocka_unit_test(test_what_cannot_be_split_is_refused),
         cmocka_unit_test(test_nothing_is_left_of_what_fails),
     };
