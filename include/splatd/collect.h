@@ -26,6 +26,9 @@ struct spl_collect_options {
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
     /* Each collection in a folder, which is no tile: the others are collected without it. May be NULL. */
     void (*left_out)(void *context, const struct spl_error *why);
+    const struct spl_saved_view *default_view; /* this and the next as of struct spl_pack_options */
+    const struct spl_saved_view *views;
+    size_t view_count;
 };
 
 static inline void spl_collect_options_init(struct spl_collect_options *options)

@@ -33,7 +33,8 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
                            struct spl_error *err)
 {
     static const char *const of_part[] = {"part", "memory", "threads", NULL};
-    static const char *const of_join[] = {"join", "output", "title", "description", "threads", NULL};
+    static const char *const of_join[] = {"join", "output",       "title", "description", "threads",
+                                          "view", "default-view", NULL};
     const bool part = a->part != SPL_CMD_PACK_NO_PART;
     if ((a->plan > 0) + part + a->join > 1)
         return spl_fail(err, SPL_E_USAGE, "--plan, --part and --join are three steps: name one of them at a time");
@@ -52,7 +53,8 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
         if (!strncmp(words[i], "--", 2) && words[i][2] && !is_among(words[i], part ? of_part : of_join))
             return spl_fail(
                 err, SPL_E_USAGE, "%.40s is decided by the plan: %s takes %s alone beside the job; name it to --plan",
-                words[i], step, part ? "--memory and --threads" : "-o, --title, --description and --threads");
+                words[i], step, part ? "--memory and --threads"
+                     : "-o, --title, --description, --default-view, --view and --threads");
     if (part && a->pack.output)
         return spl_fail(err, SPL_E_USAGE, "--part writes part-%llu.spld in the job's folder: leave out -o",
                         (unsigned long long)a->part);
@@ -115,6 +117,7 @@ static int plan(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
     const struct spl_plan_options options = {.pack = a->pack, .parts = a->plan, .halo = a->halo};
     struct spl_job job;
     bool unchanged = false;
+    spl_cmd_ignore_limits();
     int rc = spl_job_plan(&options, &job, &unchanged, err);
     spl_cmd_progress_finish(&listener->progress);
     if (rc)
@@ -174,6 +177,9 @@ static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
                                                 .output = a->pack.output ? a->pack.output : output,
                                                 .title = a->pack.title,
                                                 .description = a->pack.description,
+                                                .default_view = a->pack.default_view,
+                                                .views = a->pack.views,
+                                                .view_count = a->pack.view_count,
                                                 .threads = a->pack.threads,
                                                 .progress = a->pack.progress,
                                                 .progress_context = a->pack.progress_context};

@@ -7,4 +7,7 @@
  * limit of its size is an error like a full disk from then on. Copies `path`. Call from the main thread alone. */
 void spl_cmd_remove_unfinished(const char *path);
 
+/* What remove_unfinished() does too: a file that grows beyond what the process may write fails as on a full disk. */
+void spl_cmd_ignore_limits(void);
+
 #endif

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <jansson.h>
+
 #include "base/clock.h"
 #include "base/file.h"
 #include "base/parallel.h"
@@ -104,6 +106,20 @@ static int write_drawing(const struct spl_pack_options *options, const struct sp
               : SPL_OK;
 }
 
+/* A dataset names its scans in JSON. */
+static int check_names(const struct spl_inputs *inputs, struct spl_error *err)
+{
+    for (size_t i = 0; i < inputs->count; i++) {
+        json_t *text = json_string(spl_input_name(inputs->paths[i]));
+        if (!text)
+            return spl_fail_field(err, SPL_E_INPUT, "inputs",
+                                  "%.300s: this name is no UTF-8, in which a dataset names its scans; rename the file",
+                                  inputs->paths[i]);
+        json_decref(text);
+    }
+    return SPL_OK;
+}
+
 static int pack(const struct spl_pack_options *options, struct spl_pack_report *report, struct spl_error *err)
 {
     if (options->points_only && options->photos)
@@ -134,6 +150,10 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
     if (rc)
         return rc;
     spl_inputs_sort(&inputs);
+    if ((rc = check_names(&inputs, err))) {
+        spl_inputs_finish(&inputs);
+        return rc;
+    }
     found.inputs = (const char *const *)inputs.paths;
     found.input_count = inputs.count;
     struct spl_passes p = {.options = &found, .stage = &stage};

@@ -169,6 +169,7 @@ static void on_wake(uv_async_t *handle)
     if (state == SPL_PIPELINE_FAILED && !service->failure.code) {
         service->failure = *spl_fleet_get_failure(service->views->fleet);
         drain(service);
+        spl_waiting_refuse_all(service); // nothing that they wait for will come
     }
 }
 

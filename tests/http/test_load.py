@@ -144,6 +144,19 @@ def test_too_many_losses_end_the_daemon():
     assert any("more than 3 times" in line for line in d.lines), d.lines
 
 
+def test_nobody_waits_for_a_device_that_is_gone():
+    d = Daemon(FAKE, FAKE_FRAME_MS=1, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
+    views = {"views": [{"camera": {"eye": [3 + i, 2, 3], "target": [0, 0, 0]}, "width": 8, "height": 6}
+                       for i in range(12)]}
+    began = time.monotonic()
+    try:
+        assert d.post(views, "/v1/datasets/wall/views").status in (200, 503)
+    except OSError:
+        pass  # it has ended
+    assert d.wait_exit() == 1
+    assert time.monotonic() - began < 6, "the batch waited for its deadline"
+
+
 def test_a_device_that_stays_away_ends_the_daemon():
     d = Daemon(FAKE, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
     assert [d.ask(fresh(SMALL)).status for _ in range(2)] == [200, 503]

@@ -119,7 +119,9 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     int rc = spl_pack_check(said, &neighbours, &chunk, err);
     if (!rc)
         rc = know_stations(&c->points, err);
-    if (!rc)
+    if (!rc && said->default_view)
+        spl_said_view(said->default_view, c->points.up, &view);
+    else if (!rc)
         rc = spl_default_view_find(&c->points, unit_m, c->has_sides, spl_thread_count(said->threads), &view, err);
     if (rc)
         return rc;
@@ -169,7 +171,10 @@ static int collect(const struct spl_collect_options *options, struct spl_error *
                                           .inputs = (const char *const[]){""},
                                           .output = options->output,
                                           .title = options->title,
-                                          .description = options->description};
+                                          .description = options->description,
+                                          .default_view = options->default_view,
+                                          .views = options->views,
+                                          .view_count = options->view_count};
     struct spl_collect c = {.options = options, .stage = &stage};
     struct spl_dataset_writer *writer = NULL;
     struct spl_emitted emitted = {0};

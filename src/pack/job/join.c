@@ -53,7 +53,7 @@ static int check_dataset(const struct spl_job *job, uint32_t number, const char 
 static bool is_marked(const struct spl_job *job, uint32_t number)
 {
     char *path = spl_job_part_path(job, number, true);
-    json_t *mark = path ? json_load_file(path, JSON_REJECT_DUPLICATES, NULL) : NULL;
+    json_t *mark = path ? spl_part_read_mark(path) : NULL;
     bool older, is = mark && !spl_part_recognise(job, number, mark, path, &older, NULL);
     json_decref(mark);
     free(path);
@@ -91,7 +91,13 @@ static int find_parts(const struct spl_job *job, char **paths, size_t *count, st
 int spl_job_join(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err)
 {
     struct spl_collect_options o = *options;
+    const size_t length = strlen(o.output);
     size_t count = 0;
+    if (length < 5 || strcmp(o.output + length - 5, ".spld") != 0)
+        return spl_fail_field(err, SPL_E_USAGE, "output",
+                              "the joined dataset lies beside its parts, under a name that ends in .spld: -o "
+                              "%.300s/NAME.spld, not '%.300s'",
+                              job->folder, o.output);
     char **paths = spl_alloc(job->part_count, sizeof *paths, err);
     int rc = paths ? find_parts(job, paths, &count, err) : SPL_E_NOMEM;
     if (!rc && !count)

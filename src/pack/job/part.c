@@ -128,6 +128,7 @@ void spl_part_view(const struct spl_points *points, struct spl_default_view *vie
     for (int c = 0; c < 3; c++) {
         view->target[c] = points->bounds_min[c] / 2 + points->bounds_max[c] / 2;
         view->eye[c] = view->target[c] + diagonal * (above * up[c] - beside * side[c] / length);
+        view->eye[c] = fmin(fmax(view->eye[c], -SPL_COORDINATE_MAX), SPL_COORDINATE_MAX);
         view->up[c] = up[c];
     }
 }
@@ -196,10 +197,17 @@ static int look_at_dataset(const struct spl_job *job, uint32_t number, const cha
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
+json_t *spl_part_read_mark(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) || !S_ISREG(status.st_mode) ? NULL
+                                                           : json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
+}
+
 static void look_at_mark(const struct spl_job *job, uint32_t number, const char *path, struct there *there)
 {
     bool older;
-    json_t *mark = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
+    json_t *mark = spl_part_read_mark(path);
     if (mark && !spl_part_recognise(job, number, mark, path, &older, NULL))
         there->done = true;
     json_decref(mark);

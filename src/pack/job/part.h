@@ -34,4 +34,7 @@ json_t *spl_part_describe(const struct spl_part *part, uint64_t halo_points);
 int spl_part_recognise(const struct spl_job *job, uint32_t number, const json_t *said, const char *path, bool *older,
                        struct spl_error *err);
 
+/* The mark that a part has no point, parsed; NULL: there is none, or what lies there is none. */
+json_t *spl_part_read_mark(const char *path);
+
 #endif

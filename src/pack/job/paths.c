@@ -21,7 +21,8 @@ static int look_into(const char *path, struct spl_error *err)
     if (!dir)
         return spl_fail_errno(err, errno, "%.300s: this folder cannot be opened", path);
     for (struct dirent *item; (item = readdir(dir));) {
-        if (!strcmp(item->d_name, ".") || !strcmp(item->d_name, ".."))
+        if (!strcmp(item->d_name, ".") || !strcmp(item->d_name, "..") ||
+            !strncmp(item->d_name, "." SPL_JOB_FILE ".", strlen("." SPL_JOB_FILE "."))) /* a killed plan's */
             continue;
         job |= !strcmp(item->d_name, SPL_JOB_FILE);
         if (!other)

@@ -51,9 +51,11 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
                        : o->prune > 1                  ? "--prune"
                        : o->export_primitives          ? "--export-primitives"
                        : o->max_points                 ? "--max-points"
-                       : o->default_view               ? "--default-view"
-                       : o->view_count                 ? "--view"
                                                        : NULL;
+    if (o->default_view || o->view_count)
+        return spl_fail_field(err, SPL_E_USAGE, "plan",
+                              "%s is of the dataset that parts become: name it to --join",
+                              o->default_view ? "--default-view" : "--view");
     if (what)
         return spl_fail_field(err, SPL_E_USAGE, "plan",
                               "%s cannot be split into parts: leave it out, or pack without --plan, in one piece",

@@ -387,7 +387,7 @@ int spl_job_read(struct spl_job *job, const char *folder, struct spl_error *err)
     *job = (struct spl_job){0};
     if (asprintf(&path, "%s/" SPL_JOB_FILE, folder) < 0)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %.300s", folder);
-    int fd = open(path, O_RDONLY | O_CLOEXEC), rc = SPL_OK;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), rc = SPL_OK; // a pipe would wait for who writes
     if (fd < 0 || fstat(fd, &status))
         rc = spl_fail_field(err, errno == ENOENT || errno == ENOTDIR ? SPL_E_NOT_FOUND : SPL_E_IO, "job",
                             "%.300s: %s; a job is a folder that \"splatd pack --plan N IN... -o JOB\" makes", path,

@@ -32,13 +32,15 @@ static int read_at(int fd, char *to, size_t bytes, uint64_t offset, const char *
 int spl_stamp_take(const char *path, uint64_t *bytes, uint64_t *ends, struct spl_error *err)
 {
     struct stat status;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // which a pipe that nobody writes to would hold up
     if (fd < 0)
         return spl_fail_errno(err, errno, "%.300s: cannot be opened", path);
     char *both = spl_alloc_raw(2, end_bytes, err);
     int rc = both ? SPL_OK : SPL_E_NOMEM;
     if (!rc && fstat(fd, &status))
         rc = spl_fail_errno(err, errno, "%.300s: cannot be looked at", path);
+    if (!rc && !S_ISREG(status.st_mode))
+        rc = spl_fail_field(err, SPL_E_INPUT, "path", "%.300s: it is not a regular file", path);
     uint64_t size = rc ? 0 : (uint64_t)status.st_size;
     size_t first = size < end_bytes ? (size_t)size : end_bytes;
     size_t last = size - first < end_bytes ? (size_t)(size - first) : end_bytes;

@@ -356,6 +356,14 @@ static void test_paths_are_relative(void **state)
 static void test_a_folder_of_something_else_is_refused(void **state)
 {
     (void)state;
+    bool made_now;
+    assert_int_equal(mkdir(in_folder("killed"), 0777), 0);
+    folder_put_text("killed/.job.json.77-0", "{"); /* of a plan that was killed */
+    assert_int_equal(spl_job_make_folder(in_folder("killed"), &made_now, NULL), 0);
+    unlink(in_folder("killed/.job.json.77-0"));
+    assert_int_equal(mkfifo(in_folder("killed/job.json"), 0600), 0);
+    struct spl_job pipe;
+    assert_int_equal(spl_job_read(&pipe, in_folder("killed"), NULL), SPL_E_INPUT);
     struct spl_error err = {0};
     bool made;
     assert_int_equal(spl_job_make_folder(in_folder("new"), &made, &err), 0);

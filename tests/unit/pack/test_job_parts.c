@@ -121,18 +121,28 @@ static void pack_well(const char *folder, uint32_t part, unsigned threads, enum 
     assert_int_equal(outcome, wanted);
 }
 
-static int join(const char *folder, struct spl_error *err)
+static int join_as(const char *folder, const char *name, const struct spl_saved_view *view, struct spl_error *err)
 {
     char output[800];
     struct spl_job job;
     int rc = spl_job_read(&job, in_folder(folder), err);
     if (rc)
         return rc;
-    snprintf(output, sizeof output, "%s/all.spld", in_folder(folder));
-    struct spl_collect_options options = {.size = sizeof options, .output = output, .threads = 2};
+    snprintf(output, sizeof output, "%s/%s", in_folder(folder), name);
+    struct spl_collect_options options = {.size = sizeof options,
+                                          .output = output,
+                                          .threads = 2,
+                                          .default_view = view,
+                                          .views = view,
+                                          .view_count = view != NULL};
     rc = spl_job_join(&job, &options, err);
     spl_job_finish(&job);
     return rc;
+}
+
+static int join(const char *folder, struct spl_error *err)
+{
+    return join_as(folder, "all.spld", NULL, err);
 }
 
 static void check_same(const char *folder, const char *other, const char *name)
@@ -436,6 +446,33 @@ static void test_all_parts_know_all_stations(void **state)
         fail_msg("%s", err.message);
     check_stations(in_job("stations", "all.spld"), 3000);
 
+    /* views are the collection's, which has a name of its own */
+    const struct spl_saved_view view = {.name = "door", .eye = {1, 2, 3}, .target = {9, 2, 1}};
+    struct spl_dataset *dataset;
+    if (join_as("stations", "seen.spld", &view, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(spl_dataset_open(in_job("stations", "seen.spld"), true, &dataset, NULL), 0);
+    assert_int_equal(spl_dataset_get_info(dataset)->view_count, 1);
+    assert_true(spl_dataset_get_info(dataset)->default_eye[1] == 2);
+    spl_dataset_close(dataset);
+    unlink(in_job("stations", "seen.spld"));
+    assert_int_equal(join_as("stations", "job.json", NULL, &err), SPL_E_USAGE);
+    assert_int_equal(join_as("stations", "seen", NULL, &err), SPL_E_USAGE);
+    assert_int_equal(spl_job_read(&job, in_folder("stations"), NULL), 0);
+    spl_job_finish(&job);
+
+    /* pipes that nobody writes to are waited for nowhere */
+    unlink(in_folder("station-0.ptx"));
+    assert_int_equal(mkfifo(in_folder("station-0.ptx"), 0600), 0);
+    unlink(in_job("stations", "part-0.spld"));
+    refuse_part("stations", 0, SPL_E_INPUT, "path", "it is not a regular file");
+    assert_int_equal(mkfifo(in_job("stations", part_name(0, "empty")), 0600), 0);
+    refuse_join("stations", SPL_E_NOT_FOUND, "1 of 3 parts are missing: 0;");
+    unlink(in_job("stations", part_name(0, "empty")));
+    unlink(in_folder("station-0.ptx"));
+    write_station(0);
+    pack_well("stations", 0, 1, SPL_PART_MADE);
+
     /* of two plans, whatever names they have */
     struct spl_collect_options mixed = {.size = sizeof mixed, .threads = 1, .input_count = 2};
     const char *tiles[2];
@@ -447,6 +484,7 @@ static void test_all_parts_know_all_stations(void **state)
         tiles[i] = tile[i];
     mixed.inputs = tiles;
     mixed.output = in_job("stations", "mixed.spld");
+    err = (struct spl_error){0};
     assert_int_equal(spl_collect(&mixed, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "inputs");
     unlink(tile[0]);
@@ -472,7 +510,8 @@ static void test_what_cannot_be_split_is_refused(void **state)
         struct spl_error err = {0};
         bool same;
         assert_int_equal(plan("refused", &cases[i].how, 2, &same, &err), SPL_E_USAGE);
-        if (!strstr(err.message, cases[i].says) || !strstr(err.message, "cannot be split"))
+        bool of_join = cases[i].how.default_view || cases[i].how.view_count;
+        if (!strstr(err.message, cases[i].says) || !strstr(err.message, of_join ? "--join" : "cannot be split"))
             fail_msg("%s", err.message);
     }
     struct spl_error err = {0};
@@ -480,6 +519,17 @@ static void test_what_cannot_be_split_is_refused(void **state)
     assert_int_equal(plan("refused", &(struct spl_pack_options){.keep = "amplitude"}, 2, &same, &err), SPL_E_USAGE);
     assert_string_equal(err.field, "keep");
     assert_int_equal(plan("refused", &(struct spl_pack_options){0}, 10001, &same, NULL), SPL_E_USAGE);
+    /* nor is a name that a dataset could not say, which is known at once */
+    const char *unsayable = in_folder("bad\xff.ply");
+    assert_int_equal(link(in_folder("scan-0.ply"), unsayable), 0);
+    char whole[700];
+    snprintf(whole, sizeof whole, "%s", in_folder("unsaid.spld"));
+    const struct spl_pack_options bad_name = {
+        .size = sizeof bad_name, .inputs = &unsayable, .input_count = 1, .output = whole};
+    err = (struct spl_error){0};
+    assert_int_equal(spl_pack(&bad_name, NULL, &err), SPL_E_INPUT);
+    assert_string_equal(err.field, "inputs");
+    unlink(unsayable);
     err = (struct spl_error){0};
     const struct spl_pack_options unsaid = {.primitives = SPL_PRIMITIVES_ALL};
     assert_int_equal(plan("refused", &unsaid, 2, &same, &err), SPL_E_USAGE);
