@@ -224,7 +224,7 @@ def pack():
     peak = usage.ru_maxrss * 1024
     print(f"{points} points in {seconds:.1f} s = {points / seconds:.0f} points/s "
           f"({usage.ru_utime + usage.ru_stime:.1f} s of CPU)")
-    bound("pack, seconds for 700,000 points", 7e5 * seconds / points, 1, "s")
+    bound("pack, seconds for 1,000,000 points", 1e6 * seconds / points, 1, "s")
     bound("pack, peak memory", peak / 2**20, (80 * points + 512e6) / 2**20, "MiB")
     errors = re.search(r"mean errors: position ([\d.]+) % of the radius, normal ([\d.]+) degrees", said)
     bound("mean position error", float(errors[1]), 1.6, "% of the splat radius")
