@@ -1,6 +1,6 @@
 /* What stations add colours to: those of the splats themselves, of a weight that counts where no station sees a sample,
  * and there alone. A power of two, so that they come out of it as they went in. Of method splat they are in the sums;
- * of method nearest (constant 0) they are smoothed payloads. */
+ * of method nearest (constant 0) they are smoothed payloads, which say how far they were bent, not what they weigh. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
@@ -18,7 +18,7 @@ void main()
     vec3 color;
     if (BENT != 0u) {
         precise float row = floor((float(at) + 0.5) / float(frame.width)); /* exact below 2^23 samples */
-        color = smooth_color(ivec2(int(at) - int(row) * int(frame.width), int(row)), at);
+        color = smooth_color(ivec2(int(at) - int(row) * int(frame.width), int(row)), at, false);
     } else {
         uvec4 sum = load_sums(at);
         color = vec3(sum.xyz) / float(sum.w);

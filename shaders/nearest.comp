@@ -1,8 +1,8 @@
 /* Method nearest: each sample keeps the disc whose depth, bent into a cone by as much of the blend margin as the sample
  * lies off the disc's centre, is the least; the least payload among equals. So discs of one surface meet where their
  * cones do, in the middle between their centres, without sums. The payload (constant 0) is what the requested layer
- * needs: colour, octahedral normal, id, what it is, the depth that was not bent, or for maps colour and how far it
- * was. */
+ * needs: colour and how far off its disc's centre the sample lies, octahedral normal, id, what it is, the depth that
+ * was not bent, or for maps colour and how far it was. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/point.glsl"
@@ -46,9 +46,11 @@ void touch(work w, ivec2 sample_at)
     if (distance < 1.0 && sample_at.y <= w.d.last.y) {
         precise float bent = z + w.d.margin * distance + w.d.behind;
         uint at = image_sample_index(sample_at), bits = floatBitsToUint(bent);
+        uint off = uint(distance * 255.0) << 24; /* none of lines, panels and meshes, which weigh 1 */
         SPL_WHERE(wins(at, bits))
             if (!is_trimmed(w.rule, sample_at, z))
                 put(at, bits, GROUP == SPL_SUMS_DEPTH    ? floatBitsToUint(z)
+                              : GROUP == SPL_SUMS_COLOR  ? w.payload | off
                               : GROUP == SPL_SUMS_MAPPED ? w.payload | bend_code(z, bent) << 24
                                                          : w.payload);
     }

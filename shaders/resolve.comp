@@ -136,7 +136,7 @@ uint sample_id(pixel_sample s)
 /* Of the sample at `place`, for which `at` stands. */
 uvec3 drawn_color(ivec2 place, uint at)
 {
-    uvec3 color = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(place, at) + 0.5) : sample_color(at);
+    uvec3 color = RESOLVED == SPL_RESOLVED_BENT ? uvec3(smooth_color(place, at, true) + 0.5) : sample_color(at);
     if (SHADED != 0u)
         color = (color * imageLoad(shade_texels, int(at)).x + SPL_SHADE_WHOLE / 2u) / SPL_SHADE_WHOLE;
     return color;

@@ -44,8 +44,9 @@ uint sample_beside(ivec2 at, int i)
     return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
 }
 
-/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. */
-vec3 smooth_color(ivec2 at, uint own)
+/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. With
+ * `weighted` times what their payloads say of how near to its disc's centre each lies, as discs that blend weigh. */
+vec3 smooth_color(ivec2 at, uint own, bool weighted)
 {
     float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
     vec3 sum = vec3(0.0);
@@ -54,7 +55,9 @@ vec3 smooth_color(ivec2 at, uint own)
         float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
         float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
         weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
-        sum += weight * vec3(unpack_color(payload(beside)));
+        uint word = payload(beside);
+        weight *= weighted ? 1.0 - float(word >> 24) * (1.0 / 255.0) : 1.0;
+        sum += weight * vec3(unpack_color(word));
         weights += weight;
         if (++i >= 9)
             break;

@@ -188,10 +188,11 @@ static uint32_t normal_word(const float n[3])
     return (uint32_t)((e[0] + 1) * 32767 + 0.5f) | (uint32_t)((e[1] + 1) * 32767 + 0.5f) << 16;
 }
 
-/* Method nearest: a fragment whose depth is bent to `bent`; each layer's least payload among equals. */
-static void bend(struct sample *at, const struct disc *d, float z, float bent)
+/* Method nearest: a fragment whose depth is bent to `bent`, `off` 255ths off its disc's centre; each layer's least
+ * payload among equals. */
+static void bend(struct sample *at, const struct disc *d, float z, float bent, uint32_t off)
 {
-    uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16;
+    uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16 | off << 24;
     if (bent > at->first)
         return;
     bool nearer = bent < at->first;
@@ -208,6 +209,7 @@ static void bend(struct sample *at, const struct disc *d, float z, float bent)
  * pushed. */
 struct fragment {
     float z, distance, offset[3], margin, behind;
+    bool whole; /* of a line or a panel, whose samples all weigh 1 in method nearest */
 };
 
 static void draw(struct scene *s, const struct disc *d, struct sample *at, const struct fragment *f, bool shade)
@@ -215,7 +217,8 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
     float z = f->z, pushed = z + f->margin + f->behind;
     bool light = f->distance >= 1; /* a cell that stands for a panel */
     if (!sums(s)) {
-        bend(at, d, z, z + (light ? 0 : f->margin * f->distance) + f->behind);
+        bend(at, d, z, z + (light ? 0 : f->margin * f->distance) + f->behind,
+             f->whole ? 0 : (uint32_t)(f->distance * 255));
         return;
     }
     if (!shade) {
@@ -346,7 +349,8 @@ static void draw_fragment(void *context, const struct reference_fragment *from)
     struct fragment f = {.z = from->z,
                          .distance = from->light,
                          .margin = margin_of(s, radius, from->z, from->slant),
-                         .behind = s->sided && from->behind ? radius : 0};
+                         .behind = s->sided && from->behind ? radius : 0,
+                         .whole = true};
     draw(s, &d, sample_of(s, from->x, from->y), &f, panels->shade);
 }
 
@@ -356,7 +360,7 @@ static void wide_piece(struct scene *s, const struct disc ends[2], const struct 
     const struct reference_capsule c = reference_capsule(&s->camera, cut);
     for (int64_t y = 0; y < s->camera.height; y++)
         for (int64_t x = 0; x < s->camera.width; x++) {
-            struct fragment f = {0};
+            struct fragment f = {.whole = true};
             bool second;
             f.distance = reference_capsule_sample(&c, (int)x, (int)y, &f.z, &second);
             f.margin = margin_of(s, cut->half, f.z, 1);

@@ -53,8 +53,9 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     return found;
 }
 
-/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2. */
-static float smooth_color(const struct scene *s, const struct sample *at, int c)
+/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2; with `weighted` times
+ * how near to its disc's centre each lies. */
+static float smooth_color(const struct scene *s, const struct sample *at, int c, bool weighted)
 {
     int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
     double sum = 0, weights = 0;
@@ -65,6 +66,7 @@ static float smooth_color(const struct scene *s, const struct sample *at, int c)
             double weight = i && j ? 0.5 : i || j ? 1 : 4;
             if (!(fabsf(beside->first - at->first) <= depth_slack(s, at->first, SPL_SMOOTH_SHARE)))
                 continue;
+            weight *= weighted ? 1 - (beside->payload >> 24) / 255.0 : 1;
             sum += weight * (beside->payload >> 8 * c & 255);
             weights += weight;
         }
@@ -78,7 +80,7 @@ static uint64_t color_of(const struct scene *s, const struct sample *at, int c)
         return (uint64_t)(at->mapped[c] + 0.5f);
     if (sums(s))
         return (at->color[c] + at->weight / 2) / at->weight;
-    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c) + 0.5f)
+    return s->view->method == SPL_METHOD_NEAREST ? (uint64_t)(smooth_color(s, at, c, true) + 0.5f)
                                                  : at->payload >> 8 * c & 255;
 }
 
@@ -129,7 +131,7 @@ void reference_add_maps(struct scene *s)
                                           .radius = fmaxf(at->first - depths[i], 0) / fmaxf(s->margin, 1)};
         float weights = SPL_MAP_BASE, sum[3];
         for (int c = 0; c < 3; c++)
-            sum[c] = SPL_MAP_BASE * (sums(s) ? (float)at->color[c] / (float)at->weight : smooth_color(s, at, c));
+            sum[c] = SPL_MAP_BASE * (sums(s) ? (float)at->color[c] / (float)at->weight : smooth_color(s, at, c, false));
         view_point(s, i % width, i / width, depths[i], sample.p);
         surface_step(s, depths, i % width, i / width, 0, sample.right);
         surface_step(s, depths, i % width, i / width, 1, sample.down);

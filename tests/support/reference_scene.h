@@ -20,7 +20,8 @@ struct sample {
     uint32_t fragments; /* discs and panels that cover it */
     uint32_t light;     /* cells of panels that weigh 1 */
     uint32_t word;    /* method fill: depth, spacing, linear */
-    uint32_t payload; /* of the winner, where one wins: colour */
+    uint32_t payload; /* of the winner, where one wins: colour; method nearest: above it 255 times the squared
+                         distance to its disc's centre */
     float normal_winner[3];
     uint64_t color[3], weight;
     uint64_t depth, normal[3];
