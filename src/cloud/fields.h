@@ -18,6 +18,7 @@ struct spl_fields {
     const char *p, *end; /* what is left of the line */
     const char *start;   /* of the field that was taken last */
     char separator;      /* ' ' = runs of blanks and tabs, else ',' or ';' (with blanks around it) */
+    bool comma;          /* numbers have decimal commas, and no points; never where the separator is one */
 };
 
 enum spl_field { SPL_FIELD_END, SPL_FIELD_OK, SPL_FIELD_BAD };
