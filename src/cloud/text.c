@@ -348,13 +348,15 @@ static int refuse_number(const struct spl_cloud *cloud, const struct spl_layout 
     const struct spl_source *source = &cloud->source;
     char shown[32];
     const char *text = spl_fields_show(fields, shown);
+    bool names = column == 0 && cloud->info.guessed[0] && layout->fields > 3 && !strchr("+-.0123456789", text[0]);
     return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, layout->column[column]), err,
                                 "\"%s\" in column %u is not a number%s", text, column + 1,
                                 is_decimal_comma(fields)
                                     ? "; decimal commas are read where no number of the first lines has a point, and "
                                       "semicolons, tabs or blanks separate the columns: write 1.5 for 1,5 (sed "
                                       "'s/,/./g' where commas do not separate them)"
-                                    : "");
+                                : names ? "; where it names points, --columns -,x,y,z and so on skips it"
+                                        : "");
 }
 
 /* Is the field that no number was found in a blank between separators, or behind the line's last,

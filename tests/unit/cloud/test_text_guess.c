@@ -76,7 +76,8 @@ static void a_first_column_of_names_is_skipped(void **state)
     };
     (void)state;
     CHECK(guesses);
-    refused_text("P1,1,2,3\n2,4,5,6\n", SPL_E_INPUT, "x", "\"P1\" in column 1 is not a number");
+    refused_text("P1,1,2,3\n2,4,5,6\n", SPL_E_INPUT, "x",
+                 "\"P1\" in column 1 is not a number; where it names points, --columns -,x,y,z");
     refused_text("P1,1,2\n", SPL_E_INPUT, "x", "there are \"P1,1,2\"");
     refused_text("P1,1,b,3\n", SPL_E_INPUT, "x", "no column has this name");
 }
@@ -102,9 +103,12 @@ static void decimal_commas_are_read(void **state)
     struct loaded l;
     (void)state;
     CHECK(guesses);
-    load_text("a 8,5 1 2 3\n", "-,x,y,z,intensity", &l);
-    assert_point(&l, 0, 8.5, 1, 2);
-    loaded_finish(&l);
+    static const char *const given[] = {"a 8,5 1 2 3\n", "P1\t8,5\t1\t2\t3,5\n", "P,1;8,5;1;2;\n"};
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
+        load_text(given[i], "-,x,y,z,intensity", &l);
+        assert_point(&l, 0, 8.5, 1, 2);
+        loaded_finish(&l);
+    }
     refused_text("1,5;2,5;3,5\n1,5;2.5;3,5\n", SPL_E_INPUT, "x", "decimal commas are read where");
     refused_text("1.234,5;2,5;3,5\n", SPL_E_INPUT, "x", "not a number");
     refused_text("1,5;2,5,1;3,5\n", SPL_E_INPUT, "x", "not a number");
