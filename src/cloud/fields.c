@@ -174,8 +174,7 @@ enum spl_field spl_fields_number(struct spl_fields *fields, double *value)
     fields->start = skip_blanks(fields->p, fields->end);
     if (fields->start == fields->end)
         return SPL_FIELD_END;
-    const char *p =
-        fields->comma ? parse_comma(fields, value) : spl_number_parse(fields->start, fields->end, value);
+    const char *p = fields->comma ? parse_comma(fields, value) : spl_number_parse(fields->start, fields->end, value);
     return p && at_field_end(fields, p) && finish_field(fields, p) ? SPL_FIELD_OK : SPL_FIELD_BAD;
 }
 

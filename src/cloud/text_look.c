@@ -105,8 +105,8 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
         whole &= all[count].is || (names && count == 0);
         count++;
     }
-    bool numbers = layout->fields > 3 && count > 0 && all[0].is && !all[0].sign &&
-                   spl_fields_number(&first, &v) == SPL_FIELD_OK;
+    bool numbers =
+        layout->fields > 3 && count > 0 && all[0].is && !all[0].sign && spl_fields_number(&first, &v) == SPL_FIELD_OK;
     for (int i = 0; i < 3 && numbers; i++) {
         numbers = spl_fields_number(&first, &v) == SPL_FIELD_OK;
         y = i ? y : v;
@@ -128,8 +128,8 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
 
 unsigned spl_text_look_first(const struct spl_text_look *look)
 {
-    bool numbered = !look->unnumbered && look->varies &&
-                    look->lines >= (look->fraction ? COUNTED_LINES : COUNTED_WHOLE_LINES);
+    bool numbered =
+        !look->unnumbered && look->varies && look->lines >= (look->fraction ? COUNTED_LINES : COUNTED_WHOLE_LINES);
     return look->lines > 0 && (numbered || !look->unnamed);
 }
 

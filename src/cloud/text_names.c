@@ -156,7 +156,7 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
  * that is what is meant; without the number it may be, and nobody can tell. */
 static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fields)
 {
-    static const char *const numbers[] = {"nr",     "ptnr",        "pktnr",         "pkt",   "punkt", "pnr",
+    static const char *const numbers[] = {"nr",      "ptnr",        "pktnr",    "pkt",    "punkt",    "pnr",
                                           "punktnr", "punktnummer", "punkt-nr", "pkt-nr", "punktname"};
     static const char *const heights[] = {"h", "hoehe", "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he", "h\xd6he"};
     const char *name;

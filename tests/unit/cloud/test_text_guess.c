@@ -201,9 +201,11 @@ static void headings_in_other_words(void **state)
         struct loaded l;
         char text[200];
         bool commas = strchr(headings[i].heading, ','), semicolons = strchr(headings[i].heading, ';');
-        snprintf(text, sizeof text, commas ? "%s\n1,2,3,255,0,128\n4,5,6,1,2,7\n" :
-                                    semicolons ? "%s\n1;2;3;255;0;128\n4;5;6;1;2;7\n"
-                                               : "%s\n1 2 3 255 0 128\n4 5 6 1 2 7\n", headings[i].heading);
+        snprintf(text, sizeof text,
+                 commas       ? "%s\n1,2,3,255,0,128\n4,5,6,1,2,7\n"
+                 : semicolons ? "%s\n1;2;3;255;0;128\n4;5;6;1;2;7\n"
+                              : "%s\n1 2 3 255 0 128\n4 5 6 1 2 7\n",
+                 headings[i].heading);
         load_text(text, NULL, &l);
         if (strcmp(l.unused, headings[i].unused) != 0 || l.attributes != headings[i].attributes)
             fail_msg("%s: \"%s\" is not used, attributes %x", headings[i].heading, l.unused, l.attributes);
@@ -258,7 +260,7 @@ static void white_is_that_of_the_bits_in_use(void **state)
 {
     static const struct {
         double largest, white;
-    } rows[] = {{1, 1},       {2, 255},     {255, 255},    {256, 65535},  {511, 65535},  {512, 1023},   {1020, 1023},
+    } rows[] = {{1, 1},       {2, 255},      {255, 255},   {256, 65535}, {511, 65535},  {512, 1023},   {1020, 1023},
                 {1023, 1023}, {1024, 65535}, {2048, 4095}, {4095, 4095}, {4096, 65535}, {65535, 65535}};
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
