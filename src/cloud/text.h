@@ -20,8 +20,14 @@ struct spl_layout {
 
 static inline struct spl_fields spl_layout_fields(const struct spl_layout *layout, const char *line, size_t length)
 {
-    return (struct spl_fields){
-        .p = line, .end = line + length, .start = line, .separator = layout->separator, .comma = layout->comma};
+    return spl_fields_begin(line, length, layout->separator);
+}
+
+/* The next field as a number of the text's kind. */
+static inline enum spl_field spl_layout_number(const struct spl_layout *layout, struct spl_fields *fields,
+                                               double *value)
+{
+    return layout->comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
 }
 
 bool spl_layout_has(const struct spl_layout *layout, int column);

@@ -102,7 +102,7 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         size_t text;
         if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
             return false;
-        if (spl_fields_number(&field, &v[i]) != SPL_FIELD_OK)
+        if (spl_layout_number(layout, &field, &v[i]) != SPL_FIELD_OK)
             v[i] = NAN;
     }
     bool whole = spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));

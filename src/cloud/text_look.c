@@ -33,18 +33,22 @@ static bool take_whole(struct spl_fields *fields, struct whole *whole)
     return true;
 }
 
+static enum spl_field take_number(bool comma, struct spl_fields *fields, double *value)
+{
+    return comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
+}
+
 bool spl_text_names_point(const char *line, size_t length, char separator, bool comma)
 {
     struct spl_fields fields = spl_fields_begin(line, length, separator);
     double v;
     size_t length_of;
-    fields.comma = comma;
     struct spl_fields first = fields;
-    if (spl_fields_number(&first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
+    if (take_number(comma, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
         length_of == 0)
         return false;
     for (int i = 0; i < 3; i++)
-        if (spl_fields_number(&fields, &v) != SPL_FIELD_OK)
+        if (take_number(comma, &fields, &v) != SPL_FIELD_OK)
             return false;
     return true;
 }
@@ -67,7 +71,7 @@ bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout
         if (named ? i >= layout->fields || layout->column[i] < 0 : names && i == 0)
             continue;
         bool empty = field.separator == ';' && ignored == 0;
-        commas->bad = !empty && spl_fields_number(&field, &v) != SPL_FIELD_OK;
+        commas->bad = !empty && spl_layout_number(layout, &field, &v) != SPL_FIELD_OK;
         for (size_t k = 0; k < ignored; k++)
             commas->found |= fields.start[k] == ',';
     }
@@ -105,10 +109,10 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
         whole &= all[count].is || (names && count == 0);
         count++;
     }
-    bool numbers =
-        layout->fields > 3 && count > 0 && all[0].is && !all[0].sign && spl_fields_number(&first, &v) == SPL_FIELD_OK;
+    bool numbers = layout->fields > 3 && count > 0 && all[0].is && !all[0].sign &&
+                   spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
     for (int i = 0; i < 3 && numbers; i++) {
-        numbers = spl_fields_number(&first, &v) == SPL_FIELD_OK;
+        numbers = spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
         y = i ? y : v;
     }
     numbers &= !look->lines || all[0].value == look->last + 1;
