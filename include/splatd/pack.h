@@ -127,7 +127,7 @@ struct spl_pack_options {
     /* Each thing in which scans disagree, once they have been read, and wires that are too dear to join: a sentence or
      * two without a newline. May be NULL. */
     void (*warn)(void *context, const char *text);
-    void *progress_context; /* of all three */
+    void *progress_context; /* of all of them */
     const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
     /* Each input that cannot be read, and why: the dataset is made of the others, META names it. NULL: the first one
      * fails all. */
@@ -165,6 +165,9 @@ struct spl_pack_options {
     /* Bytes that the process may take while scans become a dataset; what is beyond lies in files without a name in the
      * output's folder. At least SPL_PACK_MEMORY_MIN; 0 = as much as there is need. The dataset is the same. */
     uint64_t memory_bytes;
+    /* What text scans were taken for where they do not say it, before they are read: a sentence or two without a
+     * newline. May be NULL. */
+    void (*note)(void *context, const char *text);
 };
 
 #define SPL_PACK_MEMORY_MIN (64ull << 20)

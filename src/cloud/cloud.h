@@ -32,7 +32,7 @@ enum spl_scalar {
 /* What a file's colours are made from, and the values that are black and white. */
 struct spl_cloud_colors {
     enum { SPL_COLORS_CONSTANT, SPL_COLORS_RGB, SPL_COLORS_INTENSITY } from; /* the first: the file has neither */
-    double black, white;                                                     /* of RGB 0 and 1, 255 or 65535 */
+    double black, white; /* of RGB 0 and 1, 255, 1023, 4095 or 65535 */
     bool guessed; /* by the values of this file, since their type has room for more */
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
     bool sampled; /* white is what the first points say: spl_cloud_read() may find that it is another */
@@ -91,7 +91,11 @@ struct spl_cloud_info {
     uint64_t points_skipped;              /* non-finite, or PTX "no return" cells */
     uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
     uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
-    char guessed[192]; /* text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "" */
+    /* Text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "". Begins with '-' where the
+     * first numbers or names the points. */
+    char guessed[192];
+    char unused[200]; /* headings of a text whose columns fill nothing, as "Code, Dist"; "" = none */
+    bool surveyors;   /* a text's headings Y and X were taken for east and north, x and y here */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */
     const struct spl_cloud_image *images; /* borrowed until destroy */

@@ -1,6 +1,6 @@
-/* Finding out what a file's colour numbers mean: 8 or 16 bits, 0..1 or 0..255, or intensities whose range becomes grey.
+/* Finding out what a file's colour numbers mean: 8 to 16 bits, 0..1 or 0..255, or intensities whose range becomes grey.
  *
- * Binary colours of an ambiguous type are all looked at (until one exceeds 8 bits), since one dark half of a scan must
+ * Binary colours of an ambiguous type are all looked at (until one needs 16 bits), since one dark half of a scan must
  * not decide for the other; of a file that is slow to read only the first ones where the caller can begin again
  * (SPL_CLOUD_AGAIN). Text is sampled at places all over the file; spl_rows_emit() then refuses a value that
  * contradicts what the samples said, so that no colour is ever wrong in silence. Runs once, inside spl_cloud_open(). */
@@ -15,7 +15,8 @@ enum { PARTS = 64, SAMPLES = 1 << 16, FIRST_ROWS = 4096 };
 
 struct ranges {
     bool colors, intensities; /* which are wanted */
-    bool done;                /* the colours are settled: they have more than 8 bits */
+    bool done;                /* the colours are settled: they have 16 bits */
+    double settled;           /* by a colour above this */
     double color_max;
     double *sample; /* intensities */
     size_t sample_count, sample_limit;
@@ -37,7 +38,7 @@ static void look(struct ranges *ranges, const struct spl_rows *rows)
             if (v > ranges->color_max && is_point(rows, r))
                 ranges->color_max = v;
         }
-    ranges->done = ranges->color_max > 255.5;
+    ranges->done = ranges->color_max > ranges->settled;
     for (size_t r = 0; ranges->intensities && r < rows->count; r++) {
         double v = rows->value[SPL_COLUMN_INTENSITY][r];
         if (ranges->rows++ % ranges->stride == 0 && isfinite(v) && is_point(rows, r) &&
@@ -111,10 +112,19 @@ static struct spl_cloud_colors find_grey(double *sample, size_t count)
     return grey.black < grey.white ? grey : (struct spl_cloud_colors){0};
 }
 
+/* Of colours of more than 8 bits: 10 or 12 of them, where the largest lies in the upper half, else 16. */
+static double white_of_bits(double largest)
+{
+    for (double white = 1023; white < 65535; white = 4 * white + 3)
+        if (largest <= white + 0.5 && largest > white / 2)
+            return white;
+    return 65535;
+}
+
 /* Looks for the largest colour and decides what is white by it. */
 static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
 {
-    struct ranges ranges = {.colors = true};
+    struct ranges ranges = {.colors = true, .settled = cloud->few_bits ? 4095.5 : 255.5};
     /* of a part all points have a say, those too that are not read */
     bool sample = cloud->slow_rows && cloud->options->sample_colors && !cloud->options->max_points;
     int code = sample ? cloud->reader->seek(cloud, 0, PARTS, err) : SPL_OK;
@@ -130,7 +140,7 @@ static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, 
                                "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
     *colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .guessed = true, .white = 1, .sampled = sampled};
     if (ranges.color_max > 255.5)
-        colors->white = 65535;
+        colors->white = cloud->few_bits ? white_of_bits(ranges.color_max) : 65535;
     else if (ranges.color_max > 1.001 || cloud->integer_colors)
         colors->white = 255;
     if (ranges.color_max <= 0) /* colour fields that nobody filled are no colours */
@@ -140,7 +150,7 @@ static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, 
 
 static int find_range(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
 {
-    struct ranges ranges = {.intensities = true};
+    struct ranges ranges = {.intensities = true, .settled = INFINITY};
     bool blank = colors->blank;
     ranges.sample = spl_alloc_raw(SAMPLES, sizeof *ranges.sample, err);
     if (!ranges.sample)

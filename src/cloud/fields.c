@@ -162,6 +162,24 @@ enum spl_field spl_fields_number(struct spl_fields *fields, double *value)
     return p && at_field_end(fields, p) && finish_field(fields, p) ? SPL_FIELD_OK : SPL_FIELD_BAD;
 }
 
+enum spl_field spl_fields_comma_number(struct spl_fields *fields, double *value)
+{
+    char text[64];
+    size_t n = 0;
+    const char *p = fields->start = skip_blanks(fields->p, fields->end);
+    if (p == fields->end)
+        return SPL_FIELD_END;
+    for (; !at_field_end(fields, p); p++) {
+        bool parts = p > fields->start && is_digit(p[-1]) && p + 1 < fields->end && is_digit(p[1]);
+        if (n == sizeof text - 1 || *p == '.' || (*p == ',' && !parts))
+            return SPL_FIELD_BAD;
+        text[n++] = *p == ',' ? '.' : *p;
+    }
+    text[n] = 0;
+    return spl_number_parse(text, text + n, value) == text + n && finish_field(fields, p) ? SPL_FIELD_OK
+                                                                                          : SPL_FIELD_BAD;
+}
+
 enum spl_field spl_fields_text(struct spl_fields *fields, size_t *length)
 {
     const char *p = fields->start = skip_blanks(fields->p, fields->end);

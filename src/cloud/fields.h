@@ -30,6 +30,10 @@ static inline struct spl_fields spl_fields_begin(const char *line, size_t length
 /* Takes the next field as a number; a separator at the end of the line opens no field. */
 enum spl_field spl_fields_number(struct spl_fields *fields, double *value);
 
+/* The same of a number with a comma, between digits, where others have a point, which it must not have. The separator
+ * is no comma. */
+enum spl_field spl_fields_comma_number(struct spl_fields *fields, double *value);
+
 /* Takes the next field whatever it is; its text is [fields->start, fields->start + *length), quotes taken off;
  * "" within quotes is a quotation mark, and stays as it is written. */
 enum spl_field spl_fields_text(struct spl_fields *fields, size_t *length);

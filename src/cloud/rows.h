@@ -52,7 +52,7 @@ static inline bool spl_columns_have3(uint32_t mask, int first)
     return (mask >> first & 7u) == 7u;
 }
 
-struct spl_color_rule spl_color_rule_rgb(double white); /* white = 1, 255 or 65535 */
+struct spl_color_rule spl_color_rule_rgb(double white); /* 1, 255, 1023, … */
 struct spl_color_rule spl_color_rule_grey(double black, double white);
 
 /* Appends the rows to `batch`, which has room for them; rows with a non-finite position are counted in

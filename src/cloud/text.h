@@ -2,6 +2,7 @@
 #ifndef SPL_CLOUD_TEXT_H
 #define SPL_CLOUD_TEXT_H
 
+#include "cloud/fields.h"
 #include "cloud/reader.h"
 
 enum { SPL_TEXT_FIELDS = 64 };
@@ -9,9 +10,28 @@ enum { SPL_TEXT_FIELDS = 64 };
 struct spl_layout {
     int8_t column[SPL_TEXT_FIELDS]; /* enum spl_column of each field */
     unsigned fields;
+    unsigned first; /* recognised columns begin with x here: 1 where a point's number or name comes before */
     bool exact;     /* a line must have `fields` values, not more */
+    bool comma;     /* decimal commas */
+    bool surveyors; /* names: Y and X, the east and the north of German geodesy, are x and y here */
+    bool doubtful;  /* names: they may be that, or not */
     char separator; /* ' ', ',' or ';' */
 };
+
+static inline struct spl_fields spl_layout_fields(const struct spl_layout *layout, const char *line, size_t length)
+{
+    return spl_fields_begin(line, length, layout->separator);
+}
+
+/* The next field as a number of the text's kind. */
+static inline enum spl_field spl_layout_number(const struct spl_layout *layout, struct spl_fields *fields,
+                                               double *value)
+{
+    return layout->comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
+}
+
+bool spl_layout_has(const struct spl_layout *layout, int column);
+uint32_t spl_layout_taken(const struct spl_layout *layout); /* 1 << column of all that it has */
 
 /* The separator that a line uses outside of "quoted text". */
 char spl_text_separator(const char *line, size_t length);
@@ -19,12 +39,59 @@ char spl_text_separator(const char *line, size_t length);
 /* From a line of names. False when there are more than SPL_TEXT_FIELDS; unknown names are skipped columns. */
 bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *keep, const char *line, size_t length);
 
+/* The names of this line that fill nothing, "Code, Dist", into `text`, cut to `size`. */
+void spl_layout_list_unused(const struct spl_layout *layout, const char *line, size_t length, char *text, size_t size);
+
 /* Does a header line name longitudes or latitudes? */
 bool spl_text_names_degrees(const char *line, size_t length);
 
 /* From the option "x,y,z,-,…": unknown names are refused, SPL_E_USAGE, field "columns". */
 int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
                            struct spl_error *err);
+
+/* Do the numbers of a text have decimal commas? All that is a number must be one so, over all lines that are added, and
+ * one must have a comma. Zero-initialised. */
+struct spl_text_commas {
+    unsigned lines;
+    size_t fields;
+    bool found, bad;
+};
+
+/* `layout` has the separator and decimal commas that are tried; `named`: and columns. False: no more lines are asked
+ * for, since this one is none or has another number of columns. */
+bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
+                         size_t length);
+
+/* A text before three numbers. */
+bool spl_text_names_point(const char *line, size_t length, char separator, bool comma);
+
+/* Whole numbers that may be what is before and behind decimal commas, where commas separate columns too. */
+struct spl_text_pairs {
+    bool bad;        /* some are not */
+    bool uneven;     /* those behind have not all as many digits */
+    bool parted;     /* blanks lie between pairs, and none in them */
+    unsigned digits; /* of those behind */
+    unsigned zeros;  /* 1 << field: some of them begins with 0 */
+};
+
+/* What the first columns of lines without names look like. Zero-initialised. */
+struct spl_text_look {
+    unsigned lines;
+    bool unnumbered; /* the first column does not count by one, or too few numbers come behind */
+    bool unnamed;    /* it is no text everywhere */
+    bool varies;     /* the one behind it does */
+    bool fraction;   /* not all are whole numbers */
+    uint64_t last;
+    double y;
+    struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */
+};
+
+/* False when the line has other than layout->fields values. */
+bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length);
+
+/* layout->first, and the column from which on commas are both decimal ones and separators, else -1. */
+unsigned spl_text_look_first(const struct spl_text_look *look);
+int spl_text_look_doubled(const struct spl_text_look *look, char separator);
 
 /* What the first lines look like, from which nameless columns are recognised. Zero-initialised. */
 struct spl_text_sample {

@@ -1,10 +1,10 @@
-/* Which column of a text file is which. Names decide when there are any (a header line, a commented one, the caller's
- * option); otherwise the count and the values do: x y z come first, three neighbours of unit length are a normal, three
- * neighbours of colour-like numbers a colour, what is left at the fourth place or behind the colour an intensity.
+/* Which column of a text file is which. Names decide when there are any (a header line, a commented one: text_names.c;
+ * the caller's option); otherwise the count and the values do: x y z come first, behind a point's number or name where
+ * there is one (text_look.c), three neighbours of unit length are a normal, three neighbours of colour-like numbers a
+ * colour, what is left at the fourth place or behind the colour an intensity.
  * Pure functions. */
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
@@ -21,7 +21,7 @@ char spl_text_separator(const char *line, size_t length)
     return found;
 }
 
-static bool has_column(const struct spl_layout *layout, int column)
+bool spl_layout_has(const struct spl_layout *layout, int column)
 {
     for (unsigned i = 0; i < layout->fields; i++)
         if (layout->column[i] == column)
@@ -29,7 +29,7 @@ static bool has_column(const struct spl_layout *layout, int column)
     return false;
 }
 
-static uint32_t taken(const struct spl_layout *layout)
+uint32_t spl_layout_taken(const struct spl_layout *layout)
 {
     uint32_t columns = 0;
     for (unsigned i = 0; i < layout->fields; i++)
@@ -40,83 +40,9 @@ static uint32_t taken(const struct spl_layout *layout)
 int spl_layout_lacks(const struct spl_layout *layout)
 {
     for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
-        if (!has_column(layout, k))
+        if (!spl_layout_has(layout, k))
             return k;
     return SPL_COLUMN_SKIP;
-}
-
-/* What surveyors call x, y and z, also in German and French; so only where no column has the name itself. Longitudes
- * and latitudes are neither. */
-static int column_from_synonym(const char *name, size_t length)
-{
-    static const struct {
-        const char *name;
-        int column;
-    } synonyms[] = {{"easting", SPL_COLUMN_X},
-                    {"northing", SPL_COLUMN_Y},
-                    {"height", SPL_COLUMN_Z},
-                    {"elevation", SPL_COLUMN_Z},
-                    {"rechtswert", SPL_COLUMN_X},
-                    {"hochwert", SPL_COLUMN_Y},
-                    {"ostwert", SPL_COLUMN_X},
-                    {"nordwert", SPL_COLUMN_Y},
-                    {"hoehe", SPL_COLUMN_Z},
-                    {"h\xc3\xb6he", SPL_COLUMN_Z},
-                    {"H\xc3\x96HE", SPL_COLUMN_Z}, /* no letter of ASCII's, so none that strncasecmp() makes small */
-                    {"h\xf6he", SPL_COLUMN_Z},     /* Latin-1 */
-                    {"x_", SPL_COLUMN_X},
-                    {"y_", SPL_COLUMN_Y},
-                    {"z_", SPL_COLUMN_Z},
-                    {"x-coordinate", SPL_COLUMN_X},
-                    {"y-coordinate", SPL_COLUMN_Y},
-                    {"z-coordinate", SPL_COLUMN_Z},
-                    {"x_coord", SPL_COLUMN_X},
-                    {"y_coord", SPL_COLUMN_Y},
-                    {"z_coord", SPL_COLUMN_Z},
-                    {"coord_x", SPL_COLUMN_X},
-                    {"coord_y", SPL_COLUMN_Y},
-                    {"coord_z", SPL_COLUMN_Z}};
-    for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
-        if (strlen(synonyms[i].name) == length && !strncasecmp(synonyms[i].name, name, length))
-            return synonyms[i].column;
-    return SPL_COLUMN_SKIP;
-}
-
-static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
-{
-    size_t name;
-    for (unsigned i = 0; i < layout->fields && spl_fields_text(&fields, &name) == SPL_FIELD_OK; i++) {
-        int column = column_from_synonym(fields.start, name);
-        if (column >= 0 && layout->column[i] < 0 && !has_column(layout, column))
-            layout->column[i] = (int8_t)column;
-    }
-}
-
-bool spl_text_names_degrees(const char *line, size_t length)
-{
-    static const char *const degrees[] = {"lon", "lat", "long", "longitude", "latitude"};
-    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
-    size_t name;
-    while (spl_fields_text(&fields, &name) == SPL_FIELD_OK)
-        for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++)
-            if (strlen(degrees[i]) == name && !strncasecmp(degrees[i], fields.start, name))
-                return true;
-    return false;
-}
-
-bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *keep, const char *line, size_t length)
-{
-    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length)), again = fields;
-    size_t name;
-    *layout = (struct spl_layout){.exact = true};
-    while (spl_fields_text(&fields, &name) == SPL_FIELD_OK) {
-        if (layout->fields == SPL_TEXT_FIELDS)
-            return false;
-        layout->column[layout->fields] = (int8_t)spl_keep_find_column(keep, taken(layout), fields.start, name);
-        layout->fields++;
-    }
-    take_synonyms(layout, again);
-    return true;
 }
 
 /* A colour or a normal of one or two components would be left out without a word. */
@@ -126,10 +52,10 @@ static int check_threes(const struct spl_layout *layout, struct spl_error *err)
     for (size_t i = 0; i < sizeof firsts / sizeof *firsts; i++)
         for (int k = 0; k < 3; k++) {
             int a = firsts[i] + k, b = firsts[i] + (k + 1) % 3, c = firsts[i] + (k + 2) % 3;
-            if (has_column(layout, a) || !(has_column(layout, b) || has_column(layout, c)))
+            if (spl_layout_has(layout, a) || !(spl_layout_has(layout, b) || spl_layout_has(layout, c)))
                 continue;
-            bool both = has_column(layout, b) && has_column(layout, c);
-            int have = has_column(layout, b) ? b : c;
+            bool both = spl_layout_has(layout, b) && spl_layout_has(layout, c);
+            int have = spl_layout_has(layout, b) ? b : c;
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %s%s%s without %s; '-' skips a column",
                                   spl_column_name(both && c < b ? c : have), both ? " and " : "",
                                   both ? spl_column_name(c < b ? b : c) : "", spl_column_name(a));
@@ -146,7 +72,7 @@ int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *kee
     *layout = (struct spl_layout){0};
     while ((got = spl_fields_text(&fields, &length)) == SPL_FIELD_OK) {
         int known = spl_column_from_name(fields.start, length);
-        int column = spl_keep_find_column(keep, taken(layout), fields.start, length);
+        int column = spl_keep_find_column(keep, spl_layout_taken(layout), fields.start, length);
         if (layout->fields == SPL_TEXT_FIELDS)
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: more than %d names", SPL_TEXT_FIELDS);
         if (known == SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
@@ -168,18 +94,19 @@ int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *kee
 bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout *layout, const char *line,
                          size_t length)
 {
-    struct spl_fields fields = spl_fields_begin(line, length, layout->separator);
+    struct spl_fields fields = spl_layout_fields(layout, line, length);
+    const unsigned at = layout->first;
     double v[SPL_TEXT_FIELDS];
     for (unsigned i = 0; i < layout->fields; i++) {
         struct spl_fields field = fields;
         size_t text;
         if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
             return false;
-        if (spl_fields_number(&field, &v[i]) != SPL_FIELD_OK)
+        if (spl_layout_number(layout, &field, &v[i]) != SPL_FIELD_OK)
             v[i] = NAN;
     }
     bool whole = spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
-    if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2])) /* no point, so the rest of it says nothing */
+    if (!isfinite(v[at]) || !isfinite(v[at + 1]) || !isfinite(v[at + 2])) /* no point, so the rest of it says nothing */
         return whole;
     for (unsigned i = 0; i < layout->fields; i++) {
         sample->fraction[i] |= v[i] != floor(v[i]);
@@ -229,20 +156,21 @@ static bool free3(const struct spl_layout *layout, unsigned at)
 void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sample *sample)
 {
     memset(layout->column, SPL_COLUMN_SKIP, sizeof layout->column);
-    set3(layout, 0, SPL_COLUMN_X);
-    for (unsigned i = 3; i + 2 < layout->fields; i++)
+    const unsigned first = layout->first, behind = first + 3;
+    set3(layout, first, SPL_COLUMN_X);
+    for (unsigned i = behind; i + 2 < layout->fields; i++)
         if (is_normal(sample, i, i + 3 == layout->fields)) {
             set3(layout, i, SPL_COLUMN_NX);
             break;
         }
     /* with seven columns or more, "x y z intensity r g b" (PTS) before "x y z r g b intensity" */
     static const uint8_t order[] = {4, 3, 5, 6, 7, 8, 9, 10};
-    for (unsigned k = layout->fields < 7; k < sizeof order; k++)
-        if (free3(layout, order[k]) && is_color(sample, order[k])) {
-            set3(layout, order[k], SPL_COLUMN_RED);
+    for (unsigned k = layout->fields - first < 7; k < sizeof order; k++)
+        if (free3(layout, first + order[k]) && is_color(sample, first + order[k])) {
+            set3(layout, first + order[k], SPL_COLUMN_RED);
             break;
         }
-    for (unsigned i = 3; i < layout->fields && i < 7; i++)
+    for (unsigned i = behind; i < layout->fields && i < behind + 4; i++)
         if (layout->column[i] < 0) {
             layout->column[i] = SPL_COLUMN_INTENSITY;
             break;

@@ -188,6 +188,8 @@ static json_t *describe(const struct spl_scans *scans, struct spl_scan *scan, co
     json_object_set_new(json, "attributes", list_attributes(info, scan));
     json_object_set_new(json, "fields", info->fields[0] ? spl_info_text(info->fields) : json_null());
     json_object_set_new(json, "columns_by_values", info->guessed[0] ? json_string(info->guessed) : json_null());
+    json_object_set_new(json, "columns_not_used", info->unused[0] ? spl_info_text(info->unused) : json_null());
+    json_object_set_new(json, "y_is_east", json_boolean(info->surveyors));
     json_object_set_new(json, "color_from", options->read ? colors : json_pack("[s]", from[scan->colors.from]));
     json_object_set_new(json, "stations",
                         options->read || info->station_count ? json_integer((json_int_t)info->station_count)
@@ -275,7 +277,12 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
     if (info->fields[0])
         print_text("fields", info->fields);
     if (info->guessed[0])
-        printf("  columns       %s by the values\n", info->guessed);
+        printf("  columns       %s by the values%s\n", info->guessed,
+               info->guessed[0] == '-' ? ": the first numbers or names the points" : "");
+    if (info->surveyors)
+        printf("  columns       Y is the east and X the north, as surveyors have it: x and y here\n");
+    if (info->unused[0])
+        print_text("not used", info->unused);
     if (scan->colors.from != SPL_COLORS_CONSTANT)
         printf("  color from    %s, %g is black and %g white%s\n",
                scan->colors.from == SPL_COLORS_RGB ? "rgb" : "intensity", scan->colors.black, scan->colors.white,

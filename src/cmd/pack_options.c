@@ -366,6 +366,7 @@ int spl_cmd_pack_parse(struct spl_cmd_pack *a, struct spl_cmd_pack_listener *lis
         .pack = {.size = sizeof a->pack,
                  .progress = spl_cmd_progress,
                  .warn = spl_cmd_pack_say_warning,
+                 .note = spl_cmd_pack_say_note,
                  .progress_context = listener},
         .photos = {.size = sizeof a->photos, .trained = spl_cmd_pack_say_trained, .context = listener},
         .maps = {.size = sizeof a->maps},

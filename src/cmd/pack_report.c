@@ -115,12 +115,22 @@ void spl_cmd_pack_say_trained(void *context, uint32_t epoch, double seconds, dou
             atoms_per_splat, atoms);
 }
 
-void spl_cmd_pack_say_warning(void *context, const char *text)
+static void say(void *context, const char *what, const char *text)
 {
     spl_cmd_progress_finish(context);
-    fprintf(stderr, "splatd: warning: ");
+    fprintf(stderr, "splatd: %s: ", what);
     spl_cmd_put_text(stderr, text, 0);
     fputc('\n', stderr);
+}
+
+void spl_cmd_pack_say_warning(void *context, const char *text)
+{
+    say(context, "warning", text);
+}
+
+void spl_cmd_pack_say_note(void *context, const char *text)
+{
+    say(context, "note", text);
 }
 
 void spl_cmd_pack_name_refused(void *context, const struct spl_error *why)

@@ -21,6 +21,7 @@ struct spl_cmd_pack_listener {        /* zero before use */
 void spl_cmd_pack_say_trained(void *context, uint32_t epoch, double seconds, double psnr, double atoms_per_splat,
                               uint32_t atoms);
 void spl_cmd_pack_say_warning(void *context, const char *text);
+void spl_cmd_pack_say_note(void *context, const char *text);
 void spl_cmd_pack_name_refused(void *context, const struct spl_error *why);
 void spl_cmd_pack_say_left_out(void *context, const struct spl_error *why);
 

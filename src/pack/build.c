@@ -397,6 +397,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = spl_dataset_writer_create(out->dataset, &p.writer, err);
     if (!rc)
         rc = open_scans(&p, inputs, &said, err);
+    if (!rc && options->note && !part)
+        spl_scans_tell(&p.scans, options->note, options->progress_context);
     if (!rc) {
         plan(&p, later);
         rc = stage->spill ? begin_spill(&p, later, err) : SPL_OK;

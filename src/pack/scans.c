@@ -74,9 +74,11 @@ int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_clou
     memcpy(scan->box, info->bounds, sizeof scan->box);
     if (fields)
         snprintf(fields, SPL_SCANS_FIELDS, "%s", info->fields);
-    spl_cloud_take_coordinates(cloud, &scan->coordinates);
+    rc = spl_scan_guess(info, &scan->guess, err);
+    if (!rc)
+        spl_cloud_take_coordinates(cloud, &scan->coordinates);
     spl_cloud_destroy(cloud);
-    return SPL_OK;
+    return rc;
 }
 
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
@@ -116,6 +118,7 @@ void spl_scans_remove(struct spl_scans *scans, size_t place)
 {
     spl_crs_finish(&scans->list[place].coordinates);
     free(scans->list[place].poses);
+    free(scans->list[place].guess);
     scans->count--;
     memmove(&scans->list[place], &scans->list[place + 1], (scans->count - place) * sizeof *scans->list);
 }
@@ -142,6 +145,7 @@ void spl_scans_finish(struct spl_scans *scans)
     for (size_t i = 0; scans->list && i < scans->count; i++) {
         spl_crs_finish(&scans->list[i].coordinates);
         free(scans->list[i].poses);
+        free(scans->list[i].guess);
     }
     free(scans->list);
     *scans = (struct spl_scans){0};

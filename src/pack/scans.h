@@ -35,6 +35,7 @@ struct spl_scan {
     uint32_t first_number;     /* of a job: of its points' scan, or of its first station */
     uint64_t points_inside;    /* likewise: of the part, once read */
     struct spl_part_blocks blocks; /* likewise: which of its rows are read */
+    char *guess; // owned; what it was taken for, as spl_scan_guess() says; NULL = nothing to say
 };
 
 enum { SPL_SCANS_FIELDS = 400 };
@@ -58,6 +59,13 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
 /* The part of it that opens one. `fields`: room for the names of the scan's, or NULL. */
 int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
                   struct spl_error *err);
+
+/* What columns and colours of a text were taken for by their values, and which are not used, as a sentence; free().
+ * NULL in *text where there is nothing to say. */
+int spl_scan_guess(const struct spl_cloud_info *info, char **text, struct spl_error *err);
+
+/* Hands that out, for alike scans together. For before reading. */
+void spl_scans_tell(const struct spl_scans *scans, void (*note)(void *context, const char *text), void *context);
 
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
 void spl_scans_remove(struct spl_scans *scans, size_t place);

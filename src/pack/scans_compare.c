@@ -50,7 +50,7 @@ static void compare_kinds(const struct saying *s)
             snprintf(text + used, sizeof text - used, "%s%s in %zu (%s)", kinds++ ? ", " : "", what[from],
                      groups[from].count, spl_names_list(&groups[from]));
     }
-    if (blank.count && s->scans->count > 1)
+    if (blank.count)
         say(s, "colour fields hold nothing but 0 in %s: they were taken as missing", spl_names_list(&blank));
     if (s->scans->how.intensity && !groups[SPL_COLORS_INTENSITY].count && kinds)
         say(s,

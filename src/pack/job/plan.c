@@ -335,6 +335,8 @@ static int plan(struct planning *p, struct spl_error *err)
         rc = spl_scans_init(&p->scans, &p->inputs, &how, &p->stage, err);
     if (!rc)
         rc = spl_kept_check(&p->scans, err);
+    if (!rc && o->note)
+        spl_scans_tell(&p->scans, o->note, o->progress_context);
     if (!rc)
         rc = headers_tell(p) ? take_headers(p, err) : count_points(p, err);
     if (!rc)

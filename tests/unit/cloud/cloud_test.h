@@ -77,7 +77,9 @@ struct loaded {
     char format[8];
     uint32_t attributes, station_count;
     uint64_t points, skipped, expected, end_offset;
-    bool at_most;
+    bool at_most, surveyors;
+    char guessed[192], unused[200];
+    struct spl_cloud_colors colors;
     double station[4][16];
     double sum[3];
     struct spl_point_batch first;
@@ -119,6 +121,10 @@ static inline void load_path(const char *path, const char *columns, size_t capac
         l->skipped = info->points_skipped;
         l->expected = info->points_expected;
         l->at_most = info->points_at_most;
+        l->surveyors = info->surveyors;
+        snprintf(l->guessed, sizeof l->guessed, "%s", info->guessed);
+        snprintf(l->unused, sizeof l->unused, "%s", info->unused);
+        l->colors = info->colors;
         l->end_offset = spl_cloud_get_offset(cloud);
         for (uint32_t s = 0; s < info->station_count && s < 4; s++)
             memcpy(l->station[s], info->stations[s], sizeof l->station[s]);

@@ -125,8 +125,8 @@ static void columns_are_recognised_by_their_values(void **state)
 static void a_header_without_names_asks_for_columns(void **state)
 {
     (void)state;
-    refused_text("east north up\n1 2 3\n", SPL_E_INPUT, "x", "there are \"east north up\", and known are x y z");
-    refused_text("east north up\n1 2 3\n", SPL_E_INPUT, "x", "with --columns");
+    refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "there are \"left back up\", and known are x y z");
+    refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "with --columns");
     refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
     refused_text("x,lat,z\n7,47,3\n", SPL_E_INPUT, "y", "projected first");
 }
@@ -199,16 +199,16 @@ static void words_where_numbers_are_due_are_named(void **state)
     b.length = 0;
     put_text(&b, "P1,1,2,3\n\"P2,4,5,6\n");
     refused(&b, "-,x,y,z", SPL_E_INPUT, "", "line 2: column 1, which is skipped, has a quotation mark");
-    refused_text("P1 1 2 3\n", SPL_E_INPUT, "x", "'-' for one that is none of them");
+    refused_text("P1 1 2\n", SPL_E_INPUT, "x", "'-' for one that is none of them");
 }
 
 static void decimal_commas_are_named(void **state)
 {
     (void)state;
-    static const char *const texts[] = {"1,5;2,5;3,5\n", "x;y;z\n1;2;3\n1,5;2,5;3,5\n", "1,5 2,5 3,5\n",
-                                        "x y z\n1,5 2,5 3,5\n"};
+    static const char *const texts[] = {"1,5;2,5;3.5\n", "x;y;z\n1;2.5;3\n1,5;2,5;3,5\n", "1,5 2,5 3.5\n",
+                                        "x y z\n1,5 2,5 3.5\n"};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
-        refused_text(texts[i], SPL_E_INPUT, i < 2 ? "x" : "y", "decimal commas are not read");
+        refused_text(texts[i], SPL_E_INPUT, i < 2 ? "x" : "y", "decimal commas are read where");
 }
 
 static void counted_files(void **state)
@@ -267,7 +267,7 @@ static void broken_text_is_refused(void **state)
     refused_text("1 2 3\n4 5\n", SPL_E_INPUT, "z", "line 2");
     refused_text("1 2 3\n4 5 6 7\n", SPL_E_INPUT, "", "line 2");
     refused_text("1 2 3\n4 5 six\n", SPL_E_INPUT, "z", "\"six\"");
-    refused_text("1,5;2,5;3,5\n", SPL_E_INPUT, "x", "\"1,5\"");
+    refused_text("1,5;2,5;3.5\n", SPL_E_INPUT, "x", "\"1,5\"");
     refused_text("X,Y,Z\n1,2,3,4\n", SPL_E_INPUT, "", "line 2");
     refused_text("1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
     refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "intensity", "column 7");

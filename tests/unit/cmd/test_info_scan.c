@@ -108,8 +108,23 @@ static void test_columns_by_their_values(void **state)
     json_decref(json);
     assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
     assert_non_null(strstr(output, "\n  columns       x,y,z,nx,ny,nz by the values\n"));
+    write_text("numbered.txt", "1 2.5 0 3\n2 2 4 3\n3 2 5 3\n");
+    assert_int_equal(run("info numbered.txt", output, sizeof output), 0);
+    assert_non_null(
+        strstr(output, "\n  columns       -,x,y,z by the values: the first numbers or names the points\n"));
+    write_text("floor.xyz", "Nr Y X H Rot\nP1 1 2 3 9\n");
+    assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "\n  columns       Y is the east and X the north"));
+    assert_non_null(strstr(output, "\n  not used      Nr, Rot\n"));
+    json = json_of("floor.xyz");
+    assert_true(is(json, "columns_not_used", "\"Nr, Rot\"") && is(json, "y_is_east", "true"));
+    json_decref(json);
+    write_text("floor.xyz", "1 2.5 0 0 0 0\n3 4 5 0 0 0\n");
+    assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
+    assert_non_null(strstr(output, "colour fields hold nothing but 0 in floor.xyz: they were taken as missing"));
     write_text("floor.xyz", "x y z r g b\n1 2 0 0 0 1\n3 4 0 0 0 1\n");
     json = json_of("floor.xyz");
+    assert_true(is(json, "columns_not_used", "null") && is(json, "y_is_east", "false"));
     assert_true(is(json, "columns_by_values", "null") && is(json, "attributes", "[\"color\"]"));
     json_decref(json);
 }

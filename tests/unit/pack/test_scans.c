@@ -165,6 +165,61 @@ static const char *pack_two(const char *a, const char *b, bool intensity, struct
     return said;
 }
 
+/* A text of 20 lines behind a heading; what is noted of it and another one, which may be NULL. */
+static char *write_lines(const char *name, const char *heading, const char *line)
+{
+    char *path = path_of(name);
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fputs(heading, f);
+    for (int i = 0; i < 20; i++)
+        fprintf(f, line, i + 1, i * i % 7);
+    assert_int_equal(fclose(f), 0);
+    return path;
+}
+
+static const char *note_two(const char *a, const char *b)
+{
+    const char *inputs[2] = {a, b};
+    struct spl_pack_options options = {.size = sizeof options,
+                                       .inputs = inputs,
+                                       .input_count = b ? 2 : 1,
+                                       .output = path_of("out.spld"),
+                                       .threads = 1,
+                                       .note = listen};
+    struct spl_error err = {0};
+    said[0] = 0;
+    if (spl_pack(&options, NULL, &err))
+        fail_msg("%s", err.message);
+    return said;
+}
+
+static void test_guesses_are_noted(void **state)
+{
+    static const struct {
+        const char *heading, *line, *note;
+    } rows[] = {
+        {"", "%d.5 %d 3\n", ""},
+        {"x y z r g b\n", "%d.5 %d 3 9 9 9\n", ""},
+        {"", "%d %d.5 4 3\n",
+         "a.txt: columns are -,x,y,z by their values, of which the first numbers or names the points; --columns says "
+         "otherwise\n"},
+        {"", "%d.5 %d 4 0 0 1\n", "a.txt: columns are x,y,z,nx,ny,nz by their values; --columns says otherwise\n"},
+        {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
+        {"Nr Y X H\n", "P%d %d 4 3\n",
+         "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
+        {"x y z r g b\n", "%d.5 %d 3 9 1020 9\n", "a.txt: 0 is black and 1023 white by the largest colour\n"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        assert_string_equal(note_two(write_lines("a.txt", rows[i].heading, rows[i].line), NULL), rows[i].note);
+    char *a = write_lines("a.txt", "", "%d.5 %d 4 2\n"), *b = write_lines("b.txt", "", "3%d.5 %d 4 7\n");
+    assert_string_equal(note_two(a, b),
+                        "a.txt, b.txt: columns are x,y,z,intensity by their values; --columns says otherwise\n");
+    b = write_lines("b.txt", "x y z foo\n", "3%d.5 %d 4 7\n");
+    assert_non_null(strstr(note_two(a, b), "otherwise\nb.txt: columns not used: foo\n"));
+}
+
 static const char *grey_fields = "float intensity", *rgb_fields = "uchar red,uchar green,uchar blue";
 
 static void test_agreement_says_nothing(void **state)
@@ -175,6 +230,14 @@ static void test_agreement_says_nothing(void **state)
     assert_string_equal(
         pack_two(write_ply("c.ply", 0, grey_fields, "%d"), write_ply("d.ply", 10, grey_fields, "1%02d"), false, NULL),
         "");
+}
+
+static void test_colours_that_nobody_filled_are_told(void **state)
+{
+    (void)state;
+    char *a = write_ply("a.ply", 0, "ushort red,ushort green,ushort blue", "0 0 0");
+    assert_string_equal(pack_two(a, NULL, false, NULL),
+                        "colour fields hold nothing but 0 in a.ply: they were taken as missing\n");
 }
 
 static void test_kinds_are_said_and_remembered(void **state)
@@ -552,6 +615,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_agreement_says_nothing),
+        cmocka_unit_test(test_guesses_are_noted),
+        cmocka_unit_test(test_colours_that_nobody_filled_are_told),
         cmocka_unit_test(test_kinds_are_said_and_remembered),
         cmocka_unit_test(test_one_file_may_disagree_with_itself),
         cmocka_unit_test(test_intensities_share_a_scale),

@@ -1,0 +1,152 @@
+/* How a text without names is written, by its first lines: does its first column number or name the points, have its
+ * numbers decimal commas? And are commas both those and what separates columns, so that nobody can tell them apart?
+ * Pure functions.
+ *
+ * A first column that counts by one may also be x along a row of a grid of whole metres: there y stays the same. */
+#include <math.h>
+
+#include "cloud/fields.h"
+#include "cloud/text.h"
+
+/* Fewer count by chance; of nothing but whole numbers a diagonal does. */
+enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
+
+/* The next field as a whole number, with zeros in front and a sign if need be. */
+struct whole {
+    bool is, sign, zeros, blank; /* zeros: in front, of more digits than one; blank: before it */
+    unsigned digits;
+    uint64_t value;
+};
+
+static bool take_whole(struct spl_fields *fields, struct whole *whole)
+{
+    const char *before = fields->p;
+    size_t length;
+    if (spl_fields_text(fields, &length) != SPL_FIELD_OK)
+        return false;
+    const char *p = fields->start, *end = p + length;
+    *whole = (struct whole){.sign = length && (*p == '-' || *p == '+'), .blank = p > before};
+    p += whole->sign;
+    whole->digits = (unsigned)(end - p);
+    whole->zeros = end - p > 1 && *p == '0';
+    whole->is = p < end && spl_integer_parse(p, end, &whole->value) == end;
+    return true;
+}
+
+static enum spl_field take_number(bool comma, struct spl_fields *fields, double *value)
+{
+    return comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
+}
+
+bool spl_text_names_point(const char *line, size_t length, char separator, bool comma)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, separator);
+    double v;
+    size_t length_of;
+    struct spl_fields first = fields;
+    if (take_number(comma, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
+        length_of == 0)
+        return false;
+    for (int i = 0; i < 3; i++)
+        if (take_number(comma, &fields, &v) != SPL_FIELD_OK)
+            return false;
+    return true;
+}
+
+bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
+                         size_t length)
+{
+    struct spl_fields fields = spl_layout_fields(layout, line, length);
+    size_t count = spl_fields_count(line, length, layout->separator), ignored;
+    bool names = !named && count > 3 && spl_text_names_point(line, length, layout->separator, true);
+    bool same = named || commas->lines == 0 || count == commas->fields; /* names: the last may be empty */
+    commas->fields = count;
+    if (!same || count < 3)
+        return false;
+    commas->lines++;
+    for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !commas->bad; i++) {
+        struct spl_fields field = fields;
+        double v;
+        spl_fields_text(&fields, &ignored);
+        if (named ? i >= layout->fields || layout->column[i] < 0 : names && i == 0)
+            continue;
+        bool empty = field.separator == ';' && ignored == 0;
+        commas->bad = !empty && spl_layout_number(layout, &field, &v) != SPL_FIELD_OK;
+        for (size_t k = 0; k < ignored; k++)
+            commas->found |= fields.start[k] == ',';
+    }
+    return !commas->bad;
+}
+
+static void look_at_pairs(struct spl_text_look *look, unsigned at, const struct whole *all, unsigned count)
+{
+    struct spl_text_pairs *pairs = &look->pairs[at];
+    pairs->bad |= count < at + 6;
+    for (unsigned i = 0; i < 6 && !pairs->bad; i++) {
+        const struct whole *w = &all[at + i];
+        bool behind = i % 2; /* the comma */
+        pairs->bad |= !w->is || (behind ? w->sign || w->blank : w->zeros);
+        pairs->parted &= i == 0 || behind || w->blank;
+        if (!behind)
+            continue;
+        pairs->zeros |= (unsigned)w->zeros << i;
+        pairs->uneven |= pairs->digits && pairs->digits != w->digits;
+        pairs->digits = w->digits;
+    }
+}
+
+bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length)
+{
+    struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
+    struct whole all[SPL_TEXT_FIELDS];
+    double v = 0, y = 0;
+    unsigned count = 0;
+    bool whole = true;
+    if (spl_fields_count(line, length, layout->separator) != layout->fields)
+        return false;
+    bool names = spl_text_names_point(line, length, layout->separator, layout->comma);
+    while (count < layout->fields && take_whole(&fields, &all[count])) {
+        whole &= all[count].is || (names && count == 0);
+        count++;
+    }
+    bool numbers = layout->fields > 3 && count > 0 && all[0].is && !all[0].sign &&
+                   spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
+    for (int i = 0; i < 3 && numbers; i++) {
+        numbers = spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
+        y = i ? y : v;
+    }
+    numbers &= !look->lines || all[0].value == look->last + 1;
+    look->varies |= numbers && look->lines && y != look->y;
+    look->y = numbers ? y : look->y;
+    look->last = count > 0 ? all[0].value : 0;
+    look->unnumbered |= !numbers;
+    look->unnamed |= !names;
+    look->fraction |= !whole;
+    for (unsigned at = 0; at < 2 && !look->fraction; at++) {
+        look->pairs[at].parted |= !look->lines;
+        look_at_pairs(look, at, all, count);
+    }
+    look->lines++;
+    return true;
+}
+
+unsigned spl_text_look_first(const struct spl_text_look *look)
+{
+    bool numbered =
+        !look->unnumbered && look->varies && look->lines >= (look->fraction ? COUNTED_LINES : COUNTED_WHOLE_LINES);
+    return look->lines > 0 && (numbered || !look->unnamed);
+}
+
+/* Whole numbers have no zeros in front, decimals have, every tenth. */
+int spl_text_look_doubled(const struct spl_text_look *look, char separator)
+{
+    for (int at = 0; at < 2 && separator == ',' && look->lines && !look->fraction; at++) {
+        const struct spl_text_pairs *pairs = &look->pairs[at];
+        bool several = (pairs->zeros & (pairs->zeros - 1)) != 0;
+        bool even = !pairs->uneven && pairs->digits > 1;
+        bool behind = at == 0 || !look->unnamed || (!look->unnumbered && look->lines >= COUNTED_LINES);
+        if (!pairs->bad && behind && (several || (even && pairs->zeros) || pairs->parted))
+            return at;
+    }
+    return -1;
+}

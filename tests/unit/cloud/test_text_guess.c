@@ -1,0 +1,292 @@
+/* What a text is taken for where it does not say so plainly: numbers and names of points, decimal commas, headings in
+ * the words of surveyors and other languages, the white of colours. */
+#include "cloud_test.h"
+
+/* A text, what its columns are taken for, and its first and last point. */
+struct guess {
+    const char *text, *columns;
+    double first[3], last[3];
+};
+
+static void check(const struct guess *guesses, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        struct loaded l;
+        load_text(guesses[i].text, NULL, &l);
+        if (strcmp(l.guessed, guesses[i].columns) != 0)
+            fail_msg("%zu: \"%s\" instead of \"%s\"", i, l.guessed, guesses[i].columns);
+        const double *a = guesses[i].first, *b = guesses[i].last;
+        assert_point(&l, 0, a[0], a[1], a[2]);
+        assert_point(&l, l.points - 1, b[0], b[1], b[2]);
+        loaded_finish(&l);
+    }
+}
+
+#define CHECK(guesses) check(guesses, sizeof(guesses) / sizeof *(guesses))
+
+static void a_first_column_that_counts_is_no_x(void **state)
+{
+    static const struct guess guesses[] = {
+        {"1 8.355 -0.0003 2.2079\n2 8.3 0 2.2\n3 8.2 1 2.1\n", "-,x,y,z", {8.355, -0.0003, 2.2079}, {8.2, 1, 2.1}},
+        {"0,8,5,2\n1,7,5,2.5\n2,6,5,2\n", "-,x,y,z", {8, 5, 2}, {6, 5, 2}},
+        {"1001;8.5;1;2;10;20;30\n1002;8;1;2;255;0;1\n1003;7;1;2;9;9;9\n",
+         "-,x,y,z,red,green,blue",
+         {8.5, 1, 2},
+         {7, 1, 2}},
+        {"3\n1 8 1 2 -900 10 20 30\n2 8.5 1 2 600 255 0 1\n3 7 1 2 -3.5 9 9 9\n",
+         "-,x,y,z,intensity,red,green,blue",
+         {8, 1, 2},
+         {7, 1, 2}},
+        {"1 8.0 1 2 0 0 1\n2 8.5 1 2 0 0.6 -0.8\n3 7 1 2 1 0 0\n", "-,x,y,z,nx,ny,nz", {8, 1, 2}, {7, 1, 2}},
+        {"1 nan nan nan\n2 8.5 1 2\n3 7 1 2\n", "-,x,y,z", {8.5, 1, 2}, {7, 1, 2}},
+        /* what does not count, or has no point behind it */
+        {"1 8.5 1\n2 7 1\n3 6 1\n", "x,y,z", {1, 8.5, 1}, {3, 6, 1}},
+        {"1 8.5 1 2\n2 7 1 2\n4 6 1 2\n", "x,y,z,intensity", {1, 8.5, 1}, {4, 6, 1}},
+        {"1.0 8 1 2\n2.0 7 1 2\n3.0 6 1 2\n", "x,y,z,intensity", {1, 8, 1}, {3, 6, 1}},
+        {"-1 8.5 1 2\n0 7 1 2\n1 6 1 2\n", "x,y,z,intensity", {-1, 8.5, 1}, {1, 6, 1}},
+        {"1 1 1 25\n2 2 2 30\n3 3 3 35\n", "x,y,z,intensity", {1, 1, 1}, {3, 3, 3}},
+        {"1 8 1 2\n2 7.5 1 2\n", "x,y,z,intensity", {1, 8, 1}, {2, 7.5, 1}},
+        /* along a row of a grid of whole metres y stays the same */
+        {"500 80 1.5 2\n501 80 1.25 2\n502 80 1 2\n503 80 1 1\n", "x,y,z,intensity", {500, 80, 1.5}, {503, 80, 1}},
+    };
+    (void)state;
+    CHECK(guesses);
+    for (int lines = 99; lines < 101; lines++) { /* millimetres, whole ones */
+        struct loaded l;
+        FILE *f = fopen(scratch_path(), "w");
+        assert_non_null(f);
+        for (int i = 0; i < lines; i++)
+            fprintf(f, "%d %d 1 2\n", i + 7, i * i);
+        fclose(f);
+        load_path(scratch_path(), NULL, 100, &l);
+        assert_string_equal(l.guessed, lines < 100 ? "x,y,z,intensity" : "-,x,y,z");
+        loaded_finish(&l);
+    }
+}
+
+static void a_first_column_of_names_is_skipped(void **state)
+{
+    static const struct guess guesses[] = {
+        {"P1,9.56,2,3\nP2,4,5,6\n", "-,x,y,z", {9.56, 2, 3}, {4, 5, 6}},
+        {"P1 1 2 3\n", "-,x,y,z", {1, 2, 3}, {1, 2, 3}},
+        {"\"P;1\";1;2;3;10;20;30\n\"P 2\";4;5;6;255;0;0\n", "-,x,y,z,red,green,blue", {1, 2, 3}, {4, 5, 6}},
+        {"# by hand\nBaum\t1\t2\t3\nHaus\t4\t5\t6\n", "-,x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"P1\t1,5\t2,5\t3,5\nP2\t4,5\t5\t6\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
+        {"P1;1,5;2,5;3,5\nP2;4,5;5;6\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
+    };
+    (void)state;
+    CHECK(guesses);
+    refused_text("P1,1,2,3\n2,4,5,6\n", SPL_E_INPUT, "x",
+                 "\"P1\" in column 1 is not a number; where it names points, --columns -,x,y,z");
+    refused_text("P1,1,2\n", SPL_E_INPUT, "x", "there are \"P1,1,2\"");
+    refused_text("P1,1,b,3\n", SPL_E_INPUT, "x", "no column has this name");
+}
+
+static void decimal_commas_are_read(void **state)
+{
+    static const struct guess guesses[] = {
+        {"8,3550;-0,0003;2,2079\n1;-2,5e1;+3\n", "x,y,z", {8.355, -0.0003, 2.2079}, {1, -25, 3}},
+        {"8,3550\t-0,0003\t2,2079\n1\t-2,5\t0,5\n", "x,y,z", {8.355, -0.0003, 2.2079}, {1, -2.5, 0.5}},
+        {"8,3550  -0,0003 2,2079 \n1 -2,5 3\n", "x,y,z", {8.355, -0.0003, 2.2079}, {1, -2.5, 3}},
+        {"1;2;3\n1,5;2,5;3,5\n", "x,y,z", {1, 2, 3}, {1.5, 2.5, 3.5}},
+        {"1 2 3\n1,5 2,5 3,5\n", "x,y,z", {1, 2, 3}, {1.5, 2.5, 3.5}},
+        {"1;8,5;2;3\n2;8,6;2;3\n3;8,7;2;3,25\n", "-,x,y,z", {8.5, 2, 3}, {8.7, 2, 3.25}},
+        {"8,3;1;2;10;20;30\n1;-2,5;3;255;0;0\n", "x,y,z,red,green,blue", {8.3, 1, 2}, {1, -2.5, 3}},
+        {"x;y;z;Code;Intensity\n1,5;2,5;3,5;a,b.c;\n4;5,5;6;;7,5\n", "", {1.5, 2.5, 3.5}, {4, 5.5, 6}},
+        {"//X Y Z\n8,35 1 2,5\n1 2 3\n", "", {8.35, 1, 2.5}, {1, 2, 3}},
+        {"1234567890,12345678901234567890;2;3\n1;2;3\n", "x,y,z", {1234567890.1234567890, 2, 3}, {1, 2, 3}},
+        /* these commas are separators */
+        {"1, 2, 3\n4 ,5 ,6\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"1, 2, 3, 4\n4 ,5 ,6 ,7\n", "x,y,z,intensity", {1, 2, 3}, {4, 5, 6}},
+        {"1,2,3\n4,5,6\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+    };
+    struct loaded l;
+    (void)state;
+    CHECK(guesses);
+    static const char *const given[] = {"a 8,5 1 2 3\n", "P1\t8,5\t1\t2\t3,5\n", "P,1;8,5;1;2;\n"};
+    for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
+        load_text(given[i], "-,x,y,z,intensity", &l);
+        assert_point(&l, 0, 8.5, 1, 2);
+        loaded_finish(&l);
+    }
+    refused_text("1,5;2,5;3,5\n1,5;2.5;3,5\n", SPL_E_INPUT, "x", "decimal commas are read where");
+    refused_text("1.234,5;2,5;3,5\n", SPL_E_INPUT, "x", "not a number");
+    refused_text("1,5;2,5,1;3,5\n", SPL_E_INPUT, "x", "not a number");
+}
+
+/* Beyond the lines that decide. */
+static void decimal_commas_hold_for_all_lines(void **state)
+{
+    for (int odd = 0; odd < 2; odd++) {
+        struct loaded l;
+        FILE *f = fopen(scratch_path(), "w");
+        (void)state;
+        assert_non_null(f);
+        for (int i = 0; i < 3000; i++)
+            fprintf(f, "%d,5;2%c5;3\n", i, odd && i == 2000 ? '.' : ',');
+        fclose(f);
+        load_path(scratch_path(), NULL, 100, &l);
+        if (odd) {
+            assert_int_equal(l.code, SPL_E_INPUT);
+            assert_non_null(strstr(l.err.message, "line 2001"));
+            assert_non_null(strstr(l.err.message, "\"2.5\" in column 2 is not a number"));
+        } else {
+            assert_int_equal(l.points, 3000);
+            assert_true(l.sum[1] == 7500);
+        }
+        loaded_finish(&l);
+    }
+}
+
+static void commas_that_are_both_are_refused(void **state)
+{
+    static const char *const both[] = {
+        "8,3550,-0,0003,2,2079\n",
+        "8,3550, -0,0003, 2,2079\n",
+        "8,355, -1,25, 2,5\n",
+        "8,355,-0,05,2,2\n8,3,0,1,2,07\n",
+        "8,3550,-0,0003,2,2079,12,200,13\n8,3550,-0,1003,2,2079,0,0,255\n",
+    };
+    static const char *const behind[] = {
+        "1,8,3550,-0,0003,2,2079\n2,8,3550,-0,1003,2,2079\n3,8,3550,-0,2003,2,2079\n",
+        "P1,8,3550,-0,0003,2,2079\nP2,8,3550,-0,1003,2,2079\n",
+    };
+    static const struct guess numbers[] = {
+        {"8,3550,-1,3,2,2079\n7,120,5,30,20,10\n", "x,y,z,red,green,blue", {8, 3550, -1}, {7, 120, 5}},
+        {"-0,120,5,255,255,255\n0,130,5,255,255,255\n", "x,y,z,red,green,blue", {-0.0, 120, 5}, {0, 130, 5}},
+        {"8,120,5,012,005,001\n7,130,5,055,255,000\n", "x,y,z,red,green,blue", {8, 120, 5}, {7, 130, 5}},
+        {"8, 120, 5, 12, 5, 1\n7, 130, 5, 55, 255, 0\n", "x,y,z,red,green,blue", {8, 120, 5}, {7, 130, 5}},
+        {"8 3550 0 0003 2 2079\n7 1 2 3 4 5\n", "x,y,z,red,green,blue", {8, 3550, 0}, {7, 1, 2}},
+        {"8,03,1.5,02,5,1\n7,01,5,055,255,0\n", "x,y,z,red,green,blue", {8, 3, 1.5}, {7, 1, 5}},
+    };
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof both / sizeof *both; i++)
+        refused_text(both[i], SPL_E_INPUT, "", "(sed 's/,/./5;s/,/./3;s/,/./1')");
+    for (size_t i = 0; i < sizeof behind / sizeof *behind; i++)
+        refused_text(behind[i], SPL_E_INPUT, "", "line 1: commas seem to separate columns and to be decimal points");
+    refused_text(behind[0], SPL_E_INPUT, "", "(sed 's/,/./6;s/,/./4;s/,/./2')");
+    CHECK(numbers);
+    load_text(both[0], "x,y,z,r,g,b", &l); /* who says so is believed */
+    assert_point(&l, 0, 8, 3550, 0);
+    loaded_finish(&l);
+}
+
+static void headings_in_other_words(void **state)
+{
+    static const struct {
+        const char *heading, *unused;
+        uint32_t attributes;
+    } headings[] = {
+        {"X,Y,Z,Rot,Gr\xc3\xbcn,Blau", "", SPL_CLOUD_COLOR},
+        {"X,Y,Z,ROT,GR\xc3\x9cN,BLAU", "", SPL_CLOUD_COLOR},
+        {"X,Y,Z,rot,gr\xfcn,blau", "", SPL_CLOUD_COLOR},
+        {"X Y Z Rot Gruen Blau", "", SPL_CLOUD_COLOR},
+        {"X;Y;Z;Rouge;Vert;Bleu", "", SPL_CLOUD_COLOR},
+        {"X [m];Y [m];Z [m];R(0-255);G(0-255);B (0-255)", "", SPL_CLOUD_COLOR},
+        {"X [m] Y [m] Z [m] R G B", "", SPL_CLOUD_COLOR},
+        {"E N H Rot Foo Blau", "Rot, Foo, Blau", 0},
+        {"E,N,Z,a,b,c", "a, b, c", 0},
+        {"Ost;Nord;H\xc3\xb6he;Rot;;Code", "Rot, Code", 0},
+        {"East North Height nx ny nz", "", SPL_CLOUD_NORMAL},
+        {"East North Up nx ny foo", "nx, ny, foo", 0},
+        {"Easting Northing Elev. R G B", "", SPL_CLOUD_COLOR},
+        {"X Y H e n Klasse", "e, n", SPL_CLOUD_CLASS},
+        {"x,y,z,Intensit\xc3\xa4t,Punkt,Reflectance", "Intensit\xc3\xa4t, Punkt", SPL_CLOUD_COLOR},
+        {"x,y,z,Intensitaet,e,n", "e, n", SPL_CLOUD_COLOR},
+        {"//E N H r g b", "", SPL_CLOUD_COLOR},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof headings / sizeof *headings; i++) {
+        struct loaded l;
+        char text[200];
+        bool commas = strchr(headings[i].heading, ','), semicolons = strchr(headings[i].heading, ';');
+        snprintf(text, sizeof text,
+                 commas       ? "%s\n1,2,3,255,0,128\n4,5,6,1,2,7\n"
+                 : semicolons ? "%s\n1;2;3;255;0;128\n4;5;6;1;2;7\n"
+                              : "%s\n1 2 3 255 0 128\n4 5 6 1 2 7\n",
+                 headings[i].heading);
+        load_text(text, NULL, &l);
+        if (strcmp(l.unused, headings[i].unused) != 0 || l.attributes != headings[i].attributes)
+            fail_msg("%s: \"%s\" is not used, attributes %x", headings[i].heading, l.unused, l.attributes);
+        assert_point(&l, 0, 1, 2, 3);
+        assert_point(&l, 1, 4, 5, 6);
+        assert_false(l.surveyors);
+        loaded_finish(&l);
+    }
+    refused_text("E Y H\n1 2 3\n", SPL_E_INPUT, "x", "no column has this name");
+    refused_text("X N H\n1 2 3\n", SPL_E_INPUT, "y", "no column has this name");
+    refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+}
+
+static void many_headings_are_cut(void **state)
+{
+    char text[2000] = "x y z";
+    struct loaded l;
+    (void)state;
+    for (int i = 0; i < 40; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), " heading%02d", i);
+    snprintf(text + strlen(text), sizeof text - strlen(text), "\n1 2 3");
+    for (int i = 0; i < 40; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), " 9");
+    load_text(text, NULL, &l);
+    assert_in_range(strlen(l.unused), 150, sizeof l.unused - 1);
+    assert_string_equal(l.unused + strlen(l.unused) - 5, ", …");
+    loaded_finish(&l);
+}
+
+static void surveyors_y_is_the_east(void **state)
+{
+    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n", "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
+                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n"};
+    static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n"};
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof meant / sizeof *meant; i++) {
+        load_text(meant[i], NULL, &l);
+        assert_point(&l, 0, 1, 2, 3);
+        assert_true(l.surveyors);
+        loaded_finish(&l);
+    }
+    for (size_t i = 0; i < sizeof doubtful / sizeof *doubtful; i++)
+        refused_text(doubtful[i], SPL_E_INPUT, "x", "may be a surveyor's, with Y as the east, or not");
+    load_text("PtNr Y X Z\nP1 1 2 3\n", NULL, &l); /* no German height: as it says */
+    assert_point(&l, 0, 2, 1, 3);
+    assert_false(l.surveyors);
+    loaded_finish(&l);
+}
+
+static void white_is_that_of_the_bits_in_use(void **state)
+{
+    static const struct {
+        double largest, white;
+    } rows[] = {{1, 1},       {2, 255},      {255, 255},   {256, 65535}, {511, 65535},  {512, 1023},   {1020, 1023},
+                {1023, 1023}, {1024, 65535}, {2048, 4095}, {4095, 4095}, {4096, 65535}, {65535, 65535}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct loaded l;
+        char text[100];
+        snprintf(text, sizeof text, "x y z r g b\n1 2 3 0 0 %g\n", rows[i].largest);
+        load_text(text, NULL, &l);
+        if (l.colors.white != rows[i].white)
+            fail_msg("largest %g: white %g", rows[i].largest, l.colors.white);
+        assert_color(&l, 0, 0, 0, (int)(rows[i].largest * 255 / rows[i].white + 0.5));
+        loaded_finish(&l);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_first_column_that_counts_is_no_x),
+        cmocka_unit_test(a_first_column_of_names_is_skipped),
+        cmocka_unit_test(decimal_commas_are_read),
+        cmocka_unit_test(decimal_commas_hold_for_all_lines),
+        cmocka_unit_test(commas_that_are_both_are_refused),
+        cmocka_unit_test(headings_in_other_words),
+        cmocka_unit_test(many_headings_are_cut),
+        cmocka_unit_test(surveyors_y_is_the_east),
+        cmocka_unit_test(white_is_that_of_the_bits_in_use),
+    };
+    return cmocka_run_group_tests(tests, NULL, remove_scratch);
+}
