@@ -28,6 +28,8 @@ build() {
     shift 2
     local begin=$SECONDS setup=(meson setup "$out/$name" "$@")
     [ ! -f "$out/$name/build.ninja" ] || setup+=(--reconfigure)
+    # of an earlier run, before the normal build's kernels changed
+    [ ! "$out/normal/shaders/kernels.S" -nt "$out/$name/shaders/kernels.S" ] || rm -f "$out/$name/shaders/kernels.S"
     if CC="ccache $compiler" "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" ${targets-} >>"$log" 2>&1; then
         printf '%-10s %-8s built in %d s\n' "$name" "" $((SECONDS - begin)) >"$out/$name.said"
         echo yes >"$out/$name.built"
