@@ -1,6 +1,7 @@
 /* Instances, made when first asked for and kept for the life of the process: with the last would go all drivers, whose
  * unloading and loading again is slow and leaks inside them. Each device that is open has one to itself, as software
- * drivers run what all devices of an instance are given one after the other. Any thread. */
+ * drivers run what all devices of an instance are given one after the other; those that are debugged share one, since
+ * the validation layer leaks what it knows of a second. Any thread. */
 #include "gpu/vulkan/vk.h"
 
 #include <limits.h>
@@ -105,7 +106,7 @@ static int get(bool debug, bool takes, VkInstance *out, struct spl_error *err)
     const size_t most = sizeof known / sizeof *known;
     int code = 0;
     pthread_mutex_lock(&mutex);
-    *out = find(debug, takes ? 0 : UINT_MAX, takes);
+    *out = find(debug, takes && !debug ? 0 : UINT_MAX, takes);
     if (!*out && known_count == most)
         *out = find(debug, UINT_MAX, takes);
     if (!*out && known_count == most)
