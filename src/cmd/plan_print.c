@@ -24,7 +24,7 @@ static const char *const unknown[] = {
     "machine, so what all look at has the views a second of one machine, whatever the sum says.",
     "Datasets as one on servers: the parts of a collection are files beside it, on a disk that its daemon sees.",
     "Packs of more than 100 million points. One dataset of many machines is packed in parts (splatd pack --plan), "
-    "beside each other, for 1.1 to 1.15 of the core hours, and becomes a collection.",
+    "beside each other, for 1.1 to 1.25 of the core hours, and becomes a collection.",
     "Many clients whose pages come and go: the two frame times behind that row of devices are of one client, of 100 "
     "million points, pages on a local disk, a quarter of the memory that was wanted.",
     "Other scans: 7.1 to 9.3 bytes a splat were measured, 11.9 with times; LAZ of 5.5 bytes a point, JPEGs of 65 to "
