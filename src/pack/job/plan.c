@@ -60,6 +60,10 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
         return spl_fail_field(err, SPL_E_USAGE, "plan",
                               "%s cannot be split into parts: leave it out, or pack without --plan, in one piece",
                               what);
+    if (o->primitives != SPL_PRIMITIVES_OFF && !(o->error > 0)) /* each would choose by its own noise and spacing */
+        return spl_fail_field(err, SPL_E_USAGE, "error",
+                              "--primitives in parts needs one bound for all of them: say how far a primitive may be "
+                              "off its points, such as --error 5mm");
     if (options->parts < 1 || options->parts > SPL_JOB_PARTS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "plan", "%u parts; 1 to %d can be planned", options->parts,
                               SPL_JOB_PARTS_MAX);
@@ -147,13 +151,19 @@ static int count_points(struct planning *p, struct spl_error *err)
     return rc;
 }
 
+/* Whose points say which of them saw each: of others nothing is numbered. */
+static bool has_stations(const struct spl_scan *scan)
+{
+    return scan->poses && scan->attributes & SPL_CLOUD_STATION;
+}
+
 /* Where they stand, by their numbers: a part reads some of the scans, and knows all stations. */
 static int take_stations(struct planning *p, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     uint32_t count = 0;
     for (size_t i = 0; i < p->scans.count; i++)
-        count += p->scans.list[i].poses ? p->scans.list[i].stations : 0;
+        count += has_stations(&p->scans.list[i]) ? p->scans.list[i].stations : 0;
     if (!count)
         return SPL_OK;
     if (count >= SPL_NO_STATION)
@@ -164,7 +174,7 @@ static int take_stations(struct planning *p, struct spl_error *err)
     job->rules.poses = (const double(*)[16])job->poses;
     for (size_t i = 0; i < p->scans.count; i++) {
         const struct spl_scan *scan = &p->scans.list[i];
-        if (!scan->poses)
+        if (!has_stations(scan))
             continue;
         memcpy(job->poses + job->rules.pose_count, scan->poses, scan->stations * sizeof *scan->poses);
         job->rules.pose_count += scan->stations;
@@ -234,14 +244,9 @@ static int take_inputs(struct planning *p, struct spl_error *err)
     return rc;
 }
 
-/* A part may be small beside what primitives may be off, where the whole is not; and of its own noise and spacing each
- * would choose another. */
+/* A part may be small beside what primitives may be off, where the whole is not. */
 static int check_error(const struct planning *p, struct spl_error *err)
 {
-    if (p->options->pack.primitives != SPL_PRIMITIVES_OFF && !(p->options->pack.error > 0))
-        return spl_fail_field(err, SPL_E_USAGE, "error",
-                              "--primitives in parts needs one bound for all of them: say how far a primitive may be "
-                              "off its points, such as --error 5mm");
     const double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
     const struct spl_bound bound = {.error = p->options->pack.error / unit, .unit_m = unit};
     struct spl_points all = {.bounds_min = {INFINITY, INFINITY, INFINITY},
