@@ -234,6 +234,22 @@ def test_tiles_of_a_plane():
         assert webp.headers.get("Content-Type") == "image/webp" if WEBP else webp.status == 404
 
 
+def test_a_system_that_proj_cannot_use_is_a_plane():
+    """A site's own system, one that no list has, and what is no system at all; asked for first, and again."""
+    with tempfile.TemporaryDirectory() as folder:
+        systems = ['LOCAL_CS["site",UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]', "EPSG:999999", "nonsense["]
+        paths = [os.path.join(folder, f"site{i}.spld") for i in range(len(systems))]
+        for path, crs in zip(paths, systems):
+            subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--unit=m", f"--crs={crs}", path], check=True)
+        with Daemon(REAL, datasets=paths) as d:
+            for i in range(len(systems)):
+                assert any(any(row[3::4]) for row in tile_pixels(d.ask(f"/v1/datasets/site{i}/tiles/0/0/0.png")))
+                for _ in range(2):
+                    assert d.ask(f"/v1/datasets/site{i}/tiles.json").json()["splatd"]["scheme"] == "plane"
+                    refused = d.ask(f"/v1/datasets/site{i}/place?crs=EPSG:3857&world=0,0,0")
+                    assert refused.status in (400, 501) and refused.json()["field"] == "crs", refused.body
+
+
 def test_tiles_of_the_earth():
     """What a tile shows of the world is where PROJ says that its pixels are."""
     with Daemon(REAL) as d:

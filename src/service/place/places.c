@@ -3,8 +3,8 @@
  * latitude before longitude is an error and no empty picture.
  *
  * Transforms are kept for all datasets together, since the tiles of a country have one coordinate system, and each
- * takes some 0.4 MiB. Invariant: they are used under the mutex, made outside it, and at most `kept` live. Any thread.
- */
+ * takes some 0.4 MiB; so is what PROJ refused, which it would refuse again. Invariant: they are used under the mutex,
+ * made outside it, and at most `kept` live. Any thread. */
 #include "service/place/places.h"
 
 #include <ctype.h>
@@ -25,7 +25,8 @@ static const double reach_m = 1e6, degree_m = 111195; /* of a great circle */
 struct slot {
     uint32_t crs;                    /* 0 = none */
     char *world;                     // owned; META's text
-    struct spl_transform *transform; // owned
+    struct spl_transform *transform; // owned; NULL = refused
+    struct spl_error refusal;
     uint64_t used;
 };
 
@@ -123,14 +124,20 @@ void spl_places_destroy(struct spl_places *places)
 }
 
 /* With the mutex held; NULL: it is not there. */
-static struct spl_transform *find(const struct spl_places *places, uint32_t crs)
+static const struct slot *find(const struct spl_places *places, uint32_t crs)
 {
     for (int i = 0; i < kept; i++)
         if (slots[i].crs == crs && !strcmp(slots[i].world, places->crs)) {
             slots[i].used = ++uses;
-            return slots[i].transform;
+            return &slots[i];
         }
     return NULL;
+}
+
+/* What was refused, if it was. */
+static int tell(struct spl_error *err, const struct spl_error *refusal)
+{
+    return refusal->code ? spl_fail_field(err, refusal->code, refusal->field, "%s", refusal->message) : 0;
 }
 
 /* Puts what is new in the place of the one that was not used for longest, and leaves what is to be freed in it. */
@@ -161,21 +168,24 @@ int spl_places_prepare(struct spl_places *places, uint32_t crs, struct spl_error
     struct slot slot = {.crs = crs};
     double middle[2], ignored[2];
     pthread_mutex_lock(&mutex);
-    bool there = find(places, crs);
+    const struct slot *there = find(places, crs);
+    int rc = there ? tell(err, &there->refusal) : 0;
     pthread_mutex_unlock(&mutex);
     if (there)
-        return 0;
+        return rc;
     if (spl_transform_is_built && places->fault)
         return spl_fail_field(err, SPL_E_INPUT, "crs", "%s", places->fault);
     if (!(slot.world = strdup(places->crs)))
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a coordinate system");
-    int rc = spl_transform_create(crs, places->epsg, places->crs, &slot.transform, err);
+    rc = spl_transform_create(crs, places->epsg, places->crs, &slot.transform, &slot.refusal);
     if (!rc) {
         get_middle(places, middle);
         spl_transform_apply(slot.transform, false, middle,
                             ignored); // reads what grids there are, here and not on the loop
-        keep(places, &slot);
     }
+    tell(err, &slot.refusal);
+    if (rc != SPL_E_NOMEM)
+        keep(places, &slot);
     spl_transform_destroy(slot.transform);
     free(slot.world);
     return rc;
@@ -189,9 +199,13 @@ static int enter(struct spl_places *places, uint32_t crs, bool waits, unsigned *
         return spl_fail_field(err, SPL_E_INPUT, "crs", "%s", places->fault);
     for (;;) { // another thread may need other ones in between
         pthread_mutex_lock(&mutex);
-        if ((*out = find(places, crs)))
+        const struct slot *slot = find(places, crs);
+        if (slot && (*out = slot->transform))
             return 0;
+        int refused = slot ? tell(err, &slot->refusal) : 0;
         pthread_mutex_unlock(&mutex);
+        if (refused)
+            return refused;
         if (!waits) {
             places->missing = crs;
             return spl_fail_field(err, SPL_E_BUSY, "crs", "EPSG:%u is being looked up; come back later", crs);

@@ -85,8 +85,9 @@ static int open_systems(struct spl_transform *t, uint32_t asked, uint32_t world_
     PJ *crs = open_epsg(t->context, asked);
     const char *database = crs ? "" : proj_context_get_database_path(t->context);
     if (!database || (!crs && !*database))
-        return spl_fail_field(err, SPL_E_UNSUPPORTED, "crs",
-                              "PROJ finds no list of coordinate systems; the operator may install proj-data");
+        return spl_fail_field(
+            err, SPL_E_UNSUPPORTED, "crs",
+            "PROJ finds no list of coordinate systems; the operator may install proj-data and restart");
     if (!crs || !(*from = take_horizontal(t->context, crs, &axes_m, &t->height_m)))
         return spl_fail_field(err, SPL_E_INPUT, "crs", "EPSG:%u is no geographic or projected coordinate system%s",
                               asked, crs ? "" : " that PROJ knows");

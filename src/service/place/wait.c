@@ -27,13 +27,12 @@ struct spl_place_wish {
     struct spl_call call; /* with a reference to its entry */
     spl_handler *handler;
     uint32_t crs;
-    struct spl_error err;
 };
 
 static void look_up(uv_work_t *work)
 {
     struct spl_place_wish *wish = work->data;
-    spl_places_prepare(wish->call.entry->places, wish->crs, &wish->err);
+    spl_places_prepare(wish->call.entry->places, wish->crs, NULL);
 }
 
 static void after(uv_work_t *work, int status)
@@ -45,10 +44,7 @@ static void after(uv_work_t *work, int status)
     if (request) {
         request->place = NULL;
         spl_waiting_resume(request);
-        if (wish->err.code)
-            spl_reply_error(request, &wish->err);
-        else
-            wish->handler(request, &wish->call);
+        wish->handler(request, &wish->call); // finds what was made, or why it was not
         spl_http_pump(service);
     }
     spl_catalog_entry_unref(wish->call.entry);

@@ -12,7 +12,7 @@ struct spl_place_wish;
 typedef void spl_handler(struct request *request, const struct spl_call *call);
 
 /* Where `err` is SPL_E_BUSY for that: has a thread of the pool make what is missing while the request waits, then calls
- * `handler` again; true. False where it is not, or where too many wait so. */
+ * `handler` again, whether that succeeded or not; true. False where it is not, or where too many wait so. */
 bool spl_place_wait(struct request *request, const struct spl_call *call, spl_handler *handler,
                     const struct spl_error *err);
 void spl_place_abandon(struct spl_place_wish *wish); /* its request no longer waits for it; NULL-safe */
