@@ -22,9 +22,10 @@
 #include "pack/warn.h"
 
 enum { cells_least = 1 << 15, cells_most = 1 << 18, cells_a_part = 1 << 12, scans_a_part = 4, cell_points = 16 };
+static const double linear_points = 10, cells_finest = 0x1p-30; /* wires are looked for in cells of so many points */
+
 /* Spacings that a halo is wide: of what half of the points have, and of what nearly all have. A point's radius is held
  * against those of its neighbours, of which the 36th is 3.4 spacings away. */
-static const double linear_points = 10, cells_finest = 0x1p-30; /* wires are looked for in cells of so many points */
 static const double halo_usual = 5, halo_wide = 3;
 
 struct planning {

@@ -56,15 +56,10 @@ static int prepare(struct work *w, const struct spl_atlas *atlas, const struct s
     }
     for (size_t i = 0; i < samples->count; i++) {
         const struct spl_sample *s = &samples->list[i];
-        const double normal[3] = {(double)s->normal[0], (double)s->normal[1], (double)s->normal[2]};
-        double own[3], turned[3], range, cosine;
+        double own[3];
         if (scanned && s->of != index)
             continue;
-        spl_station_to_own(station, s->position, own);
-        spl_station_turn(station, normal, turned);
-        range = sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
-        cosine = fabs(own[0] * turned[0] + own[1] * turned[1] + own[2] * turned[2]) / fmax(range, 1e-30);
-        if (!(range > 0) || cosine < 0.2 || spl_map_shows(map, own, (double)s->radius, cosine) < 1)
+        if (!spl_sample_is_seen(s, station, map, own))
             continue;
         memcpy(w->points[w->count].own, own, sizeof own);
         w->points[w->count++].bright = brightness(s->color[0], s->color[1], s->color[2]);

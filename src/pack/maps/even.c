@@ -31,14 +31,9 @@ int spl_sightings_add(struct spl_sightings *sightings, const struct spl_atlas *a
 {
     for (size_t i = 0; i < samples->count; i++) {
         const struct spl_sample *s = &samples->list[i];
-        const double normal[3] = {(double)s->normal[0], (double)s->normal[1], (double)s->normal[2]};
-        double own[3], turned[3], range, cosine;
+        double own[3];
         float color[3], logs[3];
-        spl_station_to_own(station, s->position, own);
-        spl_station_turn(station, normal, turned);
-        range = sqrt(own[0] * own[0] + own[1] * own[1] + own[2] * own[2]);
-        cosine = fabs(own[0] * turned[0] + own[1] * turned[1] + own[2] * turned[2]) / fmax(range, 1e-30);
-        if (!(range > 0) || cosine < 0.2 || spl_map_shows(map, own, (double)s->radius, cosine) < 1)
+        if (!spl_sample_is_seen(s, station, map, own))
             continue;
         spl_atlas_get(atlas, own, color);
         if (!take_log(color, logs))

@@ -1,10 +1,14 @@
 /* Every so manieth splat by id: ids go by place, so that samples lie as splats do. The caller's thread. */
 #include "pack/maps/samples.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/array.h"
+#include "geom/vector.h"
+
+static const double cosine_least = 0.2;
 
 int spl_samples_init(struct spl_samples *samples, const struct spl_splats *splats, const struct spl_stations *stations,
                      uint64_t most, struct spl_error *err)
@@ -41,4 +45,15 @@ void spl_samples_finish(struct spl_samples *samples)
 {
     free(samples->list);
     *samples = (struct spl_samples){0};
+}
+
+bool spl_sample_is_seen(const struct spl_sample *sample, const struct spl_station *station,
+                        const struct spl_map_sight *map, double own[3])
+{
+    const double normal[3] = {(double)sample->normal[0], (double)sample->normal[1], (double)sample->normal[2]};
+    double turned[3];
+    spl_station_to_own(station, sample->position, own);
+    spl_station_turn(station, normal, turned);
+    double range = sqrt(dot3(own, own)), cosine = fabs(dot3(own, turned)) / fmax(range, 1e-30);
+    return range > 0 && cosine >= cosine_least && spl_map_shows(map, own, (double)sample->radius, cosine) >= 1;
 }

@@ -2,7 +2,7 @@
 #ifndef SPL_PACK_MAPS_SAMPLES_H
 #define SPL_PACK_MAPS_SAMPLES_H
 
-#include "pack/maps/stations.h"
+#include "pack/maps/sees.h"
 
 struct spl_sample {
     double position[3]; /* world */
@@ -21,5 +21,10 @@ struct spl_samples {
 int spl_samples_init(struct spl_samples *samples, const struct spl_splats *splats, const struct spl_stations *stations,
                      uint64_t most, struct spl_error *err);
 void spl_samples_finish(struct spl_samples *samples);
+
+/* Whether the sample lies where nothing ends beside it: its station sees it square enough, and all four texels of the
+ * map around it show it. `own`: where it lies in the station's frame. */
+bool spl_sample_is_seen(const struct spl_sample *sample, const struct spl_station *station,
+                        const struct spl_map_sight *map, double own[3]);
 
 #endif
