@@ -77,7 +77,9 @@ struct spl_text_pairs {
 /* What the first columns of lines without names look like. Zero-initialised. */
 struct spl_text_look {
     unsigned lines;
-    bool unnumbered; /* the first column does not count by one, or too few numbers come behind */
+    bool unnumbered; /* the first column does not rise, or too few numbers come behind */
+    bool gaps;       /* it rises by more than one somewhere */
+    bool coarse;     /* one of the next three is a whole number */
     bool unnamed;    /* it is no text everywhere */
     bool varies;     /* the one behind it does */
     bool fraction;   /* not all are whole numbers */

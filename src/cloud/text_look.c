@@ -2,14 +2,15 @@
  * numbers decimal commas? And are commas both those and what separates columns, so that nobody can tell them apart?
  * Pure functions.
  *
- * A first column that counts by one may also be x along a row of a grid of whole metres: there y stays the same. */
+ * A first column that counts by one may also be x along a row of a grid of whole metres: there y stays the same. One
+ * that rises by other steps numbers points that are left of more, where no coordinate behind it is a whole number. */
 #include <math.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
 
-/* Fewer count by chance; of nothing but whole numbers a diagonal does. */
-enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
+/* Fewer count by chance; of nothing but whole numbers a diagonal does, and with gaps points in the order of x. */
+enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100, COUNTED_GAP_LINES = 20 };
 
 /* The next field as a whole number, with zeros in front and a sign if need be. */
 struct whole {
@@ -109,13 +110,15 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
         whole &= all[count].is || (names && count == 0);
         count++;
     }
-    bool numbers = layout->fields > 3 && count > 0 && all[0].is && !all[0].sign &&
+    bool numbers = count > 3 && all[0].is && !all[0].sign &&
                    spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
     for (int i = 0; i < 3 && numbers; i++) {
         numbers = spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
         y = i ? y : v;
+        look->coarse |= all[1 + i].is;
     }
-    numbers &= !look->lines || all[0].value == look->last + 1;
+    numbers &= !look->lines || all[0].value > look->last;
+    look->gaps |= numbers && look->lines && all[0].value != look->last + 1;
     look->varies |= numbers && look->lines && y != look->y;
     look->y = numbers ? y : look->y;
     look->last = count > 0 ? all[0].value : 0;
@@ -130,10 +133,15 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
     return true;
 }
 
+static bool counts(const struct spl_text_look *look)
+{
+    return !look->unnumbered && look->lines >= (look->gaps ? COUNTED_GAP_LINES : COUNTED_LINES) &&
+           !(look->gaps && look->coarse);
+}
+
 unsigned spl_text_look_first(const struct spl_text_look *look)
 {
-    bool numbered =
-        !look->unnumbered && look->varies && look->lines >= (look->fraction ? COUNTED_LINES : COUNTED_WHOLE_LINES);
+    bool numbered = counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
     return look->lines > 0 && (numbered || !look->unnamed);
 }
 
@@ -144,7 +152,7 @@ int spl_text_look_doubled(const struct spl_text_look *look, char separator)
         const struct spl_text_pairs *pairs = &look->pairs[at];
         bool several = (pairs->zeros & (pairs->zeros - 1)) != 0;
         bool even = !pairs->uneven && pairs->digits > 1;
-        bool behind = at == 0 || !look->unnamed || (!look->unnumbered && look->lines >= COUNTED_LINES);
+        bool behind = at == 0 || !look->unnamed || counts(look);
         if (!pairs->bad && behind && (several || (even && pairs->zeros) || pairs->parted))
             return at;
     }

@@ -64,6 +64,32 @@ static void a_first_column_that_counts_is_no_x(void **state)
     }
 }
 
+/* What is left of more points, as every third one; in the order of x it is no number where y or z are whole ones. */
+static void numbers_with_gaps_are_no_x(void **state)
+{
+    static const struct {
+        unsigned lines;
+        int step;
+        const char *z, *guessed;
+    } rows[] = {
+        {19, 3, "2.5", "x,y,z,intensity"}, {20, 3, "2.5", "-,x,y,z"},           {200, 1, "2.5", "-,x,y,z"},
+        {200, 3, "2", "x,y,z,intensity"},  {200, -1, "2.5", "x,y,z,intensity"}, {200, 0, "2.5", "x,y,z,intensity"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct loaded l;
+        FILE *f = fopen(scratch_path(), "w");
+        assert_non_null(f);
+        for (unsigned k = 0; k < rows[i].lines; k++)
+            fprintf(f, "%d %d.25 %d.75 %s\n", 7000 + (int)k * rows[i].step, (int)(k * k % 50), (int)(k * 7 % 40),
+                    k == 5 ? rows[i].z : "1.5");
+        fclose(f);
+        load_path(scratch_path(), NULL, 100, &l);
+        assert_string_equal(l.guessed, rows[i].guessed);
+        loaded_finish(&l);
+    }
+}
+
 static void a_first_column_of_names_is_skipped(void **state)
 {
     static const struct guess guesses[] = {
@@ -279,6 +305,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_first_column_that_counts_is_no_x),
+        cmocka_unit_test(numbers_with_gaps_are_no_x),
         cmocka_unit_test(a_first_column_of_names_is_skipped),
         cmocka_unit_test(decimal_commas_are_read),
         cmocka_unit_test(decimal_commas_hold_for_all_lines),
