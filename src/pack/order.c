@@ -39,10 +39,10 @@ struct order {
     struct run *runs;       /* long ones that wait: room for all that there can be */
     atomic_size_t run_count;
     unsigned pieces, part_count;
-    uint32_t (*leads)[leads];        /* of each piece: points by the first bits of their keys */
-    uint32_t (*at)[parts_most + 2];  /* of each piece: where its next point of a part goes */
-    uint16_t *part_of;               /* of each lead */
-    size_t first[parts_most + 3];    /* points of parts */
+    uint32_t (*leads)[leads];       /* of each piece: points by the first bits of their keys */
+    uint32_t (*at)[parts_most + 2]; /* of each piece: where its next point of a part goes */
+    uint16_t *part_of;              /* of each lead */
+    size_t first[parts_most + 3];   /* points of parts */
     double low[threads_max][3], high[threads_max][3];
     struct spl_stage *stage;
     atomic_bool failed;
@@ -84,14 +84,17 @@ static void find_cube(struct order *o, double high[3])
     }
 }
 
-/* Of a part: cells of all parts lie at the same places, up to those of as many levels as wires are looked for on. */
+/* Of a part: cells of all parts lie at the same places, up to those of as many levels as wires are looked for on. Where
+ * coordinates are round numbers floors and walls lie: none of the larger cells may end there, for a surface on both
+ * sides of such an end is ordered as two that are far apart. So all cells are moved by `aside`, which is exact. */
 static void align_cube(struct order *o)
 {
     struct spl_points *p = o->points;
     const double step = p->cells * SPL_CELLS_ALIGNED;
+    const double aside = 1365.0 / 4096; /* a third in few bits: of cells half as large it is one or two thirds again */
     double size = step;
     for (int c = 0; c < 3; c++) {
-        o->origin[c] = p->cube_min[c] = floor(p->bounds_min[c] / step) * step;
+        o->origin[c] = p->cube_min[c] = (floor(p->bounds_min[c] / step - aside) + aside) * step;
         while (!(size > p->bounds_max[c] - o->origin[c]))
             size *= 2;
     }

@@ -13,7 +13,7 @@
 
 #define SPL_NO_STATION UINT16_MAX
 #define SPL_POINTS_MAX (UINT32_MAX - 1) /* of a dataset: indices have 32 bits */
-enum { SPL_CELLS_ALIGNED = 64 };  /* cells of a part: the cube begins at a multiple of so many */
+enum { SPL_CELLS_ALIGNED = 64 };  /* cells of a part: cubes begin a multiple of so many apart */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
