@@ -48,6 +48,7 @@ struct spl_cloud_coordinates {
     double height_unit_m; /* of z; 0 = not said: as x and y, metres where those are angles */
     bool angles;          /* x and y are longitudes and latitudes */
     double step[3];       /* that they are multiples of; 0 = not said */
+    double first[3];      /* from where on these are counted */
     bool floats;          /* of 32 bits, so that their steps grow with their size */
 };
 

@@ -359,6 +359,8 @@ static int build(struct spl_build *p, struct spl_build_outputs *out, struct spl_
     if (!rc)
         rc = spl_stage_check(p->stage, err);
     if (!rc)
+        rc = spl_points_narrow(&p->points, p->scans.count ? &p->scans.list[0].coordinates : NULL, p->stage, err);
+    if (!rc)
         rc = look_around(p, err);
     if (!rc && !p->points.count) {
         out->empty = true;

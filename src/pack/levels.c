@@ -82,7 +82,7 @@ static void load_point(const struct spl_points *p, const struct spl_tree_node *p
                        struct spl_inner_splat *out)
 {
     for (int c = 0; c < 3; c++) {
-        out->position[c] = (float)(p->axis[c][i] - parent->origin[c]);
+        out->position[c] = (float)(spl_points_at(p, c, i) - parent->origin[c]);
         out->normal[c] = p->normal[i][c];
     }
     out->radius = p->radius[i];

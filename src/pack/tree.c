@@ -39,12 +39,12 @@ static void frame_points(struct spl_tree_node *node, const struct spl_points *po
 {
     node->frame_size = 0;
     for (int c = 0; c < 3; c++) {
-        double low = points->axis[c][node->begin], high = low;
+        double low = spl_points_at(points, c, node->begin), high = low;
         for (size_t i = node->begin; i < node->end; i++) {
             if (i % grain == 0)
                 spl_spill_keep_bound(points->spill);
-            low = fmin(low, points->axis[c][i]);
-            high = fmax(high, points->axis[c][i]);
+            low = fmin(low, spl_points_at(points, c, i));
+            high = fmax(high, spl_points_at(points, c, i));
         }
         node->frame_low[c] = low;
         node->frame_size = fmax(node->frame_size, high - low);
