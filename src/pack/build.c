@@ -68,7 +68,6 @@ static int write_dataset(struct spl_build *p, struct spl_error *err)
         rc = spl_emit(&p->tree, &p->points, &p->wires, &p->chunk, p->writer, p->stage, &p->emitted, err);
     if (rc)
         return rc;
-    spl_tree_drop_splats(&p->tree);
     if ((rc = spl_stage_check(p->stage, err)))
         return rc;
     json_t *meta = spl_build_describe(p, radius, &view);

@@ -48,7 +48,7 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
         s->normal[c] = from->normal[c];
     }
     s->radius = from->radius;
-    s->linear = from->linear;
+    s->linear = spl_inner_is_linear(from);
     set_color(s, from->color_class);
 }
 
@@ -211,7 +211,7 @@ static uint32_t put_linear_first(struct spl_node_encoder *w, const struct spl_tr
     for (uint32_t i = 0; i < count; i++) {
         const struct spl_cut item = w->items[i];
         if (spl_tree_node_has_points(node) ? !p->linear || !p->linear[node->begin + item.index]
-                                           : !node->splats[item.index].linear)
+                                           : !spl_inner_is_linear(&node->splats[item.index]))
             continue;
         w->items[i] = w->items[linear];
         w->items[linear++] = item;

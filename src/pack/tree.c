@@ -145,20 +145,18 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
     return rc;
 }
 
-void spl_tree_drop_splats(struct spl_tree *tree)
+void spl_tree_drop_splats(struct spl_tree *tree, uint32_t node)
 {
-    for (uint32_t i = 0; i < tree->count; i++) {
-        spl_spill_give(tree->spill, tree->nodes[i].splats);
-        spl_spill_give(tree->spill, tree->nodes[i].numbers);
-        tree->nodes[i].splats = NULL;
-        tree->nodes[i].numbers = NULL;
-    }
+    spl_spill_give(tree->spill, tree->nodes[node].splats);
+    spl_spill_give(tree->spill, tree->nodes[node].numbers);
+    tree->nodes[node].splats = NULL;
+    tree->nodes[node].numbers = NULL;
 }
 
 void spl_tree_finish(struct spl_tree *tree)
 {
-    spl_tree_drop_splats(tree);
     for (uint32_t i = 0; i < tree->count; i++) {
+        spl_tree_drop_splats(tree, i);
         if (tree->nodes[i].panels)
             spl_node_panels_finish(tree->nodes[i].panels);
         free(tree->nodes[i].panels);
