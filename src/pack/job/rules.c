@@ -53,14 +53,7 @@ size_t spl_part_filter(const struct spl_part_rules *rules, const double low[3], 
         halo[to] = place == SPL_PART_HALO;
         inside += place == SPL_PART_INSIDE;
         if (to < i) {
-            memcpy(batch->position[to], batch->position[i], sizeof batch->position[i]);
-            memcpy(batch->color[to], batch->color[i], sizeof batch->color[i]);
-            memcpy(batch->normal[to], batch->normal[i], sizeof batch->normal[i]);
-            batch->classification[to] = batch->classification[i];
-            batch->station[to] = batch->station[i];
-            for (int s = 0; s < SPL_SCALAR_COUNT; s++)
-                if (scalars >> s & 1)
-                    batch->scalar[s][to] = batch->scalar[s][i];
+            spl_point_batch_move(batch, scalars, to, i);
             if (numbers)
                 numbers[to] = numbers[i];
         }
