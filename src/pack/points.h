@@ -115,6 +115,10 @@ int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err)
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err);
 
+/* Decides which of the scalars are kept and their steps: those of a part (`rules`; else NULL) as of all others, else
+ * those that say something. SPL_E_INPUT where a part's are not as its rules say. */
+int spl_points_settle(struct spl_points *points, const struct spl_part_rules *rules, struct spl_error *err);
+
 /* Fills `list` with the indices of the scalars that the points have, in order; returns how many. */
 unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS]);
 
