@@ -41,6 +41,18 @@ void spl_point_batch_finish(struct spl_point_batch *batch)
     *batch = (struct spl_point_batch){0};
 }
 
+void spl_point_batch_move(struct spl_point_batch *batch, uint32_t scalars, size_t to, size_t from)
+{
+    memcpy(batch->position[to], batch->position[from], sizeof batch->position[from]);
+    memcpy(batch->color[to], batch->color[from], sizeof batch->color[from]);
+    memcpy(batch->normal[to], batch->normal[from], sizeof batch->normal[from]);
+    batch->classification[to] = batch->classification[from];
+    batch->station[to] = batch->station[from];
+    for (int s = 0; s < SPL_SCALAR_COUNT; s++)
+        if (scalars >> s & 1)
+            batch->scalar[s][to] = batch->scalar[s][from];
+}
+
 /* Decides which points make the part that is wanted. Not before colours are known, which all points have a say in. */
 static int find_part(struct spl_cloud *cloud, struct spl_error *err)
 {
@@ -174,15 +186,7 @@ static void thin(struct spl_cloud *cloud, struct spl_point_batch *batch, size_t 
         if (cloud->part_sum < cloud->part_of)
             continue;
         cloud->part_sum -= cloud->part_of;
-        memcpy(batch->position[to], batch->position[i], sizeof batch->position[i]);
-        memcpy(batch->color[to], batch->color[i], sizeof batch->color[i]);
-        memcpy(batch->normal[to], batch->normal[i], sizeof batch->normal[i]);
-        batch->classification[to] = batch->classification[i];
-        batch->station[to] = batch->station[i];
-        for (int s = 0; s < SPL_SCALAR_COUNT; s++)
-            if (cloud->info.scalars >> s & 1)
-                batch->scalar[s][to] = batch->scalar[s][i];
-        to++;
+        spl_point_batch_move(batch, cloud->info.scalars, to++, i);
     }
     batch->count = to;
 }

@@ -48,6 +48,7 @@ struct spl_cloud_coordinates {
     double height_unit_m; /* of z; 0 = not said: as x and y, metres where those are angles */
     bool angles;          /* x and y are longitudes and latitudes */
     double step[3];       /* that they are multiples of; 0 = not said */
+    double first[3];      /* from where on these are counted */
     bool floats;          /* of 32 bits, so that their steps grow with their size */
 };
 
@@ -121,6 +122,9 @@ enum { SPL_CLOUD_AGAIN = 2 };
 
 int spl_point_batch_init(struct spl_point_batch *batch, size_t capacity, struct spl_error *err);
 void spl_point_batch_finish(struct spl_point_batch *batch);
+
+/* Puts point `from` of a batch in the place of point `to`, with those of `scalars` (bit 1 << enum spl_scalar). */
+void spl_point_batch_move(struct spl_point_batch *batch, uint32_t scalars, size_t to, size_t from);
 
 /* Whether a name ends as only scans do (".las"), so that a search of a folder takes it. */
 bool spl_cloud_is_named_scan(const char *path);

@@ -36,6 +36,7 @@ void spl_crs_replace(struct spl_cloud_coordinates *crs, const struct spl_cloud_c
     struct spl_cloud_coordinates old = *crs;
     *crs = *said;
     memcpy(crs->step, old.step, sizeof crs->step);
+    memcpy(crs->first, old.first, sizeof crs->first);
     crs->floats = old.floats;
     settle(crs);
     free(old.wkt);

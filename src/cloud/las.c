@@ -193,6 +193,7 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     memcpy(cloud->info.coordinates.step, las->scale, sizeof las->scale);
+    memcpy(cloud->info.coordinates.first, las->offset, sizeof las->offset);
     cloud->info.format = compressed ? "LAZ" : "LAS";
     cloud->slow_rows = compressed;
     if (compressed && (code = open_stream(cloud, &format, points_at, err)) < 0)

@@ -26,8 +26,8 @@ static void bound_points(void *context, size_t begin, size_t end, unsigned worke
         for (int c = 0; c < 3; c++) {
             double low = INFINITY, high = -INFINITY;
             for (size_t i = first; i < last; i++) {
-                low = p->axis[c][i] < low ? p->axis[c][i] : low;
-                high = p->axis[c][i] > high ? p->axis[c][i] : high;
+                low = spl_points_at(p, c, i) < low ? spl_points_at(p, c, i) : low;
+                high = spl_points_at(p, c, i) > high ? spl_points_at(p, c, i) : high;
             }
             g->low[c][box % SPL_BOXES_FAN] = low;
             g->high[c][box % SPL_BOXES_FAN] = high;

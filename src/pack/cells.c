@@ -111,7 +111,7 @@ static void sum_points(void *context, size_t begin, size_t end, unsigned worker)
         for (size_t i = cell->begin; i < cell[1].begin; i++) {
             float d[3];
             for (int c = 0; c < 3; c++)
-                d[c] = (float)((p->axis[c][i] - middle[c]) * inverse);
+                d[c] = (float)((spl_points_at(p, c, i) - middle[c]) * inverse);
             for (int e = 0; e < 6; e++)
                 cell->sums.square[e] += d[row[e]] * d[column[e]];
             for (int c = 0; c < 3; c++)

@@ -41,14 +41,14 @@ bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl
                           double direction[2], double *end)
 {
     const float *n = p->normal[i];
-    double x[SPL_NEIGHBOURS_MAX], y[SPL_NEIGHBOURS_MAX], reach = 0, least = INFINITY;
+    double x[SPL_NEIGHBOURS_MAX], y[SPL_NEIGHBOURS_MAX], at[3], reach = 0, least = INFINITY;
     unsigned count = 0;
+    spl_points_place(p, i, at);
     for (unsigned a = 0; a < near->count; a++) {
         double d[3], height = 0;
-        for (int c = 0; c < 3; c++) {
-            d[c] = p->axis[c][near->index[a]] - p->axis[c][i];
+        spl_points_apart(p, at, near->index[a], d);
+        for (int c = 0; c < 3; c++)
             height += d[c] * n[c];
-        }
         if (of_plane ? p->plane[near->index[a]] != p->plane[i]
                      : height * height > coplanar * coplanar * near->squared[a])
             continue;

@@ -11,13 +11,14 @@
 #include "base/parallel.h"
 #include "pack/emit_node.h"
 
-enum { batch_nodes = 256 };
+enum { nodes_a_worker = 16 }; /* of a batch: few are waited for at its end, little lies in memory */
 
 struct emit {
-    const struct spl_tree *tree;
+    struct spl_tree *tree;
     struct spl_stage *stage;
     struct spl_node_encoder *encoders; /* by worker */
     struct spl_encoded_node *batch;
+    size_t batch_nodes;
     struct spl_node *nodes;
     size_t first; /* node of the batch's first element */
     atomic_bool failed;
@@ -32,6 +33,7 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
             atomic_store(&e->failed, true);
         if (atomic_load(&e->failed))
             return;
+        spl_tree_drop_splats(e->tree, (uint32_t)(e->first + i));
         spl_stage_add(e->stage, e->tree->nodes[e->first + i].splat_count, worker);
     }
 }
@@ -121,7 +123,7 @@ static int allocate(struct emit *e, const struct spl_node_encoder *encoder, stru
     size_t chunks = (largest + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
     spl_assert(chunks <= SPL_NODE_CHUNKS_MAX);
     e->nodes = out->nodes = spl_alloc(e->tree->count, sizeof *out->nodes, err);
-    e->batch = spl_alloc(batch_nodes, sizeof *e->batch, err);
+    e->batch = spl_alloc(e->batch_nodes, sizeof *e->batch, err);
     e->encoders = spl_alloc(e->stage->threads, sizeof *e->encoders, err);
     if (!e->nodes || !e->batch || !e->encoders)
         return SPL_E_NOMEM;
@@ -133,17 +135,17 @@ static int allocate(struct emit *e, const struct spl_node_encoder *encoder, stru
     return rc;
 }
 
-static void clear_batch(struct spl_encoded_node *batch)
+static void clear_batch(struct emit *e)
 {
-    for (size_t i = 0; i < batch_nodes; i++)
-        spl_encoded_node_finish(&batch[i]);
+    for (size_t i = 0; i < e->batch_nodes; i++)
+        spl_encoded_node_finish(&e->batch[i]);
 }
 
-int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const struct spl_wires *wires,
+int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struct spl_wires *wires,
              const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,
              struct spl_emitted *out, struct spl_error *err)
 {
-    struct emit e = {.tree = tree, .stage = stage};
+    struct emit e = {.tree = tree, .stage = stage, .batch_nodes = nodes_a_worker * (size_t)stage->threads};
     const struct spl_node_encoder encoder = {
         .points = points, .wires = wires, .options = options, .streams = &out->streams};
     size_t chunk_capacity = 0, splats = 0;
@@ -152,14 +154,14 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     spl_stage_begin(stage, "encoding", "splats", splats);
     spl_emitted_streams_init(&out->streams, points);
     int rc = allocate(&e, &encoder, out, err);
-    for (e.first = 0; !rc && e.first < tree->count; e.first += batch_nodes) {
-        size_t count = tree->count - e.first < batch_nodes ? tree->count - e.first : batch_nodes;
+    for (e.first = 0; !rc && e.first < tree->count; e.first += e.batch_nodes) {
+        size_t count = tree->count - e.first < e.batch_nodes ? tree->count - e.first : e.batch_nodes;
         spl_parallel_for(stage->threads, count, 1, encode_nodes, &e);
         if (atomic_load(&e.failed))
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory while encoding %zu splats", splats);
         for (size_t i = 0; !rc && i < count; i++)
             rc = write_node(&e, e.first + i, &e.batch[i], writer, &chunk_capacity, out, err);
-        clear_batch(e.batch);
+        clear_batch(&e);
         if (!rc)
             rc = spl_stage_check(stage, err);
     }
@@ -172,7 +174,7 @@ int spl_emit(const struct spl_tree *tree, const struct spl_points *points, const
     for (unsigned t = 0; e.encoders && t < stage->threads; t++)
         spl_node_encoder_finish(&e.encoders[t]);
     if (e.batch)
-        clear_batch(e.batch);
+        clear_batch(&e);
     free(e.batch);
     free(e.encoders);
     return rc;

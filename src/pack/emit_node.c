@@ -28,7 +28,7 @@ static void load_leaf(const struct spl_points *p, const struct spl_tree_node *no
     size_t i = node->begin + at;
     *s = (struct spl_splat){0};
     for (int c = 0; c < 3; c++) {
-        position[c] = p->axis[c][i] - node->origin[c];
+        position[c] = spl_points_at(p, c, i) - node->origin[c];
         s->normal[c] = p->normal[i][c];
     }
     s->radius = p->radius[i];
@@ -48,7 +48,7 @@ static void load_inner(const struct spl_tree_node *node, uint32_t at, struct spl
         s->normal[c] = from->normal[c];
     }
     s->radius = from->radius;
-    s->linear = from->linear;
+    s->linear = spl_inner_is_linear(from);
     set_color(s, from->color_class);
 }
 
@@ -211,7 +211,7 @@ static uint32_t put_linear_first(struct spl_node_encoder *w, const struct spl_tr
     for (uint32_t i = 0; i < count; i++) {
         const struct spl_cut item = w->items[i];
         if (spl_tree_node_has_points(node) ? !p->linear || !p->linear[node->begin + item.index]
-                                           : !node->splats[item.index].linear)
+                                           : !spl_inner_is_linear(&node->splats[item.index]))
             continue;
         w->items[i] = w->items[linear];
         w->items[linear++] = item;
@@ -271,7 +271,7 @@ bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *nod
         float radius = leaf ? p->radius[node->begin + at] : node->splats[at].radius;
         for (int c = 0; c < 3; c++) {
             w->items[i].position[c] =
-                leaf ? (float)(p->axis[c][node->begin + at] - node->origin[c]) : node->splats[at].position[c];
+                leaf ? (float)(spl_points_at(p, c, node->begin + at) - node->origin[c]) : node->splats[at].position[c];
         }
         w->items[i].index = at;
         w->radii[i++] = radius;

@@ -30,7 +30,7 @@ static double uncertainty_of_point(const struct spl_points *points, size_t i)
 
 static double uncertainty_of_inner(const struct spl_inner_splat *splat)
 {
-    return (double)splat->uncertainty;
+    return (double)spl_inner_get_uncertainty(splat);
 }
 
 static double uncertainty_of_panel(const struct spl_panel_values *values)

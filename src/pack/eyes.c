@@ -29,8 +29,9 @@ double spl_eyes_get_outward(const struct spl_points *points, size_t i)
     if (!points->eye_count)
         return points->up[0] * (double)n[0] + points->up[1] * (double)n[1] + points->up[2] * (double)n[2];
     for (size_t e = 0; e < points->eye_count; e++) {
-        double x = points->eyes[e][0] - points->axis[0][i], y = points->eyes[e][1] - points->axis[1][i],
-               z = points->eyes[e][2] - points->axis[2][i], square = x * x + y * y + z * z;
+        double x = points->eyes[e][0] - spl_points_at(points, 0, i),
+               y = points->eyes[e][1] - spl_points_at(points, 1, i),
+               z = points->eyes[e][2] - spl_points_at(points, 2, i), square = x * x + y * y + z * z;
         if (square < least) {
             least = square;
             outward = x * (double)n[0] + y * (double)n[1] + z * (double)n[2];

@@ -323,55 +323,6 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
     return rc;
 }
 
-static bool votes(int scalar)
-{
-    return scalar == SPL_SCALAR_RETURN || scalar == SPL_SCALAR_RETURNS || scalar == SPL_SCALAR_SCAN;
-}
-
-/* Those of a part are kept as those of all others, whatever values it has. */
-static int settle_as_ruled(struct spl_points *p, const struct spl_part_rules *rules, struct spl_error *err)
-{
-    int rc = SPL_OK;
-    for (int s = 0; s < SPL_POINT_SCALARS && !rc && p->count; s++) {
-        struct spl_scalar_values *scalar = &p->scalar[s];
-        if (!(rules->scalars >> s & 1)) {
-            spl_spill_free(p->spill, scalar->values);
-            *scalar = (struct spl_scalar_values){0};
-            continue;
-        }
-        scalar->votes = votes(s);
-        if (!scalar->values) /* no point here has any */
-            rc = spl_scalar_add(scalar, p->capacity, p->count, NULL, 0, err);
-        if (!rc && !spl_scalar_settle_as(scalar, &rules->steps[s]))
-            rc = spl_fail_field(err, SPL_E_INPUT, "scalars",
-                                "the scans' \"%s\" is from %.17g to %.17g%s, unlike in the plan (from %.17g in %.17g a "
-                                "unit): make the plan anew",
-                                spl_kept_name(p->keep, s), scalar->min, scalar->max,
-                                scalar->missing ? " and missing in some" : "", rules->steps[s].first,
-                                rules->steps[s].steps_a_unit);
-    }
-    return rc;
-}
-
-/* Leaves out those that say nothing: all points have the same, and nobody named it. */
-static int settle_scalars(struct spl_points *p, struct spl_error *err)
-{
-    int rc = SPL_OK;
-    for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++) {
-        struct spl_scalar_values *scalar = &p->scalar[s];
-        if (!scalar->values)
-            continue;
-        scalar->votes = votes(s);
-        if (!spl_scalar_is_constant(scalar) || spl_kept_is_named(p->keep, s)) {
-            rc = spl_scalar_settle(scalar, p->count, err);
-        } else {
-            spl_spill_free(p->spill, scalar->values);
-            *scalar = (struct spl_scalar_values){0};
-        }
-    }
-    return rc;
-}
-
 /* What breaks after some of it was read has left its mark: on the common range of grey, on which arrays there are. So
  * that the result is that of a pack without it, all others are read once more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
@@ -407,21 +358,12 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
         rc = spl_inputs_fail_empty(scans->inputs, err);
     points->up[2] = 1;
     if (!rc)
-        rc = scans->rules ? settle_as_ruled(points, scans->rules, err) : settle_scalars(points, err);
+        rc = spl_points_settle(points, scans->rules, err);
     if (!rc && !points->count && !scans->rules)
         rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
                       scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
                       (unsigned long long)points->points_skipped);
     return rc;
-}
-
-unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS])
-{
-    unsigned count = 0;
-    for (int s = 0; s < SPL_POINT_SCALARS; s++)
-        if (points->scalar[s].values)
-            list[count++] = s;
-    return count;
 }
 
 void spl_points_finish(struct spl_points *points)

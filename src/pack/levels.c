@@ -19,6 +19,7 @@
 #include "pack/tree.h"
 
 #include <float.h>
+#include <malloc.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -82,13 +83,12 @@ static void load_point(const struct spl_points *p, const struct spl_tree_node *p
                        struct spl_inner_splat *out)
 {
     for (int c = 0; c < 3; c++) {
-        out->position[c] = (float)(p->axis[c][i] - parent->origin[c]);
+        out->position[c] = (float)(spl_points_at(p, c, i) - parent->origin[c]);
         out->normal[c] = p->normal[i][c];
     }
     out->radius = p->radius[i];
-    out->uncertainty = p->uncertainty[i];
     out->color_class = p->color_class[i];
-    out->linear = p->linear && p->linear[i];
+    spl_inner_set(out, p->uncertainty[i], p->linear && p->linear[i]);
 }
 
 /* Puts the child's splats into w->input from `at` on, their positions relative to the parent's origin, and their
@@ -153,8 +153,8 @@ static void add_to(struct cluster *k, const struct spl_inner_splat *s)
     }
     k->weight += w;
     k->length += s->radius;
-    k->linear += s->linear ? w : 0;
-    k->uncertainty += w * s->uncertainty;
+    k->linear += spl_inner_is_linear(s) ? w : 0;
+    k->uncertainty += w * spl_inner_get_uncertainty(s);
     k->largest = s->radius > k->largest ? s->radius : k->largest;
     uint8_t classification = s->color_class >> 24;
     if (k->votes == 0)
@@ -267,9 +267,8 @@ static void finish_cluster(const struct cluster *k, double cell, double farthest
     double reach = fmin(sqrt(3 * fmax(0, k->squared / weight - mean2)), fmax(farthest * sqrt(weight), k->length));
     double radius = fmin(fmax(sqrt(weight), reach), 1.1284 * 1.4142 * cell);
     out->radius = fmaxf((float)radius, k->largest);
-    out->uncertainty = (float)(k->uncertainty / weight);
     out->color_class = (uint32_t)k->classification << 24;
-    out->linear = 2 * k->linear > weight;
+    spl_inner_set(out, (float)(k->uncertainty / weight), 2 * k->linear > weight);
     for (int c = 0; c < 3; c++)
         out->color_class |= (uint32_t)(k->color[c] / weight + 0.5) << 8 * c;
 }
@@ -459,5 +458,6 @@ done:
     }
     free(l.scratch);
     free(order);
+    malloc_trim(0); /* of the scratch */
     return rc;
 }

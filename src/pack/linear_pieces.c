@@ -22,7 +22,7 @@ static bool take_points(const struct spl_points *p, const struct spl_linear_leve
     for (size_t i = l->cells.cells[cell].begin; i < l->cells.cells[cell + 1].begin; i++) {
         double along = 0, squared = 0;
         for (int c = 0; c < 3; c++) {
-            double d = (p->axis[c][i] - origin[c]) * inverse;
+            double d = (spl_points_at(p, c, i) - origin[c]) * inverse;
             squared += d * d;
             along += d * line->direction[c];
         }

@@ -1,5 +1,6 @@
 /* A search: included by a file for each set of instructions (near_set.h), which calls spl_near_find(). Loops over 16
- * points or 8 boxes are written to vectorise; contraction is off, so all give the same bits. */
+ * points or 8 boxes are written to vectorise; contraction is off, so all give the same bits. Each kind of coordinates
+ * has a search of its own. */
 #ifndef SPL_PACK_NEAR_FIND_H
 #define SPL_PACK_NEAR_FIND_H
 
@@ -21,22 +22,39 @@ struct entry {
     unsigned level; /* the box is around the group with this number of the level below; on level 0 a leaf */
 };
 
-/* Squared distances from `at` to SPL_LANES points. */
-SPL_INLINE spl_vec point_distances(const struct spl_points *p, size_t first, const double at[3])
+/* Coordinates of SPL_LANES points; `kind` is a constant wherever this is compiled. */
+SPL_INLINE void load_points(const struct spl_points *p, enum spl_points_kind kind, size_t first, spl_vec at[3])
 {
-    spl_vec dx = *(const spl_vec *)(p->axis[0] + first) - at[0];
-    spl_vec dy = *(const spl_vec *)(p->axis[1] + first) - at[1];
-    spl_vec dz = *(const spl_vec *)(p->axis[2] + first) - at[2];
+    if (kind == SPL_POINTS_DOUBLES)
+        for (int c = 0; c < 3; c++)
+            at[c] = *(const spl_vec *)(p->axis[c] + first);
+    else if (kind == SPL_POINTS_FLOATS)
+        for (int c = 0; c < 3; c++)
+            at[c] = __builtin_convertvector(*(const spl_vec_floats *)(p->floats[c] + first), spl_vec);
+    else
+        for (int c = 0; c < 3; c++)
+            at[c] = __builtin_convertvector(*(const spl_vec_steps *)(p->steps[c] + first), spl_vec) * p->step[c] +
+                    p->first[c];
+}
+
+/* Squared distances from `at` to SPL_LANES points. */
+SPL_INLINE spl_vec point_distances(const struct spl_points *p, enum spl_points_kind kind, size_t first,
+                                   const double at[3])
+{
+    spl_vec to[3];
+    load_points(p, kind, first, to);
+    spl_vec dx = to[0] - at[0], dy = to[1] - at[1], dz = to[2] - at[2];
     return dx * dx + dy * dy + dz * dz;
 }
 
-SPL_INLINE void scan_leaf(const struct spl_points *p, size_t first, const double at[3], struct spl_near_set *c)
+SPL_INLINE void scan_leaf(const struct spl_points *p, enum spl_points_kind kind, size_t first, const double at[3],
+                          struct spl_near_set *c)
 {
     unsigned n = c->count, used = p->count - first < leaf ? (unsigned)(p->count - first) : leaf;
     for (unsigned k = 0; k < leaf; k += SPL_LANES) {
         double squared[SPL_LANES];
         uint32_t index[SPL_LANES];
-        spl_vec distances = point_distances(p, first + k, at);
+        spl_vec distances = point_distances(p, kind, first + k, at);
         unsigned bits = spl_bits_within(distances, c->bound);
         bits &= used >= k + SPL_LANES ? ~0u : used > k ? (1u << (used - k)) - 1 : 0;
         *(spl_vec *)squared = distances;
@@ -78,8 +96,8 @@ SPL_INLINE unsigned group_distances(const struct spl_box_group *g, const double 
 }
 
 /* A search on its own, nearest boxes first: among the boxes of a group the nearest is on top of the stack. */
-SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *points, const double at[3],
-                     struct spl_near_set *c)
+SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *points, enum spl_points_kind kind,
+                     const double at[3], struct spl_near_set *c)
 {
     struct entry stack[stack_max + 1];
     unsigned depth = 0;
@@ -89,7 +107,7 @@ SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *poi
         if (e.squared > c->bound)
             continue;
         if (!e.level) {
-            scan_leaf(points, (size_t)e.box * leaf, at, c);
+            scan_leaf(points, kind, (size_t)e.box * leaf, at, c);
             continue;
         }
         double squared[fan];
@@ -105,17 +123,23 @@ SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *poi
 
 /* For each point of leaf `l` a squared distance within which at least `wanted` points lie, itself included: of the
  * `size` points from `first` on, those beside it in order. Several points of the leaf at once. */
-SPL_INLINE void bound_in_order(const struct spl_points *p, size_t l, size_t first, size_t size, unsigned wanted,
-                               double bound[leaf])
+SPL_INLINE void bound_in_order(const struct spl_points *p, enum spl_points_kind kind, size_t l, size_t first,
+                               size_t size, unsigned wanted, double bound[leaf])
 {
+    double around[3][SPL_NEIGHBOURS_MAX + 1 + leaf + SPL_LANES];
+    for (size_t k = 0; k < size; k += SPL_LANES) {
+        spl_vec at[3];
+        load_points(p, kind, first + k, at);
+        for (int c = 0; c < 3; c++)
+            *(spl_vec *)(around[c] + k) = at[c];
+    }
     for (unsigned g = 0; g < leaf; g += SPL_LANES) {
         spl_vec squared[SPL_NEIGHBOURS_MAX + 1 + leaf], low = {0}, high = {0}, low_count = {0};
         spl_vec high_count = SPL_VEC((double)size), most = SPL_VEC((double)wanted);
-        const spl_vec x = *(const spl_vec *)(p->axis[0] + l * leaf + g);
-        const spl_vec y = *(const spl_vec *)(p->axis[1] + l * leaf + g);
-        const spl_vec z = *(const spl_vec *)(p->axis[2] + l * leaf + g);
+        spl_vec from[3];
+        load_points(p, kind, l * leaf + g, from);
         for (size_t k = 0; k < size; k++) {
-            spl_vec dx = p->axis[0][first + k] - x, dy = p->axis[1][first + k] - y, dz = p->axis[2][first + k] - z;
+            spl_vec dx = around[0][k] - from[0], dy = around[1][k] - from[1], dz = around[2][k] - from[2];
             squared[k] = dx * dx + dy * dy + dz * dz;
             high = spl_greater(squared[k], high);
         }
@@ -136,15 +160,15 @@ SPL_INLINE void bound_in_order(const struct spl_points *p, size_t l, size_t firs
 }
 
 /* What the searches for the points of leaf `l` share. */
-SPL_INLINE void enter_leaf(const struct spl_boxes *boxes, const struct spl_points *p, size_t l, unsigned wanted,
-                           struct spl_nearest *nearest)
+SPL_INLINE void enter_leaf(const struct spl_boxes *boxes, const struct spl_points *p, enum spl_points_kind kind,
+                           size_t l, unsigned wanted, struct spl_nearest *nearest)
 {
     size_t begin = l * leaf, end = begin + leaf < p->count ? begin + leaf : p->count;
     size_t size = wanted + leaf < p->count ? wanted + leaf : p->count;
     size_t before = (size - (end - begin)) / 2, first = begin > before ? begin - before : 0;
     first = first + size > p->count ? p->count - size : first;
     double reach = 0, from[3], to[3];
-    bound_in_order(p, l, first, size, wanted, nearest->bound);
+    bound_in_order(p, kind, l, first, size, wanted, nearest->bound);
     for (size_t i = 0; i < end - begin; i++)
         reach = nearest->bound[i] > reach ? nearest->bound[i] : reach;
     const struct spl_box_group *own = &boxes->groups[l / fan];
@@ -186,13 +210,13 @@ SPL_INLINE void enter_leaf(const struct spl_boxes *boxes, const struct spl_point
 
 /* A squared distance within which as many points lie as are wanted, from what was found for points of the same leaf:
  * as far as their farthest, and from there to here. Infinite where none was asked for. */
-SPL_INLINE double bound_from_found(const struct spl_points *p, size_t l, const double at[3],
+SPL_INLINE double bound_from_found(const struct spl_points *p, enum spl_points_kind kind, size_t l, const double at[3],
                                    const struct spl_nearest *nearest)
 {
     double reach[leaf];
     spl_vec least = SPL_VEC(INFINITY);
     for (unsigned k = 0; k < leaf; k += SPL_LANES)
-        *(spl_vec *)(reach + k) = point_distances(p, l * leaf + k, at);
+        *(spl_vec *)(reach + k) = point_distances(p, kind, l * leaf + k, at);
     for (unsigned k = 0; k < leaf; k++)
         reach[k] = sqrt(reach[k]) + nearest->found[k];
     for (unsigned k = 0; k < leaf; k += SPL_LANES)
@@ -203,30 +227,30 @@ SPL_INLINE double bound_from_found(const struct spl_points *p, size_t l, const d
     return found * found * (1 + 1e-14); /* roots and sums are rounded */
 }
 
-/* As spl_neighbours_find(). */
-SPL_INLINE void spl_near_find(const struct spl_boxes *boxes, const struct spl_points *p, size_t i, unsigned k,
-                              struct spl_nearest *nearest)
+SPL_INLINE void find_kind(const struct spl_boxes *boxes, const struct spl_points *p, enum spl_points_kind kind,
+                          size_t i, unsigned k, struct spl_nearest *nearest)
 {
-    const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+    double at[3];
+    spl_points_place(p, i, at);
     struct spl_near_set c;
     c.count = 0;
     c.wanted = k + 1 < p->count ? k + 1 : (unsigned)p->count;
     if (nearest->leaf != i / leaf)
-        enter_leaf(boxes, p, i / leaf, c.wanted, nearest);
-    const double found = bound_from_found(p, i / leaf, at, nearest);
+        enter_leaf(boxes, p, kind, i / leaf, c.wanted, nearest);
+    const double found = bound_from_found(p, kind, i / leaf, at, nearest);
     c.bound = nearest->bound[i % leaf] < found ? nearest->bound[i % leaf] : found;
     if (nearest->crowded) {
-        walk(boxes, p, at, &c);
+        walk(boxes, p, kind, at, &c);
     } else {
         const double *const low[3] = {nearest->low[0], nearest->low[1], nearest->low[2]};
         const double *const high[3] = {nearest->high[0], nearest->high[1], nearest->high[2]};
-        scan_leaf(p, i / leaf * leaf, at, &c);
+        scan_leaf(p, kind, i / leaf * leaf, at, &c);
         for (unsigned b = 0; b < nearest->leaves; b += SPL_LANES) {
             unsigned bits = spl_bits_within(box_distances(low, high, b, at, at), c.bound);
             for (; bits; bits &= bits - 1) {
                 uint32_t l = nearest->leaf_index[b + (unsigned)__builtin_ctz(bits)];
                 if (l != i / leaf)
-                    scan_leaf(p, (size_t)l * leaf, at, &c);
+                    scan_leaf(p, kind, (size_t)l * leaf, at, &c);
             }
         }
     }
@@ -245,6 +269,18 @@ SPL_INLINE void spl_near_find(const struct spl_boxes *boxes, const struct spl_po
     for (unsigned a = 1; a < SPL_LANES; a++)
         farthest = most[a] > farthest ? most[a] : farthest;
     nearest->farthest = nearest->found[i % leaf] = sqrt(farthest);
+}
+
+/* As spl_neighbours_find(). */
+SPL_INLINE void spl_near_find(const struct spl_boxes *boxes, const struct spl_points *p, size_t i, unsigned k,
+                              struct spl_nearest *nearest)
+{
+    if (p->kind == SPL_POINTS_DOUBLES)
+        find_kind(boxes, p, SPL_POINTS_DOUBLES, i, k, nearest);
+    else if (p->kind == SPL_POINTS_FLOATS)
+        find_kind(boxes, p, SPL_POINTS_FLOATS, i, k, nearest);
+    else
+        find_kind(boxes, p, SPL_POINTS_STEPS, i, k, nearest);
 }
 
 #endif

@@ -26,6 +26,8 @@ enum { SPL_LANES = 2 };
 /* A few doubles, unaligned in memory; comparisons give masks. */
 typedef double spl_vec __attribute__((vector_size(SPL_LANES * 8), aligned(8), may_alias));
 typedef int64_t spl_mask __attribute__((vector_size(SPL_LANES * 8), aligned(8), may_alias));
+typedef float spl_vec_floats __attribute__((vector_size(SPL_LANES * 4), aligned(4), may_alias));
+typedef int32_t spl_vec_steps __attribute__((vector_size(SPL_LANES * 4), aligned(4), may_alias));
 #define SPL_VEC(v) ((v) - (spl_vec){0}) /* of -0 too */
 
 enum {

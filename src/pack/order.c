@@ -119,7 +119,7 @@ uint64_t spl_points_key(const struct spl_points *points, size_t i, const double 
 {
     uint32_t cell[3];
     for (int c = 0; c < 3; c++)
-        cell[c] = spl_morton_cell(points->axis[c][i], low[c], size);
+        cell[c] = spl_morton_cell(spl_points_at(points, c, i), low[c], size);
     return spl_morton_encode(cell[0], cell[1], cell[2]);
 }
 

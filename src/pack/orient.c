@@ -75,10 +75,14 @@ SPL_INLINE void agree(const float a[3], const struct beside *b, spl_floats *agre
     *agreement = (spl_floats)((spl_marks)((ab - 2 * behind) * (1 - size)) & b->counts);
 }
 
-SPL_INLINE void set_beside(struct beside *b, unsigned a, const struct spl_points *p, size_t i, size_t j, bool counts)
+/* Point j beside `at`. */
+SPL_INLINE void set_beside(struct beside *b, unsigned a, const struct spl_points *p, const double at[3], size_t j,
+                           bool counts)
 {
+    double apart[3];
+    spl_points_apart(p, at, j, apart);
     for (int c = 0; c < 3; c++) {
-        b->apart[c][a] = (float)(p->axis[c][j] - p->axis[c][i]);
+        b->apart[c][a] = (float)apart[c];
         b->normal[c][a] = p->normal[j][c];
     }
     b->counts[a] = counts ? -1 : 0;
@@ -88,7 +92,9 @@ float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j)
 {
     struct beside b = {0};
     spl_floats agreement;
-    set_beside(&b, 0, points, i, j, true);
+    double at[3];
+    spl_points_place(points, i, at);
+    set_beside(&b, 0, points, at, j, true);
     agree(points->normal[i], &b, &agreement);
     return agreement[0];
 }
@@ -250,6 +256,8 @@ SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
     for (uint32_t i = 0; i < g->count; i++) {
         float *agreement = g->agreement + (size_t)i * g->k;
         unsigned edges = 0, agreed = 0;
+        double at[3];
+        spl_points_place(g->points, g->begin + i, at);
         for (unsigned first = 0; first < g->k; first += eight) {
             struct beside beside;
             spl_floats agreements;
@@ -257,7 +265,7 @@ SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
             for (unsigned a = 0; a < eight; a++) {
                 uint32_t j = i;
                 bool is_inside = a < count && get_neighbour(g, i, first + a, &j);
-                set_beside(&beside, a, g->points, g->begin + i, g->begin + (is_inside ? j : i), is_inside);
+                set_beside(&beside, a, g->points, at, g->begin + (is_inside ? j : i), is_inside);
                 edges += is_inside;
             }
             agree(g->points->normal[g->begin + i], &beside, &agreements);

@@ -1,4 +1,5 @@
-/* The cloud in memory while it is packed: structure of arrays, exact doubles, one element a point. */
+/* The cloud in memory while it is packed: structure of arrays, one element a point. Coordinates are exact doubles, kept
+ * as 32 bits where these say all of them. */
 #ifndef SPL_PACK_POINTS_H
 #define SPL_PACK_POINTS_H
 
@@ -22,10 +23,19 @@ struct spl_point_clip {
     uint8_t offset;
 };
 
+/* How coordinates are kept: what they are, and what a scan wrote them as, which takes half the room. */
+enum spl_points_kind { SPL_POINTS_DOUBLES, SPL_POINTS_FLOATS, SPL_POINTS_STEPS };
+
 struct spl_points {
     struct spl_spill *spill;     /* where the arrays lie, borrowed; NULL: in memory */
     size_t count, capacity;      /* arrays have room for capacity + SPL_POINTS_PAD elements */
-    double *axis[3];             /* x, y, z; sorted in Morton order by spl_points_order() */
+    union {                      /* x, y, z; sorted in Morton order by spl_points_order() */
+        double *axis[3];         /* SPL_POINTS_DOUBLES, until spl_points_narrow() */
+        float *floats[3];        /* SPL_POINTS_FLOATS */
+        int32_t *steps[3];       /* SPL_POINTS_STEPS: as many of `step` from `first` on */
+    };
+    enum spl_points_kind kind;
+    double step[3], first[3];
     uint32_t *color_class;       /* r | g << 8 | b << 16 | class << 24 */
     uint16_t *station;           /* index into stations or SPL_NO_STATION; NULL when no input has any */
     float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
@@ -58,6 +68,44 @@ static inline double spl_points_coordinate(double v)
     return v < 1e-15 && v > -1e-15 ? 0 : v;
 }
 
+static inline double spl_points_at(const struct spl_points *points, int c, size_t i)
+{
+    if (points->kind == SPL_POINTS_DOUBLES)
+        return points->axis[c][i];
+    if (points->kind == SPL_POINTS_FLOATS)
+        return (double)points->floats[c][i];
+    return points->steps[c][i] * points->step[c] + points->first[c];
+}
+
+/* All three, for loops that take many. */
+static inline __attribute__((always_inline)) void spl_points_place(const struct spl_points *points, size_t i,
+                                                                   double at[3])
+{
+    if (points->kind == SPL_POINTS_DOUBLES)
+        for (int c = 0; c < 3; c++)
+            at[c] = points->axis[c][i];
+    else if (points->kind == SPL_POINTS_FLOATS)
+        for (int c = 0; c < 3; c++)
+            at[c] = (double)points->floats[c][i];
+    else
+        for (int c = 0; c < 3; c++)
+            at[c] = points->steps[c][i] * points->step[c] + points->first[c];
+}
+
+/* From a place to point i. */
+static inline __attribute__((always_inline)) void spl_points_apart(const struct spl_points *points,
+                                                                   const double from[3], size_t i, double apart[3])
+{
+    spl_points_place(points, i, apart);
+    for (int c = 0; c < 3; c++)
+        apart[c] -= from[c];
+}
+
+static inline size_t spl_points_axis_bytes(const struct spl_points *points) /* of a coordinate */
+{
+    return points->kind == SPL_POINTS_DOUBLES ? sizeof(double) : sizeof(float);
+}
+
 /* SPL_E_LIMIT where the scans' headers say that they have more points than there can be, SPL_POINTS_MAX. */
 int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err);
 
@@ -67,12 +115,21 @@ int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err)
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
                       struct spl_error *err);
 
+/* Decides which of the scalars are kept and their steps: those of a part (`rules`; else NULL) as of all others, else
+ * those that say something. SPL_E_INPUT where a part's are not as its rules say. */
+int spl_points_settle(struct spl_points *points, const struct spl_part_rules *rules, struct spl_error *err);
+
 /* Fills `list` with the indices of the scalars that the points have, in order; returns how many. */
 unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_POINT_SCALARS]);
 
 /* Sorts all arrays in Morton order and drops points with equal coordinates. Which of them stays depends on what they
  * have alone, so that the result is the same in whatever order points were read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
+
+/* Keeps coordinates as floats, or as the steps of `steps` (NULL: of none), where all are exactly that. Nobody sees a
+ * difference who reads them by spl_points_at(). */
+int spl_points_narrow(struct spl_points *points, const struct spl_cloud_coordinates *steps, struct spl_stage *stage,
+                      struct spl_error *err);
 
 /* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX), with `clip_lines`
  * where discs end; needs sorted points. */

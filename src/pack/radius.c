@@ -33,10 +33,11 @@ static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
 
 struct spl_moments spl_moments_of(const struct spl_points *p, size_t i, const struct spl_nearest *near)
 {
-    double sum[3] = {0}, m[6] = {0};
+    double at[3], sum[3] = {0}, m[6] = {0};
+    spl_points_place(p, i, at);
     for (unsigned a = 0; a < near->count; a++) {
-        uint32_t j = near->index[a];
-        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
+        double d[3];
+        spl_points_apart(p, at, near->index[a], d);
         for (int c = 0; c < 3; c++)
             sum[c] += d[c];
         m[0] += d[0] * d[0];
@@ -68,6 +69,8 @@ static inline __attribute__((always_inline)) void widen_any(const struct spl_vic
 {
     const struct spl_points *p = v->points;
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
+    double at[3], d[3];
+    spl_points_place(p, i, at);
     *out = v->moments[i - v->begin];
     spl_four sums = *(const spl_four *)&out->count;
     spl_eight squares = *(const spl_eight *)out->square;
@@ -76,8 +79,8 @@ static inline __attribute__((always_inline)) void widen_any(const struct spl_vic
         if (j < v->begin || j >= v->end)
             continue;
         const struct spl_moments *m = &v->moments[j - v->begin];
-        const spl_eight apart = {0, (float)(p->axis[0][j] - p->axis[0][i]), (float)(p->axis[1][j] - p->axis[1][i]),
-                                 (float)(p->axis[2][j] - p->axis[2][i])};
+        spl_points_apart(p, at, j, d);
+        const spl_eight apart = {0, (float)d[0], (float)d[1], (float)d[2]};
         const spl_eight of = *(const spl_eight *)&m->count;
         const spl_eight row_apart = BY_ROW(apart), column_apart = BY_COLUMN(apart);
         sums += *(const spl_four *)&m->count + m->count * (spl_four){apart[0], apart[1], apart[2], apart[3]};
@@ -169,15 +172,16 @@ static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighb
     int least = fabs(normal[0]) < fabs(normal[1]) ? 0 : 1;
     least = fabs(normal[2]) < fabs(normal[least]) ? 2 : least;
     int b = (least + 1) % 3, c = (least + 2) % 3;
-    double x[3], y[3];
+    double at[3], x[3], y[3];
+    spl_points_place(p, i, at);
     x[least] = 0, x[b] = normal[c], x[c] = -normal[b];
     y[least] = normal[b] * x[c] - normal[c] * x[b], y[b] = normal[c] * x[least] - normal[least] * x[c];
     y[c] = normal[least] * x[b] - normal[b] * x[least];
     for (int e = 0; e < 8; e++)
         nearest[e] = INFINITY;
     for (unsigned a = 0; a < count && neighbours[a] != UINT32_MAX; a++) {
-        uint32_t j = neighbours[a];
-        double d[3] = {p->axis[0][j] - p->axis[0][i], p->axis[1][j] - p->axis[1][i], p->axis[2][j] - p->axis[2][i]};
+        double d[3];
+        spl_points_apart(p, at, neighbours[a], d);
         double u = d[0] * x[0] + d[1] * x[1] + d[2] * x[2], v = d[0] * y[0] + d[1] * y[1] + d[2] * y[2];
         double h = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2];
         double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -261,13 +265,12 @@ void spl_radius_spread(const struct spl_vicinity *v, size_t begin, size_t end, s
 /* Eq. 20 over as few neighbours as two, the least of them all: what points of another leaf or wall do not enlarge. */
 static double least_radius(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count)
 {
-    double squared[SPL_NEIGHBOURS_MAX], least = INFINITY;
+    double squared[SPL_NEIGHBOURS_MAX], least = INFINITY, at[3], d[3];
     unsigned n = 0;
+    spl_points_place(p, i, at);
     for (; n < count && neighbours[n] != UINT32_MAX; n++) {
-        uint32_t j = neighbours[n];
-        squared[n] = 0;
-        for (int c = 0; c < 3; c++)
-            squared[n] += (p->axis[c][j] - p->axis[c][i]) * (p->axis[c][j] - p->axis[c][i]);
+        spl_points_apart(p, at, neighbours[n], d);
+        squared[n] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     }
     for (unsigned a = 0; a < n; a++) {
         double within = 0; /* neighbours as near as this one */

@@ -30,7 +30,7 @@ bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
         for (size_t i = 0; i < count; i++) {
             if (i % 256 == 0)
                 spl_spill_keep_bound(p->spill);
-            sample[i] = p->axis[c][i * p->count / count];
+            sample[i] = spl_points_at(p, c, i * p->count / count);
         }
         qsort(sample, count, sizeof *sample, compare);
         low[c] = sample[outer];

@@ -23,6 +23,7 @@
 #include "pack/settle.h"
 
 enum { block_points = 1 << 16 };
+_Static_assert((int)block_points <= UINT16_MAX + 1, "components of a block are told apart by 16 bits");
 static const float lone_radius = 0.01f;             /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
 static const float flat_limit = 4, round_limit = 2; /* times what is usual in the run of points around */
@@ -50,7 +51,7 @@ struct surface {
     struct block *blocks;
     size_t block_count;
     uint8_t *edge;   /* of each point, whether its surface may end there; NULL: no clip lines */
-    uint32_t *label; /* component of each point within its block; NULL when every side is known */
+    uint16_t *label; /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
     unsigned k, wide;
     atomic_bool failed;
@@ -73,7 +74,7 @@ static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, 
         const double *pose = p->stations[p->station[i]];
         side = 0;
         for (int c = 0; c < 3; c++)
-            side += least[c] * (pose[4 * c + 3] - p->axis[c][i]);
+            side += least[c] * (pose[4 * c + 3] - spl_points_at(p, c, i));
     }
     for (int c = 0; c < 3; c++)
         normal[c] = (float)(side < 0 ? -least[c] : least[c]);
@@ -91,7 +92,7 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
         struct spl_component *c = &block->components[o->label[i - begin]];
         c->outward += spl_eyes_get_outward(s->points, i);
         c->anchored |= o->anchored[i - begin];
-        s->label[i] = o->label[i - begin];
+        s->label[i] = (uint16_t)o->label[i - begin];
     }
     return true;
 }

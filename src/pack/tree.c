@@ -39,12 +39,12 @@ static void frame_points(struct spl_tree_node *node, const struct spl_points *po
 {
     node->frame_size = 0;
     for (int c = 0; c < 3; c++) {
-        double low = points->axis[c][node->begin], high = low;
+        double low = spl_points_at(points, c, node->begin), high = low;
         for (size_t i = node->begin; i < node->end; i++) {
             if (i % grain == 0)
                 spl_spill_keep_bound(points->spill);
-            low = fmin(low, points->axis[c][i]);
-            high = fmax(high, points->axis[c][i]);
+            low = fmin(low, spl_points_at(points, c, i));
+            high = fmax(high, spl_points_at(points, c, i));
         }
         node->frame_low[c] = low;
         node->frame_size = fmax(node->frame_size, high - low);
@@ -145,20 +145,18 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
     return rc;
 }
 
-void spl_tree_drop_splats(struct spl_tree *tree)
+void spl_tree_drop_splats(struct spl_tree *tree, uint32_t node)
 {
-    for (uint32_t i = 0; i < tree->count; i++) {
-        spl_spill_give(tree->spill, tree->nodes[i].splats);
-        spl_spill_give(tree->spill, tree->nodes[i].numbers);
-        tree->nodes[i].splats = NULL;
-        tree->nodes[i].numbers = NULL;
-    }
+    spl_spill_give(tree->spill, tree->nodes[node].splats);
+    spl_spill_give(tree->spill, tree->nodes[node].numbers);
+    tree->nodes[node].splats = NULL;
+    tree->nodes[node].numbers = NULL;
 }
 
 void spl_tree_finish(struct spl_tree *tree)
 {
-    spl_tree_drop_splats(tree);
     for (uint32_t i = 0; i < tree->count; i++) {
+        spl_tree_drop_splats(tree, i);
         if (tree->nodes[i].panels)
             spl_node_panels_finish(tree->nodes[i].panels);
         free(tree->nodes[i].panels);

@@ -2,6 +2,8 @@
 #ifndef SPL_PACK_TREE_H
 #define SPL_PACK_TREE_H
 
+#include <math.h>
+
 #include "pack/panels/panels.h"
 #include "pack/points.h"
 
@@ -11,10 +13,25 @@ enum { SPL_LEAF_POINTS = 8192, SPL_PRUNED_LEAF_POINTS = 512, SPL_PRUNED_LEAF_LEA
 /* A splat of an inner node; position relative to the node's origin. */
 struct spl_inner_splat {
     float position[3], normal[3];
-    float radius, uncertainty;
-    uint32_t color_class; /* as in struct spl_points */
-    bool linear;          /* most of what it stands for is */
+    float radius, uncertainty; /* the latter with a sign: see below */
+    uint32_t color_class;      /* as in struct spl_points */
 };
+
+/* Whether most of what it stands for is on a wire, a pole or a cable, is the sign of its uncertainty. */
+static inline void spl_inner_set(struct spl_inner_splat *splat, float uncertainty, bool linear)
+{
+    splat->uncertainty = copysignf(uncertainty, linear ? -1 : 1);
+}
+
+static inline bool spl_inner_is_linear(const struct spl_inner_splat *splat)
+{
+    return signbit(splat->uncertainty);
+}
+
+static inline float spl_inner_get_uncertainty(const struct spl_inner_splat *splat)
+{
+    return fabsf(splat->uncertainty);
+}
 
 struct spl_tree_node {
     double origin[3]; /* least corner of its cube */
@@ -53,8 +70,8 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
 int spl_levels_build(struct spl_tree *tree, const struct spl_points *points, struct spl_stage *stage,
                      struct spl_error *err);
 
-/* Frees the splats of inner nodes, which nobody reads any more; how many they were stays. */
-void spl_tree_drop_splats(struct spl_tree *tree);
+/* Frees the splats of a node, which nobody reads any more; how many they were stays. */
+void spl_tree_drop_splats(struct spl_tree *tree, uint32_t node);
 
 void spl_tree_finish(struct spl_tree *tree);
 

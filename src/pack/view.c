@@ -27,7 +27,7 @@ static bool view_from_camera(const struct spl_points *p, struct spl_default_view
         if (p->station[i] != 0)
             continue;
         for (int c = 0; c < 3; c++) {
-            double d = p->axis[c][i] - pose[4 * c + 3];
+            double d = spl_points_at(p, c, i) - pose[4 * c + 3];
             along += pose[4 * c + 2] * d;
             squared += d * d;
         }

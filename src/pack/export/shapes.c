@@ -73,7 +73,7 @@ static int outline(const struct outlining *o, uint32_t k)
         uint32_t point = o->member[o->first[k] + i];
         at[i][0] = at[i][1] = 0;
         for (int c = 0; c < 3; c++) {
-            double d = o->points->axis[c][point] - shape->plane->origin[c];
+            double d = spl_points_at(o->points, c, point) - shape->plane->origin[c];
             at[i][0] += d * shape->u[c];
             at[i][1] += d * shape->v[c];
         }

@@ -53,14 +53,7 @@ size_t spl_part_filter(const struct spl_part_rules *rules, const double low[3], 
         halo[to] = place == SPL_PART_HALO;
         inside += place == SPL_PART_INSIDE;
         if (to < i) {
-            memcpy(batch->position[to], batch->position[i], sizeof batch->position[i]);
-            memcpy(batch->color[to], batch->color[i], sizeof batch->color[i]);
-            memcpy(batch->normal[to], batch->normal[i], sizeof batch->normal[i]);
-            batch->classification[to] = batch->classification[i];
-            batch->station[to] = batch->station[i];
-            for (int s = 0; s < SPL_SCALAR_COUNT; s++)
-                if (scalars >> s & 1)
-                    batch->scalar[s][to] = batch->scalar[s][i];
+            spl_point_batch_move(batch, scalars, to, i);
             if (numbers)
                 numbers[to] = numbers[i];
         }
@@ -88,12 +81,12 @@ static void drop(const struct spl_points *p, void *array, size_t size)
 static void find_bounds(struct spl_points *p)
 {
     for (int c = 0; c < 3 && p->count; c++) {
-        double low = p->axis[c][0], high = low;
+        double low = spl_points_at(p, c, 0), high = low;
         for (size_t i = 1; i < p->count; i++) {
             if (i % 4096 == 0)
                 spl_spill_keep_bound(p->spill);
-            low = fmin(low, p->axis[c][i]);
-            high = fmax(high, p->axis[c][i]);
+            low = fmin(low, spl_points_at(p, c, i));
+            high = fmax(high, spl_points_at(p, c, i));
         }
         p->bounds_min[c] = low;
         p->bounds_max[c] = high;
@@ -108,7 +101,7 @@ void spl_part_drop_halo(struct spl_points *p)
     for (size_t i = 0; i < p->count; i++)
         left += !p->halo[i];
     for (int c = 0; c < 3; c++)
-        drop(p, p->axis[c], sizeof *p->axis[c]);
+        drop(p, p->axis[c], spl_points_axis_bytes(p));
     drop(p, p->color_class, sizeof *p->color_class);
     drop(p, p->station, sizeof *p->station);
     drop(p, p->normal, sizeof *p->normal);

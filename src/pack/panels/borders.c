@@ -33,7 +33,8 @@ static void find_box(const struct spl_points *p, const struct spl_panel_groups *
         box->low[c] = INFINITY;
         box->high[c] = -INFINITY;
         for (size_t k = run->begin; k < run->begin + run->count; k++) {
-            double at = p->axis[c][first + g->members[k]], reach = beside * (double)p->radius[first + g->members[k]];
+            double at = spl_points_at(p, c, first + g->members[k]);
+            double reach = beside * (double)p->radius[first + g->members[k]];
             box->low[c] = fmin(box->low[c], at - reach);
             box->high[c] = fmax(box->high[c], at + reach);
         }
@@ -52,7 +53,7 @@ static double distance(const struct spl_points *p, size_t i, const struct spl_pl
 {
     double off = 0;
     for (int c = 0; c < 3; c++)
-        off += plane->normal[c] * (p->axis[c][i] - plane->origin[c]);
+        off += plane->normal[c] * (spl_points_at(p, c, i) - plane->origin[c]);
     return off;
 }
 
@@ -60,7 +61,7 @@ static bool is_within(const struct spl_points *p, size_t i, const struct spl_pan
 {
     bool all = true;
     for (int c = 0; c < 3; c++)
-        all &= p->axis[c][i] >= box->low[c] && p->axis[c][i] <= box->high[c];
+        all &= spl_points_at(p, c, i) >= box->low[c] && spl_points_at(p, c, i) <= box->high[c];
     return all;
 }
 
@@ -89,7 +90,8 @@ static bool find_crease(const struct spl_points *p, size_t i, const struct spl_n
         if (p->plane[k] != p->plane[i])
             continue;
         for (int c = 0; c < 3; c++)
-            out += (p->axis[c][k] - p->axis[c][i]) * (direction[0] * (double)u[c] + direction[1] * (double)v[c]);
+            out += (spl_points_at(p, c, k) - spl_points_at(p, c, i)) *
+                   (direction[0] * (double)u[c] + direction[1] * (double)v[c]);
         if (out > *end + astray * spacing)
             return false;
     }

@@ -48,7 +48,7 @@ static void end_at_crease(const struct spl_panel_grid *g, size_t i, const struct
     bool known = p->eye_count || (p->station && p->station[i] != SPL_NO_STATION);
     double off[3];
     for (int c = 0; c < 3; c++)
-        off[c] = p->axis[c][i] - other->origin[c];
+        off[c] = spl_points_at(p, c, i) - other->origin[c];
     double above = dot3(off, other->normal), side = above > 0 ? -1 : 1;
     double cut = !known ? cut_at_either : above > 0 ? cut_in_corner : cut_at_edge;
     double along[2] = {side * dot3(other->normal, g->u), side * dot3(other->normal, g->v)};

@@ -103,7 +103,7 @@ static struct distances measure(const struct making *m, const struct spl_panel_p
             if (!touch->own)
                 continue;
             for (int c = 0; c < 3; c++)
-                off[c] = group->points->axis[c][group->first + touch->member] - group->node_origin[c] -
+                off[c] = spl_points_at(group->points, c, group->first + touch->member) - group->node_origin[c] -
                          (double)(float)plane->origin[c];
             double height = 0;
             if (group->plane->heights) {

@@ -91,7 +91,7 @@ static inline void spl_panel_grid_middle(const struct spl_panel_grid *grid, size
 {
     double off[3];
     for (int c = 0; c < 3; c++)
-        off[c] = grid->group->points->axis[c][i] - grid->group->plane->origin[c];
+        off[c] = spl_points_at(grid->group->points, c, i) - grid->group->plane->origin[c];
     at[0] = (off[0] * grid->u[0] + off[1] * grid->u[1] + off[2] * grid->u[2]) * grid->inverse;
     at[1] = (off[0] * grid->v[0] + off[1] * grid->v[1] + off[2] * grid->v[2]) * grid->inverse;
 }

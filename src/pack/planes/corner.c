@@ -17,7 +17,8 @@ static size_t mark(const struct spl_fit *f, size_t begin, size_t end, const uint
 {
     const struct spl_points *p = f->points;
     const float *n = p->normal[at];
-    const double origin[3] = {p->axis[0][at], p->axis[1][at], p->axis[2][at]}, normal[3] = {n[0], n[1], n[2]};
+    const double origin[3] = {spl_points_at(p, 0, at), spl_points_at(p, 1, at), spl_points_at(p, 2, at)};
+    const double normal[3] = {n[0], n[1], n[2]};
     size_t count = 0;
     for (size_t i = begin; i < end; i++) {
         const float *own = p->normal[i];

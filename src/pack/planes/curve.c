@@ -22,7 +22,7 @@ static void get_place(const struct spl_fit *f, const struct spl_patch *p, size_t
 {
     at[0] = at[1] = at[2] = 0;
     for (int c = 0; c < 3; c++) {
-        double d = (f->points->axis[c][i] - p->curve.origin[c]) / p->curve.scale;
+        double d = (spl_points_at(f->points, c, i) - p->curve.origin[c]) / p->curve.scale;
         at[0] += d * p->curve.u[c];
         at[1] += d * p->curve.v[c];
         at[2] += d * p->curve.normal[c];

@@ -22,12 +22,14 @@ static const double above_noise = 1.3;  /* times it, is what is looked at for tw
 struct spl_plane_moments spl_fit_sum(const struct spl_fit *f, size_t begin, size_t end, uint8_t group, double limit)
 {
     const struct spl_points *p = f->points;
-    const double origin[3] = {p->axis[0][begin], p->axis[1][begin], p->axis[2][begin]};
+    double origin[3], at[3];
+    spl_points_place(p, begin, origin);
     double count = 0, sum[3] = {0}, square[6] = {0};
     for (size_t i = begin; i < end; i++) {
         if (f->group[i - f->base] != group || fabsf(f->off[i - f->base]) > limit)
             continue;
-        double x = p->axis[0][i] - origin[0], y = p->axis[1][i] - origin[1], z = p->axis[2][i] - origin[2];
+        spl_points_apart(p, origin, i, at);
+        double x = at[0], y = at[1], z = at[2];
         count++;
         sum[0] += x;
         sum[1] += y;

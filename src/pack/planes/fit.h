@@ -67,7 +67,7 @@ static inline bool spl_plane_is_seen(const struct spl_points *p, size_t i, const
         const double *pose = p->stations[p->station[i]];
         double above = 0, squared = 0;
         for (int c = 0; c < 3; c++) {
-            double d = pose[4 * c + 3] - p->axis[c][i];
+            double d = pose[4 * c + 3] - spl_points_at(p, c, i);
             above += normal[c] * d;
             squared += d * d;
         }
@@ -81,8 +81,8 @@ static inline bool spl_plane_is_seen(const struct spl_points *p, size_t i, const
 static inline double spl_plane_distance(const struct spl_points *p, size_t i, const double origin[3],
                                         const double normal[3])
 {
-    return normal[0] * (p->axis[0][i] - origin[0]) + normal[1] * (p->axis[1][i] - origin[1]) +
-           normal[2] * (p->axis[2][i] - origin[2]);
+    return normal[0] * (spl_points_at(p, 0, i) - origin[0]) + normal[1] * (spl_points_at(p, 1, i) - origin[1]) +
+           normal[2] * (spl_points_at(p, 2, i) - origin[2]);
 }
 
 /* Fits planes to points [begin, end), which lie within the fit's arrays. Returns how many it found, of which each has

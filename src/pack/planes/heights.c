@@ -173,7 +173,7 @@ void spl_heights_place(const struct spl_heights *r, const struct spl_points *poi
 {
     at[0] = at[1] = at[2] = 0;
     for (int c = 0; c < 3; c++) {
-        double d = points->axis[c][i] - r->origin[c];
+        double d = spl_points_at(points, c, i) - r->origin[c];
         at[0] += d * r->u[c];
         at[1] += d * r->v[c];
         at[2] += d * r->normal[c];

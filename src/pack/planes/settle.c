@@ -57,7 +57,7 @@ static int sum_block(const struct pass *p, struct block *b, size_t begin, size_t
         const struct spl_region *r = &p->regions->list[region];
         double d[3], off = 0;
         for (int c = 0; c < 3; c++) {
-            d[c] = p->points->axis[c][i] - r->moments.mean[c];
+            d[c] = spl_points_at(p->points, c, i) - r->moments.mean[c];
             off += d[c] * r->normal[c];
         }
         if (!(fabs(off) <= (p->limits ? spl_plane_limits_at(p->limits, i)->bound : INFINITY))) {

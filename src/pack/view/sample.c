@@ -115,7 +115,8 @@ int spl_view_sample_init(struct spl_view_sample *s, const struct spl_points *p, 
     for (size_t k = 0; k < count; k++) {
         size_t i = k * p->count / count;
         spl_spill_keep_bound(p->spill); /* each is in pages of its own */
-        spl_view_to_frame(s, (double[]){p->axis[0][i], p->axis[1][i], p->axis[2][i]}, s->at[k]);
+        spl_view_to_frame(s, (double[]){spl_points_at(p, 0, i), spl_points_at(p, 1, i), spl_points_at(p, 2, i)},
+                          s->at[k]);
         s->area[k] = p->radius[i] * p->radius[i];
         for (int a = 0; s->normal && a < 3; a++)
             s->normal[k][a] =

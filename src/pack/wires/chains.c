@@ -41,7 +41,7 @@ static void gather_run(struct gathered *g, const struct spl_points *p, size_t be
         struct spl_wire_point *point = &g->points[g->count];
         point->spacing = fmin(p->radius[i], most);
         for (int c = 0; c < 3; c++)
-            point->position[c] = p->axis[c][i];
+            point->position[c] = spl_points_at(p, c, i);
         g->index[g->count++] = (uint32_t)i;
     }
 }

@@ -187,7 +187,7 @@ static void claim_points(const struct spl_wires_grid *grid, const struct spl_wir
             return;
         if (p->linear[i] || (p->plane && p->plane[i] != SPL_NO_PLANE))
             continue;
-        const double at[3] = {p->axis[0][i], p->axis[1][i], p->axis[2][i]};
+        const double at[3] = {spl_points_at(p, 0, i), spl_points_at(p, 1, i), spl_points_at(p, 2, i)};
         size_t first, end = spl_wires_grid_find(grid, at, (int[3]){0}, &first);
         for (; first < end && !p->linear[i]; first++) {
             const struct spl_wire_vertex *v = &w->vertices[grid->cells[first].item];

@@ -123,9 +123,9 @@ static void most_parts_give_class_and_linear(void **state)
     build(&made, groups);
     assert_int_equal(of_group(&made, 1, 0)->color_class >> 24, 5);
     assert_int_equal(of_group(&made, 6, 0)->color_class >> 24, 5);
-    assert_true(of_group(&made, 10, 0)->linear);
-    assert_false(of_group(&made, 11, 0)->linear);
-    assert_float_equal(of_group(&made, 7, 0)->uncertainty, 0.25, 1e-6);
+    assert_true(spl_inner_is_linear(of_group(&made, 10, 0)));
+    assert_false(spl_inner_is_linear(of_group(&made, 11, 0)));
+    assert_float_equal(spl_inner_get_uncertainty(of_group(&made, 7, 0)), 0.25, 1e-6);
     done(&made);
 }
 
