@@ -16,6 +16,8 @@ enum { SPL_PANEL_WORTH = 32 };
 
 /* Work is counted in samples that are looked at in a pass, at most. A batch has so much, or a single chunk. */
 #define SPL_BATCH_WORK ((uint64_t)1 << 25)
+/* What a step of a frame has at most, whoever draws it: far fewer batches than there are parameters for. */
+#define SPL_STEP_WORK_MOST (128 * SPL_BATCH_WORK)
 
 /* What a chunk is listed for. A chunk of which some splats are soft is listed for all three. */
 enum spl_draw_role {

@@ -20,6 +20,9 @@ void spl_renderer_set_work_at_once(struct spl_renderer *renderer, uint64_t work)
 void spl_renderer_set_soft_items(struct spl_renderer *renderer, uint32_t items);
 /* How much a step of a frame has, before its tile is cut; then pieces may be of any size. */
 void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work);
+/* How long a step may take where that is known, and how long a unit of work is said to take, 0 = not known. After
+ * spl_renderer_set_work_a_step(), with which steps have so much work however long it takes. */
+void spl_renderer_set_pace(struct spl_renderer *renderer, uint64_t step_ns, double work_ns);
 /* Whether discs are drawn by the kernels for hardware (shaders/common/walk.glsl) or those for software drivers. */
 void spl_renderer_set_shares(struct spl_renderer *renderer, bool shares);
 

@@ -10,6 +10,7 @@
 #include "render/readback.h"
 #include "render/slot.h"
 #include "render/soft/pass.h"
+#include "render/soft_params.h"
 
 #define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
 
@@ -203,14 +204,50 @@ static uint64_t count_work(const struct spl_tile *tile)
     return spl_tile_count_work(tile, (uint32_t)__builtin_popcount(groups) + lit);
 }
 
-/* Too much for a step */
-static bool is_too_much(struct spl_frame_job *job, const struct spl_tile *tile)
+/* What a step has. Each piece selects anew, and draws what reaches into others: a frame in twenty takes a fifth longer.
+ * So it has as much as takes step_ns by what such work took of late, and all where nobody can come between. Soft
+ * spheres are another sort of work. */
+static uint64_t get_step_work(const struct spl_frame_job *job)
 {
+    const struct spl_renderer *r = job->renderer;
+    const double each = r->work_ns[job->view->method], paced = each > 0 ? (double)r->step_ns / each : 0;
+    if (!r->step_ns || spl_view_shows_soft(job->view) || r->work_a_step >= SPL_STEP_WORK_MOST)
+        return r->work_a_step;
+    if (job->hold.alone || paced >= (double)SPL_STEP_WORK_MOST)
+        return SPL_STEP_WORK_MOST;
+    return paced > (double)r->work_a_step ? (uint64_t)paced : r->work_a_step;
+}
+
+/* Too much for a step. What has more than a step of unknown work is given up where it takes several times as long as it
+ * was to. */
+static bool is_too_much(struct spl_frame_job *job, struct spl_tile *tile)
+{
+    enum { patience = 4 };
+    const struct spl_renderer *r = job->renderer;
     const uint64_t work = count_work(tile);
-    if (work <= job->renderer->work_a_step || !may_cut(job, tile, work))
+    tile->until_ns = SPL_NEVER;
+    if (work <= r->work_a_step || !may_cut(job, tile, work))
         return false;
+    if (work <= get_step_work(job)) {
+        if (!job->hold.alone)
+            tile->until_ns = spl_now_ns() + patience * r->step_ns;
+        return false;
+    }
     know_whole(job, tile, work);
     return true;
+}
+
+/* A mean of the last few: what took much longer than that was given up, and nothing is known again. Small tiles tell
+ * little. */
+static void learn_pace(struct spl_frame_job *job, const struct spl_tile *tile, int drawn, uint64_t took_ns)
+{
+    struct spl_renderer *r = job->renderer;
+    const uint64_t work = count_work(tile);
+    double *known = &r->work_ns[job->view->method], each = (double)took_ns / (double)work;
+    if (drawn == SPL_FRAME_TOO_MUCH)
+        *known = 0;
+    else if (!drawn && work >= r->work_a_step / 8)
+        *known = *known > 0 ? *known + (each - *known) / 4 : each;
 }
 
 /* Selects and uploads. Pages are taken while selecting; where they leave the draw list no room, it takes that of some,
@@ -355,8 +392,11 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     int rc = list_tile(job, tile, err);
     if (!rc)
         rc = spl_frame_make_images(job->frame, job->view, err);
-    if (!rc)
+    if (!rc) {
+        clock = spl_now_ns();
         rc = draw_tile(tile, err);
+        learn_pace(job, tile, rc, spl_now_ns() - clock);
+    }
     if (rc == SPL_FRAME_TOO_MUCH || (rc == SPL_FRAME_PAUSED && !job->pause.words))
         know_whole(job, tile, count_work(tile));
     if (rc == SPL_FRAME_PAUSED)

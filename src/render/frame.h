@@ -49,7 +49,7 @@ int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, 
 
 /* Renders `tile` into the job's images, which it makes, and adds to its stats. Blocks until it is done;
  * SPL_SLOT_PENDING where it has pages to wait for, and nothing was drawn; SPL_FRAME_TOO_MUCH where it is too much work
- * for a step and may be cut, and nothing was drawn: job->whole is set, and its pieces are to be drawn.
+ * for a step and may be cut, and nothing of it is in the images: job->whole is set, and its pieces are to be drawn.
  * SPL_FRAME_PAUSED where it gave way in the middle: it is to be drawn again, and goes on where job->pause has what was
  * walked; else it is to be cut.
  * SPL_E_TIMEOUT where the view's deadline had passed before. */

@@ -15,7 +15,8 @@ static const uint64_t patience_ns = 10 * SPL_NS_PER_S, between_looks_ns = SPL_NS
 
 /* Of what a software driver takes 0.3 ns a sample for where it was scanned, and 20 where each thing hides the one
  * before: a second and a half of a core at most. GPUs take a hundredth. */
-static const uint64_t software_work = 2 * SPL_BATCH_WORK, gpu_work = 128 * SPL_BATCH_WORK;
+static const uint64_t software_work = 2 * SPL_BATCH_WORK, gpu_work = SPL_STEP_WORK_MOST;
+static const uint64_t step_ns = 100 * SPL_NS_PER_MS;
 
 int spl_renderer_create(const struct spl_renderer_options *given, struct spl_renderer **out, struct spl_error *err)
 {
@@ -39,6 +40,7 @@ int spl_renderer_create(const struct spl_renderer_options *given, struct spl_ren
         renderer->shares = !spl_gpu_get_device(renderer->gpu)->software;
         renderer->work_at_once = renderer->shares ? gpu_work : software_work;
         renderer->work_a_step = renderer->work_at_once;
+        renderer->step_ns = step_ns;
         renderer->least_piece = least_piece;
         rc = spl_residency_init(&renderer->residency, renderer->gpu, options->wake, options->wake_context, err);
     }
@@ -194,6 +196,14 @@ void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work)
 {
     renderer->work_a_step = work;
     renderer->least_piece = 1;
+    renderer->step_ns = 0;
+}
+
+void spl_renderer_set_pace(struct spl_renderer *renderer, uint64_t wanted_ns, double work_ns)
+{
+    renderer->step_ns = wanted_ns;
+    for (int method = 0; method < SPL_METHOD_COUNT; method++)
+        renderer->work_ns[method] = work_ns;
 }
 
 void spl_renderer_set_shares(struct spl_renderer *renderer, bool shares)

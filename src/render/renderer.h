@@ -60,6 +60,8 @@ struct spl_renderer {
     uint64_t work_at_once;     /* that the device is given, see draw_list.h */
     uint32_t soft_items_most;  /* soft spheres that are held at once; 0 = as memory has room (fault.h sets it) */
     uint64_t work_a_step;      /* that a step of a frame has, unless its piece is small; see work.c */
+    uint64_t step_ns;          /* steps have more where work is known to take less than this; 0 = never */
+    double work_ns[SPL_METHOD_COUNT]; /* what a unit of it took of late; 0 = not known */
     bool shares;               /* discs are drawn by the kernels for hardware: shaders/common/walk.glsl */
     uint64_t least_piece;      /* samples of a piece, at least */
 };
@@ -81,6 +83,7 @@ struct spl_tile {
     const atomic_bool *cancelled;                // may be NULL; borrowed
     struct spl_soft_pause *pause;                // the frame's
     uint64_t work;                               /* of what is recorded and does not run yet, see draw_list.h */
+    uint64_t until_ns;                           /* if it takes longer it is given up, and is to be cut */
     uint32_t params_used;                        /* of scratch.params; first those of the batches' rounds */
     uint32_t areas;                              /* bit per enum spl_area: those that hold */
     uint64_t soft_drawn;                         /* spheres */
@@ -121,7 +124,7 @@ void spl_tile_bind(const struct spl_tile *tile, struct spl_gpu_binding bindings[
 
 /* To be called before dispatches of `work` are recorded: where they would be too much for the device's patience
  * together with those before, these are run first. SPL_E_DEVICE_LOST; SPL_E_TIMEOUT and SPL_E_CANCELLED where nobody
- * waits for the tile any more. */
+ * waits for the tile any more; SPL_FRAME_TOO_MUCH (frame.h) where the tile is to be cut. */
 int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *err);
 /* Runs what was recorded, for the host to read; errors as of spl_tile_add_work(). */
 int spl_tile_run(struct spl_tile *tile, struct spl_error *err);

@@ -181,7 +181,7 @@ static int draw_lines(struct spl_walk *w, const double node_to_eye[3], const str
     double looks = fmin(count_line_looks(camera, half, reach.near, w->focal), (double)UINT32_MAX);
     const struct spl_walk_pieces pieces = {.count = 1, .radius = INFINITY, .looks = (uint64_t)looks};
     if (looks > SPL_LINE_ROUNDS) // more than an invocation looks at
-        return spl_walk_list_windows(w, &from, &out, &pieces, reach.low, reach.high, reach.near, err);
+        return spl_walk_list_windows(w, &from, &out, &pieces, &reach, err);
     struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, reach.low, reach.high, reach.near);
     return spl_draw_list_add(w->list, &from, &out, &bounds,
                              spl_walk_count_looks(w, &pieces, reach.low, reach.high, reach.near), err);

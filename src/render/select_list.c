@@ -13,12 +13,24 @@ uint64_t spl_walk_count_looks(const struct spl_walk *w, const struct spl_walk_pi
     return pieces->count * (pieces->looks && pieces->looks < one ? pieces->looks : one);
 }
 
+/* May the box reach the window whose first sample is `from`? What reaches the eye's plane has no bounds on the image,
+ * but most windows lie beside it: a disc on the ground near the eye would be looked at by all of them. */
+static bool sees_window(const struct spl_camera *camera, const double from[2], const struct spl_view_box *box)
+{
+    enum { around = 2 }; // samples, as of spl_view_box_project()
+    struct spl_camera window = *camera;
+    window.cx -= from[0];
+    window.cy -= from[1];
+    window.width = window.height = SPL_WINDOW;
+    return spl_view_box_visible(&window, box, around);
+}
+
 int spl_walk_list_windows(struct spl_walk *w, const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk,
-                          const struct spl_walk_pieces *pieces, const double low[2], const double high[2], double near,
+                          const struct spl_walk_pieces *pieces, const struct spl_walk_reach *reach,
                           struct spl_error *err)
 {
     const struct spl_camera *camera = w->params->camera;
-    double size[2] = {camera->width, camera->height};
+    const double size[2] = {camera->width, camera->height}, *low = reach->low, *high = reach->high, near = reach->near;
     uint32_t first[2], last[2];
     for (int i = 0; i < 2; i++) {
         first[i] = (uint32_t)fmin(fmax(low[i], 0), size[i] - 1) / SPL_WINDOW;
@@ -29,6 +41,8 @@ int spl_walk_list_windows(struct spl_walk *w, const struct spl_draw_origin *orig
         for (uint32_t x = first[0]; x <= last[0] && !rc; x++) {
             double from[2] = {x * SPL_WINDOW, y * SPL_WINDOW},
                    to[2] = {from[0] + SPL_WINDOW - 1, from[1] + SPL_WINDOW - 1};
+            if (!sees_window(camera, from, &reach->box))
+                continue;
             struct spl_draw_chunk part = *chunk;
             struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, from, to, near);
             part.count |= (x + 1) << SPL_COUNT_BITS | y << (SPL_COUNT_BITS + SPL_WINDOW_BITS);
@@ -101,7 +115,7 @@ struct spl_draw_chunk spl_walk_begin(const struct spl_walk *w, const struct spl_
 struct spl_walk_reach spl_walk_project(const struct spl_walk *w, struct spl_occupancy *counted,
                                        const struct spl_view_box *box, uint32_t count)
 {
-    struct spl_walk_reach r = {{-INFINITY, -INFINITY}, {INFINITY, INFINITY}, 0};
+    struct spl_walk_reach r = {{-INFINITY, -INFINITY}, {INFINITY, INFINITY}, 0, *box};
     if (spl_view_box_project(w->params->camera, box, r.low, r.high)) {
         r.near = box->center[2] - box->half[2];
         if (counted)
@@ -119,7 +133,7 @@ int spl_walk_list(struct spl_walk *w, const struct spl_draw_origin *from, const 
     const struct spl_camera *camera = w->params->camera;
     const bool discs = w->params->discs || from->role == SPL_ROLE_SOFT;
     if (discs && spl_footprint_side(camera, radius, reach->near) > side)
-        return spl_walk_list_windows(w, from, chunk, pieces, reach->low, reach->high, reach->near, err);
+        return spl_walk_list_windows(w, from, chunk, pieces, reach, err);
     struct spl_chunk_bounds bounds = spl_footprint_bounds(camera, reach->low, reach->high, reach->near);
     uint64_t looks = discs ? spl_walk_count_looks(w, pieces, reach->low, reach->high, reach->near) : pieces->count;
     return spl_draw_list_add(w->list, from, chunk, &bounds, looks, err);

@@ -48,6 +48,7 @@ struct spl_walk_pieces {
  * counted for all samples that it may reach. */
 struct spl_walk_reach {
     double low[2], high[2], near; /* near 0: it is not bounded */
+    struct spl_view_box box;
 };
 
 static inline struct spl_view_box spl_view_box_grown(struct spl_view_box box, double by)
@@ -127,12 +128,12 @@ int spl_walk_add_map_cells(struct spl_walk *w, const struct spl_chunk *chunk, co
 uint64_t spl_walk_count_looks(const struct spl_walk *w, const struct spl_walk_pieces *pieces, const double low[2],
                               const double high[2], double near);
 /* Lists the chunk, by windows where what is `radius` around its middle may be wider than `side` samples; or by windows,
- * once for each of the tile that samples [low, high] reach into. */
+ * once for each of the tile that it reaches into. */
 int spl_walk_list(struct spl_walk *w, const struct spl_draw_origin *from, const struct spl_draw_chunk *chunk,
                   const struct spl_walk_pieces *pieces, const struct spl_walk_reach *reach, double radius, double side,
                   struct spl_error *err);
 int spl_walk_list_windows(struct spl_walk *w, const struct spl_draw_origin *origin, const struct spl_draw_chunk *chunk,
-                          const struct spl_walk_pieces *pieces, const double low[2], const double high[2], double near,
+                          const struct spl_walk_pieces *pieces, const struct spl_walk_reach *reach,
                           struct spl_error *err);
 
 #endif

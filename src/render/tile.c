@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/work.h"
+#include "render/frame.h"
 #include "render/method.h"
 #include "render/renderer.h"
 #include "render/soft/of.h"
@@ -182,6 +183,8 @@ int spl_tile_add_work(struct spl_tile *tile, uint64_t work, struct spl_error *er
 {
     bool runs = tile->work && work > 0 && tile->work + work > tile->renderer->work_at_once;
     int rc = runs ? spl_tile_run(tile, err) : SPL_OK;
+    if (!rc && runs && spl_now_ns() > tile->until_ns)
+        rc = SPL_FRAME_TOO_MUCH;
     tile->work += work;
     return rc;
 }

@@ -17,6 +17,7 @@
 #include "gpu/panel_scenes.h"
 #include "render/fault.h"
 #include "render/method.h"
+#include "render/renderer.h"
 
 static void assert_same(const struct spl_frame *a, const struct spl_frame *b, const char *what)
 {
@@ -106,6 +107,59 @@ static void pieces_change_no_byte(void **state)
     spl_frame_finish(&whole);
     spl_frame_finish(&pieces);
     done(dense);
+    spl_renderer_set_work_a_step(renderer, UINT64_MAX);
+}
+
+/* Steps have as much as is known to take no longer than they may: all of a tile, or pieces until that is known. What
+ * takes longer than that all the same is given up in the middle, and cut. A frame that nobody can come between is drawn
+ * at once. None of it changes a byte. */
+static void steps_have_what_takes_no_longer_than_they_may(void **state)
+{
+    (void)state;
+    struct spl_dataset *dataset = random_panels(4, 4000, origin, 0.02, 4);
+    struct spl_view view = looking(origin, 2, 101, 75);
+    size_t steps;
+    view.method = SPL_METHOD_SPLAT;
+    view.lod = 0;
+    spl_renderer_set_work_a_step(renderer, UINT64_MAX);
+    struct spl_frame whole = render_in_steps(dataset, &view, &steps);
+    assert_int_equal(steps, 1);
+    const struct {
+        const char *what;
+        uint64_t step_ns;
+        double work_ns;
+        bool cut;
+    } cases[] = {
+        {"nothing is known", SPL_NS_PER_S, 0, true},
+        {"it takes long", SPL_NS_PER_S, 1e9, true},
+        {"it takes little", 3600 * SPL_NS_PER_S, 1e-6, false},
+        {"it takes longer than was known", 1, 1e-12, true},
+    };
+    spl_renderer_set_work_at_once(renderer, 1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        spl_renderer_set_work_a_step(renderer, 1 << 24);
+        spl_renderer_set_pace(renderer, cases[i].step_ns, cases[i].work_ns);
+        struct spl_frame frame = render_in_steps(dataset, &view, &steps);
+        if (cases[i].cut ? steps <= 3 : steps != 1)
+            fail_msg("%s: %zu steps", cases[i].what, steps);
+        assert_same(&whole, &frame, cases[i].what);
+        spl_frame_finish(&frame);
+    }
+    spl_renderer_set_pace(renderer, 3600 * SPL_NS_PER_S, 0);
+    for (int time = 0; time < 2; time++) { /* the first tells */
+        struct spl_frame frame = render_in_steps(dataset, &view, &steps);
+        assert_true(time ? steps == 1 : steps > 3);
+        assert_same(&whole, &frame, "known since");
+        spl_frame_finish(&frame);
+    }
+    spl_renderer_set_pace(renderer, SPL_NS_PER_S, 0);
+    uint64_t tiles = renderer->kernels.turn;
+    struct spl_frame alone = render(dataset, &view);
+    assert_int_equal(renderer->kernels.turn - tiles, 1);
+    assert_same(&whole, &alone, "alone");
+    spl_frame_finish(&alone);
+    spl_frame_finish(&whole);
+    done(dataset);
     spl_renderer_set_work_a_step(renderer, UINT64_MAX);
 }
 
@@ -305,6 +359,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         frames_test(parts_change_no_byte),
         frames_test(pieces_change_no_byte),
+        frames_test(steps_have_what_takes_no_longer_than_they_may),
         frames_test(cutting_ends_where_it_does_not_pay),
         frames_test(a_step_of_too_much_work_is_a_piece),
         frames_test(too_much_work_ends_at_the_deadline),

@@ -400,12 +400,82 @@ static void what_comes_later_is_asked_for_at_once(void **state)
     spl_dataset_close(dataset);
 }
 
+/* A floor around the eye reaches its plane, so its chunks have no bounds on the image; windows above the horizon see
+ * none of it all the same, and do not list it. Those that see any of its discs do. */
+static void windows_list_what_they_may_see(void **state)
+{
+    (void)state;
+    enum { columns = (width + SPL_WINDOW - 1) / SPL_WINDOW, rows = (height + SPL_WINDOW - 1) / SPL_WINDOW, most = 64 };
+    static struct make_splat discs[side * side];
+    for (int i = 0; i < side * side; i++)
+        discs[i] = (struct make_splat){.position = {(i % side - side / 2) * 0.02, (i / side - side / 2) * 0.02, 0},
+                                       .normal = {0, 0, 1},
+                                       .radius = 0.05f};
+    struct spl_dataset *dataset = make_dataset_levels(discs, side * side, 1);
+    struct spl_view view;
+    spl_view_init(&view);
+    view.camera.near = 0.1;
+    view.camera.far = 100;
+    const double eye[3] = {0, 0, 0.2}, target[3] = {0, 1, 0.2}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    assert_int_equal(spl_camera_set_fov(&view.camera, 60, width, height, NULL), SPL_OK);
+    int left = 1 << 30;
+    struct spl_select_params params = {.dataset = dataset,
+                                       .camera = &view.camera,
+                                       .low_pass = (double)SPL_LOW_PASS,
+                                       .discs = true,
+                                       .resident = take_one,
+                                       .context = &left};
+    struct spl_draw_list list = {0};
+    assert_int_equal(spl_select(&params, &list, NULL), SPL_OK);
+    uint64_t chunk_count;
+    const struct spl_chunk *chunks = spl_dataset_get_chunks(dataset, &chunk_count);
+    static bool listed[most][rows][columns];
+    assert_true(chunk_count <= most);
+    size_t windows = 0, seen = 0, naive_count;
+    for (size_t i = 0; i < list.chunk_count; i++) {
+        const uint32_t window = list.chunks[i].count >> SPL_COUNT_BITS;
+        const uint32_t column = window & ((1u << SPL_WINDOW_BITS) - 1), row = window >> SPL_WINDOW_BITS;
+        uint32_t at = 0;
+        while (at < chunk_count && chunks[at].first_id != list.chunks[i].first_id)
+            at++;
+        assert_true(at < chunk_count);
+        for (uint32_t w = 0; w < rows * columns; w++)
+            if (!window || w == row * columns + column - 1)
+                listed[at][w / columns][w % columns] = true;
+        windows += window > 0;
+        assert_true(!window || row > 0); /* those of the first row end above the horizon */
+    }
+    assert_true(windows > 0);
+    struct naive_chunk *naive =
+        naive_select(&(struct naive_options){.dataset = dataset, .camera = &view.camera}, &naive_count);
+    for (size_t i = 0; i < naive_count; i++)
+        for (uint32_t k = 0; k < naive[i].count; k++) {
+            const struct ball ball = ball_of(dataset, &view.camera, &naive[i], k);
+            for (uint32_t w = 0; w < rows * columns; w++) {
+                struct spl_camera camera = view.camera;
+                camera.cx -= w % columns * SPL_WINDOW;
+                camera.cy -= w / columns * SPL_WINDOW;
+                camera.width = camera.height = SPL_WINDOW;
+                if (!is_seen(&camera, &ball))
+                    continue;
+                seen++;
+                assert_true(listed[naive[i].chunk][w / columns][w % columns]);
+            }
+        }
+    assert_true(seen > side * side / 4);
+    free(naive);
+    spl_draw_list_finish(&list);
+    spl_dataset_close(dataset);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_spacing_of_stand_ins_is_not_complete),
         cmocka_unit_test(every_splat_that_is_seen_is_drawn_at_its_level),
         cmocka_unit_test(one_large_disc_at_the_edge_is_drawn),
+        cmocka_unit_test(windows_list_what_they_may_see),
         cmocka_unit_test(nodes_are_listed_front_to_back),
         cmocka_unit_test(shared_among_cores_it_is_the_same),
         cmocka_unit_test(what_comes_later_is_asked_for_at_once),
