@@ -26,8 +26,7 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 {
     size_t length;
     const char *stem = spl_remote_get_stem(dataset->name, &length);
-    static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
-    if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, allowed) < length)
+    if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, SPL_NAME_LETTERS) < length)
         return spl_fail(err, SPL_E_INPUT,
                         "%s: '%.*s' cannot be a dataset's id; rename the file to at most %zu letters, digits, '.', '_' "
                         "and '-', the first of them not a '.'",

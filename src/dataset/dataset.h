@@ -23,7 +23,9 @@ static inline const char *spl_unit_word(const struct spl_dataset_info *info)
     return !*info->unit || !strcmp(info->unit, "unknown") ? "unit" : info->unit;
 }
 
-/* How to open one. */
+/* What a dataset's id is of, and a tile's file name: neither the first of them a '.'. */
+#define SPL_NAME_LETTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
+
 /* What a file is, whether it could be opened or not. */
 enum spl_file_kind {
     SPL_FILE_OTHER,      /* no container: a scan, a picture, nothing at all; or it cannot be read */

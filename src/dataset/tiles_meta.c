@@ -43,7 +43,7 @@ static int get_file(const struct spl_dataset *dataset, size_t index, const json_
     const char *file = json_string_value(json_object_get(json, "file"));
     const char *version = json_string_value(json_object_get(json, "version"));
     char *end = NULL;
-    if (!file || !*file || *file == '.' || strchr(file, '/') || strlen(file) > 255)
+    if (!file || !*file || *file == '.' || file[strspn(file, SPL_NAME_LETTERS)] || strlen(file) > 255)
         return wrong(dataset, index, "file", "is no name of a file beside it", err);
     if (!version || strlen(version) != 16 || strspn(version, "0123456789abcdef") != 16)
         return wrong(dataset, index, "version", "is not 16 hexadecimal digits", err);

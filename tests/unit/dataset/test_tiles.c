@@ -364,6 +364,13 @@ static void test_forged(void **state)
     static const struct {
         const char *key, *value, *field;
     } rows[] = {{"file", "\"../tile-3.spld\"", "tiles[3].file"}, {"file", "\".hidden\"", "tiles[3].file"},
+                {"file", "\"\"", "tiles[3].file"},               {"file", "\"..\"", "tiles[3].file"},
+                {"file", "\"/etc/passwd\"", "tiles[3].file"},    {"file", "\"https://h/t.spld\"", "tiles[3].file"},
+                {"file", "\"..%2ft.spld\"", "tiles[3].file"},    {"file", "\"a%2ft.spld\"", "tiles[3].file"},
+                {"file", "\"a\\\\t.spld\"", "tiles[3].file"},    {"file", "\"t.spld?a\"", "tiles[3].file"},
+                {"file", "\"t.spld#a\"", "tiles[3].file"},       {"file", "\"h:80\"", "tiles[3].file"},
+                {"file", "\"u@h\"", "tiles[3].file"},            {"file", "\"a b.spld\"", "tiles[3].file"},
+                {"file", "\"a\\n.spld\"", "tiles[3].file"},      {"file", "\"t\u00fc.spld\"", "tiles[3].file"},
                 {"file", "5", "tiles[3].file"},                  {"version", "\"xyz\"", "tiles[3].version"},
                 {"node", "3", "tiles[3].node"},                  {"node", "0", "tiles[3].node"},
                 {"node", "9", "tiles[3].node"},                  {"node", "-1", "tiles[3].node"},
