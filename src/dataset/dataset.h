@@ -26,6 +26,14 @@ static inline const char *spl_unit_word(const struct spl_dataset_info *info)
 /* What a dataset's id is of, and a tile's file name: neither the first of them a '.'. */
 #define SPL_NAME_LETTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
 
+/* What a tile has to be for its collection: another one is refused by its header, before more of it is read, and
+ * nothing of its META stays. */
+struct spl_expected {
+    uint64_t version;
+    uint32_t pages;
+    const char *differs; // out: NULL, or how it is another one
+};
+
 /* What a file is, whether it could be opened or not. */
 enum spl_file_kind {
     SPL_FILE_OTHER,      /* no container: a scan, a picture, nothing at all; or it cannot be read */
@@ -42,6 +50,8 @@ struct spl_dataset_opening {
     bool verify_remote;                /* with `verify`: also of a server all is read at first */
     enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
+    struct spl_expected *expected; // may be NULL; of a tile
+    _Atomic uint64_t *moved_ns; // may be NULL; what from a server comes is noted there too; borrowed until close
 };
 
 /* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless

@@ -198,6 +198,16 @@ static int fetch_window(struct remote *remote, uint64_t offset, char *out, size_
 
 static atomic_uint fetching; /* reads under way in this process */
 
+void spl_remote_begin(void)
+{
+    atomic_fetch_add(&fetching, 1);
+}
+
+void spl_remote_end(void)
+{
+    atomic_fetch_sub(&fetching, 1);
+}
+
 bool spl_remote_wait_idle(uint64_t deadline_ns)
 {
     while (atomic_load(&fetching) && spl_remaining_ns(deadline_ns))
@@ -209,7 +219,7 @@ static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct
 {
     struct remote *remote = context;
     int rc = SPL_OK;
-    atomic_fetch_add(&fetching, 1);
+    spl_remote_begin();
     for (char *to = out; bytes && !rc;) {
         uint64_t end = (offset / BLOCK + window) * BLOCK;
         size_t some = end - offset < bytes ? (size_t)(end - offset) : bytes;
@@ -218,7 +228,7 @@ static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct
         offset += some;
         bytes -= some;
     }
-    atomic_fetch_sub(&fetching, 1);
+    spl_remote_end();
     return rc;
 }
 
@@ -314,6 +324,7 @@ int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, 
     origin->name = strndup(stem, length);
     origin->deadline_ms = how->deadline_ms ? how->deadline_ms : SPL_REMOTE_DEADLINE_MS;
     origin->cancelled = how->cancelled;
+    origin->also_moved_ns = how->moved_ns;
     int rc = origin->shown && origin->name ? read_first(remote, err)
                                            : spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
     if (rc) {

@@ -313,7 +313,7 @@ static void test_only_beside_a_file(void **state)
     struct spl_dataset *city;
     struct spl_error err = {0};
     assert_int_equal(spl_dataset_open_source(&source, "city.spld", false, NULL, &city, &err), SPL_OK);
-    refuse_page(city, "files beside it on a disk");
+    refuse_page(city, "files beside it, on a disk or a server");
     spl_dataset_close(city);
     assert_int_equal(spl_dataset_open_whole(path_of("city.spld"), false, &city, &err), SPL_E_USAGE);
     assert_non_null(strstr(err.message, "collection of 8"));
@@ -420,6 +420,43 @@ static void test_tiles_that_do_not_fit(void **state)
     }
 }
 
+/* A tile that is a collection itself is refused, whatever else it has. */
+static void test_tiles_that_hold_more(void **state)
+{
+    (void)state;
+    struct spl_dataset *inner = open_city("city.spld"), *city;
+    char version[24];
+    snprintf(version, sizeof version, "\"%016llx\"", (unsigned long long)spl_dataset_get_info(inner)->version);
+    json_t *forged = json_deep_copy(tiles), *entry = json_array_get(forged, 0);
+    json_object_set_new(entry, "file", json_string("city.spld"));
+    json_object_set_new(entry, "version", json_loads(version, JSON_DECODE_ANY, NULL));
+    make_city("forged.spld", forged);
+    city = open_city("forged.spld");
+    struct spl_error err = {0};
+    char *block = malloc(spl_dataset_get_tables_bytes(city, 1));
+    assert_int_equal(spl_dataset_read_tables(city, 1, block, &err), SPL_E_CORRUPT);
+    if (!strstr(err.message, "its tile city.spld is a collection itself"))
+        fail_msg("%s", err.message);
+    assert_true(!city->tiles->list[0].open && !city->tiles->open_count);
+    free(block);
+    json_decref(forged);
+    spl_dataset_close(inner);
+    spl_dataset_close(city);
+}
+
+/* Of an open tile nothing stays but what its pages are read by. */
+static void test_what_stays_of_a_tile(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    struct spl_tables *read;
+    assert_non_null(spl_dataset_borrow_tables(city, 1, &read, NULL));
+    const struct spl_dataset *tile = city->tiles->list[0].open;
+    assert_true(tile && !tile->meta && !tile->stations && !tile->tables && !tile->whole.nodes);
+    free(read);
+    spl_dataset_close(city);
+}
+
 struct reader {
     struct spl_dataset *city;
     unsigned seed;
@@ -477,6 +514,8 @@ int main(void)
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_tiles_that_hold_more),
+        cmocka_unit_test(test_what_stays_of_a_tile),
         cmocka_unit_test(test_few_are_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
