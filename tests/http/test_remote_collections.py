@@ -113,7 +113,8 @@ def test_tiles_come_when_they_are_seen():
         with Daemon(REAL, "--page-cache", pages, datasets=[server.url("city.spld")]) as d:
             opened(d)
             assert good(d, ALL) == TRUTH[3]
-            # whether it is still the same
+            # whether it is still the same, in a few bytes
+            assert d.status()["counters"]["remote_bytes"] == 4096 * (TILES + 1), d.status()["counters"]
             assert [b - a for a, b in zip(before, counts(server))] == [1, 1, 1] and d.status()["counters"]["page_cache_hits"] >= 1
 
 
