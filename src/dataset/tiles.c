@@ -174,9 +174,7 @@ static int open_for_all(const struct spl_dataset *dataset, struct spl_tile *tile
     tile->opening = true;
     pthread_mutex_unlock(&tiles->mutex);
     spl_dataset_close(surplus);
-    spl_remote_begin();
     int rc = open_tile(dataset, tile, &own, err);
-    spl_remote_end();
     pthread_mutex_lock(&tiles->mutex);
     tile->opening = false;
     tile->open = own;
@@ -198,6 +196,7 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
                         "%s: its tile %s cannot be read: a collection's tiles are files beside it, on a disk or a "
                         "server",
                         spl_dataset_get_name(dataset), tile->file);
+    spl_remote_begin(); /* opening is many reads, and looks at the flag between them */
     pthread_mutex_lock(&tiles->mutex);
     while (tile->opening && !(rc = spl_dataset_check_cancelled(dataset, err))) // who opens it has a deadline
         spl_condition_wait(&tiles->opened, &tiles->mutex, spl_now_ns() + look_around_ns);
@@ -209,6 +208,7 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
         *out = tile->open;
     }
     pthread_mutex_unlock(&tiles->mutex);
+    spl_remote_end();
     return rc;
 }
 

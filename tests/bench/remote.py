@@ -23,7 +23,8 @@ from range_server import File, Server
 
 
 class Proxy:
-    """Passes bytes on half a round trip after they came, downwards no faster than so many a second, over all connections."""
+    """Passes bytes on half a round trip after they came, downwards no faster than so many a second, over all connections. Of a new
+    connection nothing passes for a round trip, as its handshake would take."""
 
     def __init__(self, port, rtt_s, bytes_per_s):
         self.target, self.delay_s, self.rate = port, rtt_s / 2, bytes_per_s
@@ -45,6 +46,8 @@ class Proxy:
         threading.Thread(target=self.write, args=(sink, line), daemon=True).start()
 
     def read(self, source, line, shaped):
+        if not shaped:
+            time.sleep(2 * self.delay_s)
         while True:
             try:
                 data = source.recv(1 << 17)

@@ -98,6 +98,7 @@ def test_tiles_come_when_they_are_seen():
             assert good(d, AFAR) == TRUTH[4] and counts(server) == [0, 0, 0]
             assert good(d, IN[0]) == TRUTH[0] and counts(server)[0] > 0 and counts(server)[1:] == [0, 0]
             assert good(d, IN[2]) == TRUTH[2] and not counts(server)[1]
+            assert len(server.connections) <= 2 < len(server.asked), server.connections  # they share them
             asked = counts(server)
             part = view(d, IN[1] + "&wait=0")  # coarse, at once, and said to be so
             assert part.status == 200 and part.headers["Splatd-Complete"] == "false" and part.body != TRUTH[1], part.headers
