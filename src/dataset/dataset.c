@@ -284,11 +284,11 @@ bool spl_dataset_is_remote(const struct spl_dataset *dataset)
     return dataset->remote;
 }
 
-uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset)
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset, uint32_t part)
 {
-    const uint64_t of_tiles = dataset->tiles ? atomic_load(&dataset->tiles->moved_ns) : 0;
-    const uint64_t own = dataset->remote ? dataset->source.far->get_moved_ns(dataset->source.context) : 0;
-    return own > of_tiles ? own : of_tiles;
+    if (part)
+        return atomic_load(&dataset->tiles->list[part - 1].moved_ns);
+    return dataset->remote ? dataset->source.far->get_moved_ns(dataset->source.context) : 0;
 }
 
 bool spl_dataset_has_changed(const struct spl_dataset *dataset)

@@ -79,9 +79,12 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
 /* Does it lie elsewhere, so that reading takes long and is paid for? */
 bool spl_dataset_is_remote(const struct spl_dataset *dataset);
 
-/* Of one that does: when a read of it last came on (0 = it lies here), and whether it has been found to be another one
- * by now. Any thread. */
-uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset);
+/* What holds up the reading of a page where it hangs: 0 = the dataset's own file, else a number of a tile's. */
+uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page);
+
+/* Of one that does: when a read of a part of it last came on (0 = it lies here), and whether it has been found to be
+ * another one by now. Any thread. */
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset, uint32_t part);
 bool spl_dataset_has_changed(const struct spl_dataset *dataset);
 
 /* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the

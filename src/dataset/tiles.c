@@ -113,7 +113,7 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
                                             .page_cache = tiles->page_cache,
                                             .remote_deadline_ms = tiles->remote_deadline_ms,
                                             .expected = &expected,
-                                            .moved_ns = &tiles->moved_ns};
+                                            .moved_ns = &tile->moved_ns};
     struct spl_error why = {0};
     char *location = spl_remote_make_beside(tiles->beside, tile->file);
     int rc = location ? spl_dataset_open_as(location, &how, own, &why)

@@ -15,6 +15,7 @@ struct spl_tile {
     uint32_t node, levels, depth; /* the leaf's number; of its own tree; of its root in the whole */
     uint32_t first_page, page_count;
     uint64_t first_node, first_chunk, first_id; /* where its own begin */
+    _Atomic uint64_t moved_ns; /* when something of it last came from its server */
 
     struct spl_dataset *open; // guarded by: mutex, as all below; may be NULL
     unsigned users;
@@ -32,7 +33,6 @@ struct spl_tiles {
     char *beside;              // owned; the collection's path or URL; NULL: what it lies beside cannot be read
     struct spl_page_cache *page_cache; // held; may be NULL; of tiles from a server, as the next two
     uint64_t remote_deadline_ms;
-    _Atomic uint64_t moved_ns; /* when something of one of them last came */
     _Atomic uint64_t look_ns;  /* when it is asked for at the earliest whether the collection is still the same */
     pthread_mutex_t mutex;
     pthread_cond_t opened; /* a tile is no longer being opened */

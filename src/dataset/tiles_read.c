@@ -50,6 +50,12 @@ int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *
     return end_reading(dataset, tile, rc, &why, err);
 }
 
+uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page)
+{
+    const struct spl_tile *tile = spl_tiles_find(dataset, page);
+    return tile ? (uint32_t)(tile - dataset->tiles->list) + 1 : 0;
+}
+
 uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
 {
     return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
