@@ -36,12 +36,13 @@ struct spl_tiles {
     _Atomic uint64_t look_ns;  /* when it is asked for at the earliest whether the collection is still the same */
     pthread_mutex_t mutex;
     pthread_cond_t opened; /* a tile is no longer being opened */
-    unsigned open_most;  /* SPL_TILES_OPEN_MAX; tests set less */
+    unsigned open_most;  /* SPL_TILES_OPEN_MAX, _FAR_MAX; tests set less */
     unsigned open_count; // guarded by: mutex, as below
     uint64_t borrowings;
 };
 
-enum { SPL_TILES_MAX = 16384, SPL_TILES_OPEN_MAX = 64 };
+/* Of a disk each open one has a descriptor; of a server none, and to open one anew takes round trips. */
+enum { SPL_TILES_MAX = 16384, SPL_TILES_OPEN_MAX = 64, SPL_TILES_OPEN_FAR_MAX = 512 };
 
 /* META's "tiles", held against the tables of the collection, which are all kept by now: fills dataset->tiles, info and
  * rows, and ties leaves to tiles. Without the key it does nothing. */

@@ -164,7 +164,7 @@ static int allocate(struct spl_dataset *dataset, const json_t *json, struct sums
     tiles->remote_deadline_ms = dataset->how->remote_deadline_ms;
     dataset->tiles = tiles;
     tiles->own_pages = dataset->info.pages;
-    tiles->open_most = SPL_TILES_OPEN_MAX;
+    tiles->open_most = dataset->remote ? SPL_TILES_OPEN_FAR_MAX : SPL_TILES_OPEN_MAX;
     for (size_t i = 0; i < json_array_size(json); i++)
         pages += json_array_size(json_object_get(json_array_get(json, i), "pages"));
     sums->pages = tiles->own_pages;

@@ -14,6 +14,7 @@
 #include <pthread.h>
 
 #include <cmocka.h>
+#include <xxhash.h>
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
@@ -444,6 +445,23 @@ static void test_tiles_that_hold_more(void **state)
     spl_dataset_close(city);
 }
 
+/* However many sections its header lists: their table is not read. */
+static void test_a_tile_of_too_many_sections(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    struct spoil file = spoil_load(path_of("tile-0.spld"));
+    for (uint32_t more = 0; more < 2; more++) {
+        file.header->section_count = 2 + 64 + more; // of one page
+        file.header->header_hash = XXH3_64bits(file.header, offsetof(struct spl_file_header, header_hash));
+        spoil_store(&file, path_of("tile-0.spld"), false);
+        refuse_page(city, more ? "has another number of pages or levels" : "section table lies outside the file");
+    }
+    free(file.bytes);
+    make_tile(0, 0);
+    spl_dataset_close(city);
+}
+
 /* Of an open tile nothing stays but what its pages are read by. */
 static void test_what_stays_of_a_tile(void **state)
 {
@@ -515,6 +533,7 @@ int main(void)
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit),
         cmocka_unit_test(test_tiles_that_hold_more),
+        cmocka_unit_test(test_a_tile_of_too_many_sections),
         cmocka_unit_test(test_what_stays_of_a_tile),
         cmocka_unit_test(test_few_are_open),
     };
