@@ -22,7 +22,8 @@ static const char *const unknown[] = {
     "whose GPUs cost most.",
     "Whether views spread evenly. A dataset is one daemon's (deploy/haproxy.cfg), a daemon draws on the devices of one "
     "machine, so what all look at has the views a second of one machine, whatever the sum says.",
-    "Datasets as one on servers: the parts of a collection are files beside it, on a disk that its daemon sees.",
+    "Datasets as one on servers: how long who comes to a new place waits for its parts, each of which is opened with "
+    "two requests when a view first needs it.",
     "Packs of more than 100 million points. One dataset of many machines is packed in parts (splatd pack --plan), "
     "beside each other, for 1.1 to 1.25 of the core hours, and becomes a collection.",
     "Many clients whose pages come and go: the two frame times behind that row of devices are of one client, of 100 "

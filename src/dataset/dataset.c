@@ -26,8 +26,7 @@ static int set_id(struct spl_dataset *dataset, struct spl_error *err)
 {
     size_t length;
     const char *stem = spl_remote_get_stem(dataset->name, &length);
-    static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
-    if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, allowed) < length)
+    if (length == 0 || length >= sizeof dataset->info.id || stem[0] == '.' || strspn(stem, SPL_NAME_LETTERS) < length)
         return spl_fail(err, SPL_E_INPUT,
                         "%s: '%.*s' cannot be a dataset's id; rename the file to at most %zu letters, digits, '.', '_' "
                         "and '-', the first of them not a '.'",
@@ -83,13 +82,14 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
     char shown[1024];
     struct spl_dataset_source source;
     struct spl_error why = {0};
-    const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled};
+    const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled, how->moved_ns};
     int rc = spl_remote_open(url, &remote, &source, &why);
     if (rc)
         return spl_fail(err, rc, "%s", why.message);
     spl_remote_show(url, shown, sizeof shown);
     rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
-    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) &&
+    const bool differs = how->expected && how->expected->differs; // as its header says, which holds
+    if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) && !differs &&
         !source.far->has_changed(source.context)) {
         why = (struct spl_error){0};
         source.far->forget(source.context, 0, source.size);
@@ -104,13 +104,13 @@ int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how,
                         struct spl_error *err)
 {
     struct spl_dataset_source source;
+    struct spl_dataset_opening here = *how;
     *out = NULL;
+    here.beside = path;
     if (spl_remote_is_url(path))
-        return open_remote(path, how, out, err);
-    struct spl_dataset_opening file = *how;
-    file.beside = path;
+        return open_remote(path, &here, out, err);
     int rc = spl_dataset_source_open_file(path, &source, err);
-    if (!rc && (rc = spl_dataset_open_source_as(&source, path, &file, out, err)))
+    if (!rc && (rc = spl_dataset_open_source_as(&source, path, &here, out, err)))
         spl_dataset_source_close(&source);
     return rc;
 }
@@ -158,7 +158,7 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     dataset->remote = source->far;
     dataset->lazily = source->far && !(how->verify && how->verify_remote);
     dataset->tables_limit = how->tables_bytes;
-    dataset->beside = how->beside;
+    dataset->how = how;
     dataset->info.file_bytes = source->size;
     dataset->name = spl_alloc_raw(strlen(name) + 1, 1, err);
     if (!dataset->name)
@@ -177,7 +177,7 @@ done:
         spl_dataset_close(dataset);
     } else {
         dataset->opened = true;
-        dataset->beside = NULL;
+        dataset->how = NULL;
         *out = dataset;
     }
     return rc;
@@ -212,6 +212,20 @@ static void destroy(struct spl_dataset *dataset)
     free(dataset->sections);
     free(dataset->name);
     free(dataset);
+}
+
+void spl_dataset_strip(struct spl_dataset *dataset)
+{
+    const struct spl_section_list *meta = &dataset->found[SPL_KIND_META];
+    for (uint32_t i = 0; i < meta->count; i++) {
+        free(dataset->copies[meta->at[i] - dataset->sections]);
+        dataset->copies[meta->at[i] - dataset->sections] = NULL;
+    }
+    free(dataset->stations);
+    json_decref(dataset->meta);
+    dataset->stations = NULL;
+    dataset->meta = NULL;
+    dataset->info.title = dataset->info.description = NULL; // were its texts
 }
 
 void spl_dataset_let_go(const struct spl_dataset *dataset)
@@ -270,8 +284,10 @@ bool spl_dataset_is_remote(const struct spl_dataset *dataset)
     return dataset->remote;
 }
 
-uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset)
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset, uint32_t part)
 {
+    if (part)
+        return atomic_load(&dataset->tiles->list[part - 1].moved_ns);
     return dataset->remote ? dataset->source.far->get_moved_ns(dataset->source.context) : 0;
 }
 

@@ -23,7 +23,17 @@ static inline const char *spl_unit_word(const struct spl_dataset_info *info)
     return !*info->unit || !strcmp(info->unit, "unknown") ? "unit" : info->unit;
 }
 
-/* How to open one. */
+/* What a dataset's id is of, and a tile's file name: neither the first of them a '.'. */
+#define SPL_NAME_LETTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
+
+/* What a tile has to be for its collection: another one is refused by its header, before more of it is read, and
+ * nothing of its META stays. */
+struct spl_expected {
+    uint64_t version;
+    uint32_t pages;
+    const char *differs; // out: NULL, or how it is another one
+};
+
 /* What a file is, whether it could be opened or not. */
 enum spl_file_kind {
     SPL_FILE_OTHER,      /* no container: a scan, a picture, nothing at all; or it cannot be read */
@@ -40,6 +50,8 @@ struct spl_dataset_opening {
     bool verify_remote;                /* with `verify`: also of a server all is read at first */
     enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
+    struct spl_expected *expected; // may be NULL; of a tile
+    _Atomic uint64_t *moved_ns; // may be NULL; what from a server comes is noted there too; borrowed until close
 };
 
 /* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless
@@ -67,9 +79,12 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
 /* Does it lie elsewhere, so that reading takes long and is paid for? */
 bool spl_dataset_is_remote(const struct spl_dataset *dataset);
 
-/* Of one that does: when a read of it last came on (0 = it lies here), and whether it has been found to be another one
- * by now. Any thread. */
-uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset);
+/* What holds up the reading of a page where it hangs: 0 = the dataset's own file, else a number of a tile's. */
+uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page);
+
+/* Of one that does: when a read of a part of it last came on (0 = it lies here), and whether it has been found to be
+ * another one by now. Any thread. */
+uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset, uint32_t part);
 bool spl_dataset_has_changed(const struct spl_dataset *dataset);
 
 /* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the

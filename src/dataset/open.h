@@ -36,7 +36,7 @@ struct spl_dataset {
     struct spl_dataset_source source;
     const atomic_bool *cancelled; // may be NULL; polled by whatever takes long
     enum spl_file_kind kind; /* as far as it has been read */
-    const char *beside; // while it is opened: the path that its tiles lie beside; NULL = they cannot be read
+    const struct spl_dataset_opening *how; // while it is opened
     struct spl_tiles *tiles; // of a collection (tiles.h); NULL = it is none
     bool verified;                /* every page had its checksum when it was opened, or has it when it is read */
     bool remote;                  /* what is wrong may have come so, and is asked for once more */
@@ -79,6 +79,9 @@ struct spl_dataset {
 
 /* What errors call it: its id once it is open, for they reach clients, whom the path is no business of. */
 const char *spl_dataset_get_name(const struct spl_dataset *dataset);
+
+/* Of an open tile, what only opening needed goes: all that is left is for reading its pages and tables. */
+void spl_dataset_strip(struct spl_dataset *dataset);
 
 /* Reads bytes of the source; SPL_E_CORRUPT when it has become shorter. Any thread. */
 int spl_dataset_read(const struct spl_dataset *dataset, uint64_t offset, void *out, size_t bytes,

@@ -21,6 +21,7 @@
 #include "dataset/remote_run.h"
 
 enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of a request */, forgotten_most = 1 << 16 /* on disk */ };
+enum { beginning_most = 4096 }; /* what is asked for of a file whose blocks the page cache may have */
 
 struct spl_remote_counts spl_remote_counts;
 
@@ -30,6 +31,8 @@ struct remote {
     struct spl_page_key key;
     struct spl_remote_blocks blocks;
     uint64_t expected, expected_end; // guarded by: blocks.mutex; bytes that are wanted soon
+    size_t beginning_bytes;          // guarded by: blocks.mutex; what of `beginning` is there
+    char beginning[beginning_most];
 };
 
 /* What one read has of blocks, from index `first` on. */
@@ -198,6 +201,16 @@ static int fetch_window(struct remote *remote, uint64_t offset, char *out, size_
 
 static atomic_uint fetching; /* reads under way in this process */
 
+void spl_remote_begin(void)
+{
+    atomic_fetch_add(&fetching, 1);
+}
+
+void spl_remote_end(void)
+{
+    atomic_fetch_sub(&fetching, 1);
+}
+
 bool spl_remote_wait_idle(uint64_t deadline_ns)
 {
     while (atomic_load(&fetching) && spl_remaining_ns(deadline_ns))
@@ -205,11 +218,24 @@ bool spl_remote_wait_idle(uint64_t deadline_ns)
     return !atomic_load(&fetching);
 }
 
+/* What came with the file's state. */
+static bool take_beginning(struct remote *remote, uint64_t offset, void *out, size_t bytes)
+{
+    pthread_mutex_lock(&remote->blocks.mutex);
+    const bool here = offset < remote->beginning_bytes && bytes <= remote->beginning_bytes - offset;
+    if (here)
+        memcpy(out, remote->beginning + offset, bytes);
+    pthread_mutex_unlock(&remote->blocks.mutex);
+    return here;
+}
+
 static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err)
 {
     struct remote *remote = context;
     int rc = SPL_OK;
-    atomic_fetch_add(&fetching, 1);
+    if (take_beginning(remote, offset, out, bytes))
+        return SPL_OK;
+    spl_remote_begin();
     for (char *to = out; bytes && !rc;) {
         uint64_t end = (offset / BLOCK + window) * BLOCK;
         size_t some = end - offset < bytes ? (size_t)(end - offset) : bytes;
@@ -218,7 +244,7 @@ static int fetch(void *context, uint64_t offset, void *out, size_t bytes, struct
         offset += some;
         bytes -= some;
     }
-    atomic_fetch_sub(&fetching, 1);
+    spl_remote_end();
     return rc;
 }
 
@@ -237,6 +263,10 @@ static void forget(void *context, uint64_t offset, uint64_t bytes)
     if (!bytes)
         return;
     const uint64_t first = offset / BLOCK, last = (offset + bytes - 1) / BLOCK; // a server may say any length
+    pthread_mutex_lock(&remote->blocks.mutex);
+    if (!first)
+        remote->beginning_bytes = 0;
+    pthread_mutex_unlock(&remote->blocks.mutex);
     spl_remote_blocks_forget(&remote->blocks, first, last);
     for (uint64_t i = first; remote->cache && i <= last && i - first < forgotten_most; i++)
         spl_page_cache_drop(remote->cache, remote->key, i);
@@ -272,6 +302,13 @@ static void close_remote(void *context)
     release(remote);
 }
 
+static void put_beginning(void *context, const void *data, size_t bytes)
+{
+    struct remote *remote = context;
+    memcpy(remote->beginning + remote->beginning_bytes, data, bytes);
+    remote->beginning_bytes += bytes;
+}
+
 static void put_first(void *context, const void *data, size_t bytes)
 {
     struct spl_remote_block *block = context;
@@ -279,10 +316,14 @@ static void put_first(void *context, const void *data, size_t bytes)
     block->bytes += bytes;
 }
 
-/* The first block, with which comes what the file is held to. */
-static int read_first(struct remote *remote, struct spl_error *err)
+/* The first block, with which comes what the file is held to. Where the page cache may have it, the beginning does. */
+static int read_first(struct remote *remote, bool kept, struct spl_error *err)
 {
     bool mine;
+    if (kept) {
+        struct spl_remote_run some = {.bytes = beginning_most, .put = put_beginning, .context = remote};
+        return spl_remote_run(&remote->origin, &some, err);
+    }
     pthread_mutex_lock(&remote->blocks.mutex);
     struct spl_remote_block *block = spl_remote_blocks_hold(&remote->blocks, 0, BLOCK, &mine, err);
     pthread_mutex_unlock(&remote->blocks.mutex);
@@ -314,7 +355,8 @@ int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, 
     origin->name = strndup(stem, length);
     origin->deadline_ms = how->deadline_ms ? how->deadline_ms : SPL_REMOTE_DEADLINE_MS;
     origin->cancelled = how->cancelled;
-    int rc = origin->shown && origin->name ? read_first(remote, err)
+    origin->also_moved_ns = how->moved_ns;
+    int rc = origin->shown && origin->name ? read_first(remote, how->cache, err)
                                            : spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
     if (rc) {
         release(remote);

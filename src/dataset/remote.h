@@ -13,6 +13,7 @@ struct spl_remote_how {
     struct spl_page_cache *cache; // may be NULL; held until close
     uint64_t deadline_ms;         /* how long a read goes on asking while nothing comes; 0 = SPL_REMOTE_DEADLINE_MS */
     const atomic_bool *cancelled; // may be NULL; borrowed until close
+    _Atomic uint64_t *moved_ns;   // may be NULL; gets when something last came, too; borrowed until close
 };
 
 /* Asks for the beginning of the file at `url` (remote_url.h), which says how long it is and which state of it is there:
@@ -21,6 +22,10 @@ struct spl_remote_how {
  * most. */
 int spl_remote_open(const char *url, const struct spl_remote_how *how, struct spl_dataset_source *out,
                     struct spl_error *err);
+
+/* What lies between is one read, however many it is made of. */
+void spl_remote_begin(void);
+void spl_remote_end(void);
 
 /* Waits until no read from a server is under way in this process; false where one still was at the deadline. For who
  * has cancelled them all and is about to free the flag. */

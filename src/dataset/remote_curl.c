@@ -1,5 +1,6 @@
 /* Requests over HTTP/1.1 and 2, through libcurl. Handles are lent to one request at a time and kept with their
- * connections, so that neighbours in time need no new one: some of a server, and of all some that were used last.
+ * connections, so that neighbours in time need no new one: some of a file, and of all some that were used last. Files
+ * of one host, as tiles of a collection are, lend them to each other.
  *
  * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http.
  * Bytes of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password,
@@ -26,6 +27,7 @@ enum { refusal_bytes = 1024, swallowed_most = 64 << 10 };
 struct server {
     const struct spl_curl *curl;
     char *url;
+    size_t origin_bytes; /* of the URL, with its host */
     bool tls, s3, sign;
     char *key_id, *secret, *token_header, *provider; // NULL where nothing is signed
     TAILQ_ENTRY(server) link; // guarded by: parked.mutex, as all below; in its list where it has some
@@ -36,7 +38,7 @@ struct server {
 /* Handles that nobody uses; those servers that were given one last stand behind the others. */
 static struct {
     pthread_mutex_t mutex;
-    TAILQ_HEAD(, server) servers;
+    TAILQ_HEAD(servers, server) servers;
     unsigned handles;
 } parked = {.mutex = PTHREAD_MUTEX_INITIALIZER, .servers = TAILQ_HEAD_INITIALIZER(parked.servers)};
 
@@ -248,10 +250,21 @@ static CURL *unpark(struct server *server)
     return handle;
 }
 
+/* One whose connections are as good, which has some; NULL: none. The mutex is held. */
+static struct server *find_alike(const struct server *server)
+{
+    struct server *other;
+    TAILQ_FOREACH_REVERSE(other, &parked.servers, servers, link)
+    if (other->origin_bytes == server->origin_bytes && !strncmp(other->url, server->url, server->origin_bytes))
+        return other;
+    return NULL;
+}
+
 static CURL *take_handle(struct server *server)
 {
     pthread_mutex_lock(&parked.mutex);
-    CURL *handle = server->kept_count ? unpark(server) : NULL;
+    struct server *from = server->kept_count ? server : find_alike(server);
+    CURL *handle = from ? unpark(from) : NULL;
     pthread_mutex_unlock(&parked.mutex);
     return handle ? handle : server->curl->curl_easy_init();
 }
@@ -346,6 +359,8 @@ int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_a
     server->s3 = url->s3;
     server->sign = url->s3 && account->key_id && *account->key_id;
     bool refused = !(server->url = strdup(url->get));
+    const char *host = strstr(url->get, "://");
+    server->origin_bytes = host ? (size_t)(host + 3 - url->get) + strcspn(host + 3, "/?") : strlen(url->get);
     if (server->sign) {
         const char *region = account->region && *account->region ? account->region : "us-east-1";
         char provider[128];

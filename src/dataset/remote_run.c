@@ -72,6 +72,13 @@ static bool begin(void *context)
     return true;
 }
 
+static void note_moved(struct spl_remote_origin *origin, uint64_t now_ns)
+{
+    atomic_store(&origin->moved_ns, now_ns);
+    if (origin->also_moved_ns)
+        atomic_store(origin->also_moved_ns, now_ns);
+}
+
 static bool take(void *context, const void *data, size_t bytes)
 {
     struct taking *t = context;
@@ -79,7 +86,7 @@ static bool take(void *context, const void *data, size_t bytes)
     const size_t mine = bytes < left ? bytes : (size_t)left;
     t->run->put(t->run->context, data, mine);
     t->done += mine;
-    atomic_store(&t->origin->moved_ns, spl_now_ns());
+    note_moved(t->origin, spl_now_ns());
     spl_remote_count(bytes, mine);
     return mine == bytes;
 }
@@ -191,7 +198,7 @@ int spl_remote_run(struct spl_remote_origin *origin, struct spl_remote_run *run,
     if (rc > 0 && spl_remaining_ns(atomic_load(&origin->rests_until_ns)))
         return spl_fail(err, SPL_E_TIMEOUT, "cannot read %s: its server was given up a moment ago; come back later",
                         name_of(origin));
-    atomic_store(&origin->moved_ns, since_ns);
+    note_moved(origin, since_ns);
     while (rc > 0) {
         uint64_t done = t.done;
         ask(&t, end_ns);

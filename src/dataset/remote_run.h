@@ -22,6 +22,7 @@ struct spl_remote_origin {
     atomic_bool changed;          /* it is another file by now */
     _Atomic uint64_t rests_until_ns; /* its server was given up a moment ago */
     _Atomic uint64_t moved_ns;    /* when bytes last came */
+    _Atomic uint64_t *also_moved_ns; // may be NULL; the same of several files
 };
 
 struct spl_remote_run {

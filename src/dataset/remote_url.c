@@ -67,6 +67,26 @@ const char *spl_remote_show(const char *path, char *out, size_t size)
     return out;
 }
 
+bool spl_remote_has_query(const char *path)
+{
+    return path[end_of_name(path)];
+}
+
+char *spl_remote_make_beside(const char *path, const char *name)
+{
+    size_t scheme = scheme_length(path), end = end_of_name(path), folder = end;
+    while (folder > scheme && path[folder - 1] != '/')
+        folder--;
+    const bool bare = scheme && folder == scheme; /* a host alone, which stays the host */
+    const size_t kept = bare ? end : folder, bytes = kept + 1 + strlen(name) + 1;
+    char *text = spl_alloc_raw(bytes, 1, NULL);
+    if (text) {
+        memcpy(text, path, kept);
+        snprintf(text + kept, bytes - kept, "%s%s", bare ? "/" : "", name);
+    }
+    return text;
+}
+
 const char *spl_remote_get_stem(const char *path, size_t *length)
 {
     size_t end = end_of_name(path), begin = end;

@@ -36,6 +36,13 @@ void spl_remote_url_finish(struct spl_remote_url *url);
 /* What may be shown of `path`, a URL or not: no user, no password, no query. Cut to `size`; returns `out`. */
 const char *spl_remote_show(const char *path, char *out, size_t size);
 
+/* Does a URL end in a query, which is good for what it was made for alone? */
+bool spl_remote_has_query(const char *path);
+
+/* Where `name`, a file's plain name (SPL_NAME_LETTERS), lies beside `path`: the same folder of the same disk, host or
+ * bucket, whatever the name. A query is left behind. NULL: no memory. */
+char *spl_remote_make_beside(const char *path, const char *name);
+
 /* The name at the end of a path or URL, without folder, query and ending; *length bytes of it, maybe 0. */
 const char *spl_remote_get_stem(const char *path, size_t *length);
 

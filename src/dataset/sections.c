@@ -16,7 +16,7 @@
 #include "dataset/dictionary.h"
 #include "dataset/open.h"
 
-enum { table_alignment = 8 };
+enum { table_alignment = 8, other_sections_most = 64 /* of a tile: those beside pages and heads */ };
 
 /* A texel has 4 bytes when it is expanded, and of three coefficients of 37 bits at most. */
 #define ATOMS_BYTES_MAX (4ull * SPL_DICTIONARY_BYTES_MAX)
@@ -123,6 +123,20 @@ static int not_a_dataset(struct spl_dataset *dataset, const char first[8], struc
                     "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->name);
 }
 
+/* A tile has a page and its head of each that the collection knows, and few others. */
+static int check_expected(const struct spl_dataset *dataset, const struct spl_file_header *header,
+                          struct spl_error *err)
+{
+    struct spl_expected *expected = dataset->how->expected;
+    if (!expected)
+        return SPL_OK;
+    if (header->table_hash != expected->version)
+        expected->differs = "is another one now";
+    else if (header->section_count > 2ull * expected->pages + other_sections_most)
+        expected->differs = "has another number of pages or levels";
+    return expected->differs ? spl_fail(err, SPL_E_CORRUPT, "%s %s", dataset->name, expected->differs) : SPL_OK;
+}
+
 static int read_header(struct spl_dataset *dataset, struct spl_file_header *header, struct spl_error *err)
 {
     size_t bytes = dataset->source.size < sizeof *header ? (size_t)dataset->source.size : sizeof *header;
@@ -154,7 +168,7 @@ static int read_header(struct spl_dataset *dataset, struct spl_file_header *head
     if (header->file_bytes < dataset->source.size)
         return spl_fail(err, SPL_E_CORRUPT, "%s: %llu bytes follow the end of the dataset", dataset->name,
                         (unsigned long long)(dataset->source.size - header->file_bytes));
-    return SPL_OK;
+    return check_expected(dataset, header, err);
 }
 
 /* Bytes of the source, malloc'd; NULL and `err` when they cannot be read. From a server memory is taken as they come:

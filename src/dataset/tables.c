@@ -16,6 +16,9 @@
 #include "dataset/open.h"
 #include "dataset/tiles.h"
 
+/* Of a collection, which keeps all of its own, whatever --tables says. */
+static const uint64_t coarse_bytes_max = 1u << 30;
+
 /* Numbers and sizes as the directory says; arrays still to be set. */
 static struct spl_tables describe(const struct spl_dataset *dataset, uint32_t page)
 {
@@ -290,9 +293,17 @@ static int keep_first(struct spl_dataset *dataset, struct spl_error *err)
     return rc;
 }
 
+/* Of a tile none is kept: who wants them reads them. */
 int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
 {
     const bool collection = json_object_get(dataset->meta, "tiles"); /* whose leaves get what hangs there */
+    if (dataset->how->expected) {
+        dataset->how->expected->differs = collection ? "is a collection itself" : NULL;
+        return collection ? spl_fail(err, SPL_E_CORRUPT, "%s is a collection itself", dataset->name) : SPL_OK;
+    }
+    if (collection && spl_dataset_get_all_tables_bytes(dataset) > coarse_bytes_max)
+        return spl_fail(err, SPL_E_LIMIT, "%s: it is a collection, of whose coarse levels the tables take more than %d "
+                        "MiB", dataset->name, (int)(coarse_bytes_max >> 20));
     bool whole = collection || spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
     if (whole && dataset->info.pages)

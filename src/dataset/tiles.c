@@ -1,41 +1,24 @@
 /* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to
  * be opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the
  * collection was made of, which its version and the sizes of all its pages say: a tile that is replaced fails what
- * needs it, until the collection is made anew. Any thread. */
+ * needs it, until the collection is made anew. Any thread.
+ *
+ * Invariant: a tile is opened by one thread, which holds no mutex meanwhile: who wants another one does not wait for a
+ * disk or a server that does not answer. open_count counts those that are being opened as well. */
 #include "dataset/tiles.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/condition.h"
 #include "base/memory.h"
+#include "base/work.h"
 #include "dataset/open.h"
+#include "dataset/remote.h"
+#include "dataset/remote_url.h"
 
-struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page)
-{
-    const struct spl_tiles *tiles = dataset->tiles;
-    if (!tiles || page < tiles->own_pages)
-        return NULL;
-    uint32_t low = 0;
-    for (uint32_t high = tiles->count; high - low > 1;) {
-        uint32_t middle = low + (high - low) / 2;
-        if (tiles->list[middle].first_page <= page)
-            low = middle;
-        else
-            high = middle;
-    }
-    return &tiles->list[low];
-}
-
-static char *path_of(const struct spl_tiles *tiles, const struct spl_tile *tile, struct spl_error *err)
-{
-    const char *slash = strrchr(tiles->beside, '/');
-    size_t folder = slash ? (size_t)(slash + 1 - tiles->beside) : 0, bytes = folder + strlen(tile->file) + 1;
-    char *path = spl_alloc_raw(bytes, 1, err);
-    if (path)
-        snprintf(path, bytes, "%.*s%s", (int)folder, tiles->beside, tile->file);
-    return path;
-}
+static const uint64_t rest_ns = 2 * SPL_NS_PER_S, look_around_ns = 100 * SPL_NS_PER_MS;
 
 static bool is_same_stream(const struct spl_stream *a, const struct spl_stream *b)
 {
@@ -47,10 +30,6 @@ static bool is_same_stream(const struct spl_stream *a, const struct spl_stream *
 static const char *judge(const struct spl_dataset *dataset, const struct spl_tile *tile, const struct spl_dataset *own)
 {
     const struct spl_page_row *rows = dataset->tiles->rows + tile->first_page;
-    if (own->info.version != tile->version)
-        return "is another one now";
-    if (own->tiles)
-        return "is a collection itself";
     if (own->info.pages != tile->page_count || own->info.levels != tile->levels)
         return "has another number of pages or levels";
     if (own->textures || own->maps || own->info.has_surface != dataset->info.has_surface ||
@@ -73,56 +52,103 @@ static const char *judge(const struct spl_dataset *dataset, const struct spl_til
                : "has pages of other sizes";
 }
 
-/* What is wrong with a tile is wrong with the collection, whatever it is. `name`: what messages of the tile call it, a
- * path, which clients have no business with, or its id. */
-static int fail_tile(const struct spl_dataset *dataset, const struct spl_tile *tile, int rc, const char *name,
-                     const char *message, struct spl_error *err)
+/* A message without where the tile lies, which clients have no business with, and without its name in front, as who
+ * passes it on has named it. */
+static const char *shorten(const char *location, const char *file, const char *message, char *out, size_t size)
 {
-    const size_t length = name ? strlen(name) : 0;
-    const char *rest = length && !strncmp(message, name, length) ? message + length : message;
-    return spl_fail(
-        err, rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM ? rc : SPL_E_CORRUPT,
-        "%s: its tile %s cannot be read: %s; put it back, or make the collection anew (splatd collect; of a "
-        "job splatd pack --join)",
-        spl_dataset_get_name(dataset), tile->file, rest + strspn(rest, ": "));
+    static const char opening[] = "cannot read ";
+    const size_t few = 8; /* letters, which may be anything */
+    const size_t length = strlen(location);
+    size_t used = 0, stem = 0;
+    *out = '\0';
+    for (const char *from = message; *from && used + 1 < size;) {
+        const size_t left = strlen(from), same = left > few && left < length ? left : length; /* it may be cut */
+        const bool here = length && !strncmp(from, location, same);
+        used += (size_t)snprintf(out + used, size - used, "%.*s", here ? (int)strlen(file) : 1, here ? file : from);
+        from += here ? same : 1;
+    }
+    const char *rest = strncmp(out, opening, strlen(opening)) ? out : out + strlen(opening);
+    const char *name = spl_remote_get_stem(file, &stem); /* an open one goes by its id */
+    size_t said = strncmp(rest, file, strlen(file)) ? stem : strlen(file);
+    return !strncmp(rest, name, said) && !strncmp(rest + said, ": ", 2) ? rest + said + 2 : out;
 }
 
-/* Under the lock. */
-static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, struct spl_error *err)
+int spl_tiles_fail(const struct spl_dataset *dataset, const struct spl_tile *tile, const struct spl_error *why,
+                   struct spl_error *err)
 {
-    const struct spl_dataset_opening how = {.cancelled = dataset->cancelled}; /* the root's tables alone are kept */
-    struct spl_dataset *own = NULL;
+    const int rc = why->code;
+    const bool passes = rc == SPL_E_CANCELLED || rc == SPL_E_NOMEM || rc == SPL_E_TIMEOUT;
+    const bool advised = passes || (dataset->remote && rc == SPL_E_IO); /* of a server the message says what to do */
+    char text[sizeof why->message], shown[1024];
+    char *location = spl_remote_make_beside(dataset->tiles->beside, tile->file);
+    spl_fail(err, passes ? rc : SPL_E_CORRUPT, "%s: its tile %s cannot be read: %s%s", spl_dataset_get_name(dataset),
+             tile->file,
+             shorten(location ? spl_remote_show(location, shown, sizeof shown) : "", tile->file, why->message, text,
+                     sizeof text),
+             advised ? "" : "; put it back, or make the collection anew (splatd collect; of a job splatd pack --join)");
+    free(location);
+    return passes ? rc : SPL_E_CORRUPT;
+}
+
+/* A tile that is not there, or another one: has the collection on its server been made anew? Then it is opened anew by
+ * who looks after it. Not asked by every view that meets such a tile. */
+static void look_for_change(const struct spl_dataset *dataset)
+{
+    char first;
+    const uint64_t now_ns = spl_now_ns();
+    if (!dataset->remote || now_ns < atomic_load(&dataset->tiles->look_ns))
+        return;
+    atomic_store(&dataset->tiles->look_ns, now_ns + rest_ns);
+    dataset->source.far->forget(dataset->source.context, 0, sizeof first);
+    spl_dataset_read(dataset, 0, &first, sizeof first, NULL);
+}
+
+/* Without the mutex. */
+static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, struct spl_dataset **own,
+                     struct spl_error *err)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    struct spl_expected expected = {.version = tile->version, .pages = tile->page_count};
+    const struct spl_dataset_opening how = {.cancelled = dataset->cancelled,
+                                            .page_cache = tiles->page_cache,
+                                            .remote_deadline_ms = tiles->remote_deadline_ms,
+                                            .expected = &expected,
+                                            .moved_ns = &tile->moved_ns};
     struct spl_error why = {0};
-    char *path = path_of(dataset->tiles, tile, &why);
-    int rc = path ? spl_dataset_open_as(path, &how, &own, &why) : SPL_E_NOMEM;
-    const char *what = rc ? NULL : judge(dataset, tile, own);
+    char *location = spl_remote_make_beside(tiles->beside, tile->file);
+    int rc = location ? spl_dataset_open_as(location, &how, own, &why)
+                      : spl_fail(&why, SPL_E_NOMEM, "out of memory for where it lies");
+    free(location);
+    const char *what = rc ? expected.differs : judge(dataset, tile, *own);
+    if (what || rc == SPL_E_NOT_FOUND)
+        look_for_change(dataset);
     if (what)
         rc = spl_fail(err, SPL_E_CORRUPT,
-                      "%s: its tile %s %s: make the collection anew (splatd collect; of a job splatd "
-                      "pack --join)",
+                      "%s: its tile %s %s: make the collection anew (splatd collect; of a job splatd pack --join)",
                       spl_dataset_get_name(dataset), tile->file, what);
     else if (rc)
-        rc = fail_tile(dataset, tile, rc, path, why.message, err);
-    free(path);
+        rc = spl_tiles_fail(dataset, tile, &why, err);
     if (rc) {
-        spl_dataset_close(own);
+        spl_dataset_close(*own);
+        *own = NULL;
         return rc;
     }
-    own->verified = dataset->verified; /* pages are held against their checksums when they are read */
-    tile->open = own;
-    dataset->tiles->open_count++;
+    (*own)->verified = dataset->verified; /* pages are held against their checksums when they are read */
+    spl_dataset_strip(*own);
     return SPL_OK;
 }
 
-static void close_tile(struct spl_tiles *tiles, struct spl_tile *tile)
+/* The mutex is held; the caller closes what it returns without it. */
+static struct spl_dataset *take(struct spl_tiles *tiles, struct spl_tile *tile)
 {
-    spl_dataset_close(tile->open);
+    struct spl_dataset *own = tile->open;
     tile->open = NULL;
     tile->spoilt = false;
     tiles->open_count--;
+    return own;
 }
 
-static void close_oldest(struct spl_tiles *tiles)
+static struct spl_dataset *take_oldest(struct spl_tiles *tiles)
 {
     struct spl_tile *oldest = NULL;
     for (uint32_t i = 0; i < tiles->count; i++) {
@@ -130,8 +156,33 @@ static void close_oldest(struct spl_tiles *tiles)
         if (tile->open && !tile->users && (!oldest || tile->used < oldest->used))
             oldest = tile;
     }
-    if (oldest)
-        close_tile(tiles, oldest);
+    return oldest ? take(tiles, oldest) : NULL;
+}
+
+/* Called and left with the mutex. */
+static int open_for_all(const struct spl_dataset *dataset, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    struct spl_dataset *surplus = NULL, *own = NULL;
+    if (spl_remaining_ns(tile->rests_until_ns))
+        return spl_fail(err, SPL_E_TIMEOUT,
+                        "%s: its tile %s cannot be read: its server was given up a moment ago; come back later",
+                        spl_dataset_get_name(dataset), tile->file);
+    if (tiles->open_count >= tiles->open_most)
+        surplus = take_oldest(tiles);
+    tiles->open_count++;
+    tile->opening = true;
+    pthread_mutex_unlock(&tiles->mutex);
+    spl_dataset_close(surplus);
+    int rc = open_tile(dataset, tile, &own, err);
+    pthread_mutex_lock(&tiles->mutex);
+    tile->opening = false;
+    tile->open = own;
+    tiles->open_count -= !own;
+    if (rc == SPL_E_TIMEOUT)
+        tile->rests_until_ns = spl_now_ns() + rest_ns;
+    pthread_cond_broadcast(&tiles->opened);
+    return rc;
 }
 
 int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset **out,
@@ -142,121 +193,36 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
     *out = NULL;
     if (!tiles->beside)
         return spl_fail(err, SPL_E_UNSUPPORTED,
-                        "%s: its tile %s cannot be read: a collection's tiles are files beside it on a disk",
+                        "%s: its tile %s cannot be read: a collection's tiles are files beside it, on a disk or a "
+                        "server",
                         spl_dataset_get_name(dataset), tile->file);
+    spl_remote_begin(); /* opening is many reads, and looks at the flag between them */
     pthread_mutex_lock(&tiles->mutex);
-    if (!tile->open) {
-        if (tiles->open_count >= tiles->open_most)
-            close_oldest(tiles);
-        rc = open_tile(dataset, tile, err);
-    }
+    while (tile->opening && !(rc = spl_dataset_check_cancelled(dataset, err))) // who opens it has a deadline
+        spl_condition_wait(&tiles->opened, &tiles->mutex, spl_now_ns() + look_around_ns);
+    if (!rc && !tile->open)
+        rc = open_for_all(dataset, tile, err);
     if (!rc) {
         tile->users++;
         tile->used = ++tiles->borrowings;
         *out = tile->open;
     }
     pthread_mutex_unlock(&tiles->mutex);
+    spl_remote_end();
     return rc;
 }
 
-void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *tile)
+void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *tile, bool spoilt)
 {
     struct spl_tiles *tiles = dataset->tiles;
+    struct spl_dataset *surplus = NULL;
     pthread_mutex_lock(&tiles->mutex);
-    if (!--tile->users && (tile->spoilt || tiles->open_count > tiles->open_most))
-        close_tile(tiles, tile);
-    pthread_mutex_unlock(&tiles->mutex);
-}
-
-/* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
- * been put back meanwhile. */
-static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset *own, int rc,
-                       const struct spl_error *why, struct spl_error *err)
-{
-    if (rc) {
-        rc = fail_tile(dataset, tile, rc, spl_dataset_get_name(own), why->message, err);
-        pthread_mutex_lock(&dataset->tiles->mutex);
+    if (spoilt)
         tile->spoilt = true;
-        pthread_mutex_unlock(&dataset->tiles->mutex);
-    }
-    spl_tiles_give_back(dataset, tile);
-    return rc;
-}
-
-int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err)
-{
-    struct spl_tile *tile = spl_tiles_find(dataset, page);
-    const struct spl_dataset *own;
-    struct spl_error why = {0};
-    bool sound;
-    int rc = spl_tiles_borrow(dataset, tile, &own, err);
-    if (rc)
-        return rc;
-    const uint32_t index = page - tile->first_page;
-    rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
-    if (!rc && !sound) // nobody looked when it was opened, so it need not have been in use
-        rc = spl_fail(&why, SPL_E_CORRUPT, "page %u fails its checksum", index);
-    return end_reading(dataset, tile, own, rc, &why, err);
-}
-
-uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
-{
-    return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
-}
-
-size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
-{
-    spl_assert(index < dataset->info.pages);
-    const struct spl_tiles *tiles = dataset->tiles;
-    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages]
-                                              : dataset->pages[index]->bytes;
-}
-
-int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
-                           struct spl_error *err)
-{
-    struct spl_tile *tile = spl_tiles_find(dataset, page);
-    const struct spl_dataset *own = dataset;
-    int rc = tile ? spl_tiles_borrow(dataset, tile, &own, err) : SPL_OK;
-    if (rc)
-        return rc;
-    const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
-    rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, err);
-    if (tile)
-        spl_tiles_give_back(dataset, tile);
-    return rc;
-}
-
-/* Numbers of a tile's own become those of the collection. */
-static void renumber(struct spl_tables *tables, const struct spl_tile *tile)
-{
-    tables->page += tile->first_page;
-    tables->first_node += tile->first_node;
-    tables->first_chunk += tile->first_chunk;
-    for (uint32_t n = 0; n < tables->node_count; n++) {
-        struct spl_node *node = &tables->nodes[n];
-        node->page = tables->page;
-        node->first_child += tile->first_node;
-        node->first_chunk += tile->first_chunk;
-        node->depth = (uint8_t)(node->depth + tile->depth); /* depths fit: spl_dataset_check_tiles() */
-    }
-    for (uint32_t c = 0; c < tables->chunk_count; c++)
-        tables->chunks[c].first_id += tile->first_id;
-}
-
-int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err)
-{
-    struct spl_tile *tile = spl_tiles_find(dataset, page);
-    const struct spl_dataset *own;
-    struct spl_error why = {0};
-    int rc = spl_tiles_borrow(dataset, tile, &own, err);
-    if (rc)
-        return rc;
-    rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
-    rc = end_reading(dataset, tile, own, rc, &why, err);
-    if (!rc)
-        renumber(block, tile);
-    return rc;
+    if (!--tile->users && (tile->spoilt || tiles->open_count > tiles->open_most))
+        surplus = take(tiles, tile);
+    pthread_mutex_unlock(&tiles->mutex);
+    spl_dataset_close(surplus);
 }
 
 void spl_tiles_destroy(struct spl_tiles *tiles)
@@ -267,6 +233,8 @@ void spl_tiles_destroy(struct spl_tiles *tiles)
         spl_dataset_close(tiles->list[i].open);
         free(tiles->list[i].file);
     }
+    spl_page_cache_let_go(tiles->page_cache);
+    pthread_cond_destroy(&tiles->opened);
     pthread_mutex_destroy(&tiles->mutex);
     free(tiles->list);
     free(tiles->rows);

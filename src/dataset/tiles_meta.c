@@ -6,8 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/condition.h"
 #include "base/memory.h"
 #include "dataset/open.h"
+#include "dataset/remote_url.h"
 #include "dataset/tiles.h"
 
 enum { levels_most = 256 };
@@ -43,7 +45,7 @@ static int get_file(const struct spl_dataset *dataset, size_t index, const json_
     const char *file = json_string_value(json_object_get(json, "file"));
     const char *version = json_string_value(json_object_get(json, "version"));
     char *end = NULL;
-    if (!file || !*file || *file == '.' || strchr(file, '/') || strlen(file) > 255)
+    if (!file || !*file || *file == '.' || file[strspn(file, SPL_NAME_LETTERS)] || strlen(file) > 255)
         return wrong(dataset, index, "file", "is no name of a file beside it", err);
     if (!version || strlen(version) != 16 || strspn(version, "0123456789abcdef") != 16)
         return wrong(dataset, index, "version", "is not 16 hexadecimal digits", err);
@@ -157,9 +159,12 @@ static int allocate(struct spl_dataset *dataset, const json_t *json, struct sums
     if (!tiles)
         return SPL_E_NOMEM;
     pthread_mutex_init(&tiles->mutex, NULL);
+    spl_condition_init(&tiles->opened);
+    tiles->page_cache = spl_page_cache_hold(dataset->how->page_cache);
+    tiles->remote_deadline_ms = dataset->how->remote_deadline_ms;
     dataset->tiles = tiles;
     tiles->own_pages = dataset->info.pages;
-    tiles->open_most = SPL_TILES_OPEN_MAX;
+    tiles->open_most = dataset->remote ? SPL_TILES_OPEN_FAR_MAX : SPL_TILES_OPEN_MAX;
     for (size_t i = 0; i < json_array_size(json); i++)
         pages += json_array_size(json_object_get(json_array_get(json, i), "pages"));
     sums->pages = tiles->own_pages;
@@ -172,9 +177,10 @@ static int allocate(struct spl_dataset *dataset, const json_t *json, struct sums
     tiles->list = spl_alloc(json_array_size(json), sizeof *tiles->list, err);
     tiles->rows = spl_alloc(sums->page_room + 1, sizeof *tiles->rows, err);
     tiles->page_bytes = spl_alloc(pages + 1, sizeof *tiles->page_bytes, err);
-    if (dataset->beside && (tiles->beside = spl_alloc_raw(strlen(dataset->beside) + 1, 1, err)))
-        strcpy(tiles->beside, dataset->beside);
-    if (!tiles->list || !tiles->rows || !tiles->page_bytes || (dataset->beside && !tiles->beside))
+    const char *beside = dataset->how->beside;
+    if (beside && (tiles->beside = spl_alloc_raw(strlen(beside) + 1, 1, err)))
+        strcpy(tiles->beside, beside);
+    if (!tiles->list || !tiles->rows || !tiles->page_bytes || (beside && !tiles->beside))
         return SPL_E_NOMEM;
     memcpy(tiles->rows, dataset->rows, tiles->own_pages * sizeof *tiles->rows);
     tiles->count = (uint32_t)json_array_size(json);
@@ -209,10 +215,11 @@ int spl_dataset_check_tiles(struct spl_dataset *dataset, struct spl_error *err)
                         "%s: this goes through all of a dataset, and it is a collection of %zu: name one of "
                         "its tiles",
                         dataset->name, json_array_size(json));
-    if (dataset->remote)
+    if (dataset->how->beside && spl_remote_has_query(dataset->how->beside))
         return spl_fail(err, SPL_E_UNSUPPORTED,
-                        "%s: it is a collection, whose tiles are files beside it: it is served from a disk, "
-                        "not from a server",
+                        "%s: it is a collection, and what its URL has behind '?' is good for this file alone, not for "
+                        "its tiles beside it: name it without, where its server lets you read or asks for a user in "
+                        "the URL, or as s3://BUCKET/KEY with keys in the environment",
                         dataset->name);
     if (dataset->textures || dataset->maps)
         return spl_fail_field(err, SPL_E_CORRUPT, tile_key, "%s: a collection has neither textures nor maps of its own",

@@ -1,12 +1,13 @@
 /* The io threads; see io.h.
  *
- * Invariants: staged[far] counts the bytes of reads under way and of those ended that were not given back, from afar or
- * not, and is raised before memory is taken; it exceeds SPL_IO_BYTES only for one read alone, and from afar by what
+ * Invariants: staged[far] counts the bytes of reads under way and of those ended that were not given back, from afar
+ * or not, and is raised before memory is taken; it exceeds SPL_IO_BYTES only for one read alone, and from afar by what
  * hangs, SPL_IO_HANGING_BYTES at most. Memory that is given back while there is more to read is kept for that, within
  * the same bound: to have it anew costs as much as the read. A read is in one list at a time, but for those taken,
- * which are in none. Of a source as many reads are under way as it says; a thread is begun where one of another could
- * be, and none is idle. Only idle threads wait without a deadline, for work; destroy() wakes them, waits for those that
- * are not in the middle of a read, and leaves the others behind: then `io` is theirs, and the last one frees it. */
+ * which are in none. Of a source as many reads are under way as it says, and as many that hang; a thread is begun
+ * where one of another could be, and none is idle. Only idle threads wait without a deadline, for work; destroy()
+ * wakes them, waits for those that are not in the middle of a read, and leaves the others behind: then `io` is theirs,
+ * and the last one frees it. */
 #include "render/io.h"
 
 #include <pthread.h>
@@ -47,20 +48,10 @@ static bool goes_before(const struct spl_io_read *a, const struct spl_io_read *b
     return a->number < b->number;
 }
 
-/* The read of a source that is longest under way; NULL = none. */
-static struct spl_io_read *find_being_read(struct spl_io *io, const void *source)
-{
-    struct spl_io_read *read;
-    TAILQ_FOREACH(read, &io->being_read, link)
-    if (read->what.source == source)
-        return read;
-    return NULL;
-}
-
 /* When something of it was last seen. */
 static uint64_t get_sign_ns(const struct spl_io_read *read)
 {
-    uint64_t moved_ns = read->what.get_moved_ns ? read->what.get_moved_ns(read->what.source) : 0;
+    uint64_t moved_ns = read->what.get_moved_ns ? read->what.get_moved_ns(read->what.source, read->what.index) : 0;
     return moved_ns > read->began_ns ? moved_ns : read->began_ns;
 }
 
@@ -70,18 +61,21 @@ static bool hangs(const struct spl_io_read *read)
     return now_ns > sign_ns && now_ns - sign_ns >= hangs_ns;
 }
 
-/* Are as many under way of its source as may be? One where something hangs is no place for more threads. */
+/* Are as many under way of its source as may be? A part where something hangs is no place for more threads. */
 static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
 {
-    unsigned count = 0;
-    bool any_hangs = false;
+    const unsigned most = what->at_once ? what->at_once : 1;
+    unsigned moving = 0, hanging = 0;
+    bool part_hangs = false;
     struct spl_io_read *read;
     TAILQ_FOREACH(read, &io->being_read, link)
     {
-        count += read->what.source == what->source;
-        any_hangs |= read->what.source == what->source && hangs(read);
+        const bool own = read->what.source == what->source, hung = own && hangs(read);
+        moving += own && !hung;
+        hanging += hung;
+        part_hangs |= hung && read->what.part == what->part;
     }
-    return any_hangs || count >= (what->at_once ? what->at_once : 1);
+    return part_hangs || moving >= most || hanging >= most;
 }
 
 /* Is there memory for it, and from afar a thread? */
@@ -416,21 +410,37 @@ static size_t count_hanging(struct spl_io *io)
 
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source)
 {
+    uint64_t latest_ns = 0;
+    struct spl_io_read *read;
     pthread_mutex_lock(&io->mutex);
     count_hanging(io); // who waits for pages asks this, again and again
-    const struct spl_io_read *own = find_being_read(io, source);
-    uint64_t moved_ns = own ? get_sign_ns(own) : io->moved_ns;
+    TAILQ_FOREACH(read, &io->being_read, link)
+    if (read->what.source == source && get_sign_ns(read) > latest_ns)
+        latest_ns = get_sign_ns(read);
+    latest_ns = latest_ns ? latest_ns : io->moved_ns;
     pthread_mutex_unlock(&io->mutex);
-    return moved_ns;
+    return latest_ns;
+}
+
+static bool any_hangs(struct spl_io *io, const void *source, bool of_part, uint32_t part)
+{
+    bool answer = false;
+    struct spl_io_read *read;
+    pthread_mutex_lock(&io->mutex);
+    TAILQ_FOREACH(read, &io->being_read, link)
+    answer |= read->what.source == source && (!of_part || read->what.part == part) && hangs(read);
+    pthread_mutex_unlock(&io->mutex);
+    return answer;
 }
 
 bool spl_io_hangs(struct spl_io *io, const void *source)
 {
-    pthread_mutex_lock(&io->mutex);
-    const struct spl_io_read *own = find_being_read(io, source);
-    bool answer = own && hangs(own);
-    pthread_mutex_unlock(&io->mutex);
-    return answer;
+    return any_hangs(io, source, false, 0);
+}
+
+bool spl_io_part_hangs(struct spl_io *io, const void *source, uint32_t part)
+{
+    return any_hangs(io, source, true, part);
 }
 
 size_t spl_io_count_hanging(struct spl_io *io)

@@ -35,9 +35,10 @@ struct spl_io_what {
     uint32_t index;
     size_t bytes; /* that `read` writes, at least 1 */
     void *owner;  /* of the read; not looked at */
-    uint64_t (*get_moved_ns)(const void *source); // when a read of it that has not ended last came on; NULL: it is
-                                                  // not from afar
-    unsigned at_once; /* reads of the source under way together; 0 = 1 */
+    uint64_t (*get_moved_ns)(const void *source, uint32_t index); // when a read of its part that has not ended last
+                                                                  // came on; NULL: it is not from afar
+    unsigned at_once; /* reads of the source under way together, beside as many that hang; 0 = 1 */
+    uint32_t part;    /* of the source: where something of another part hangs this one is read */
 };
 
 /* What goes first: what a frame waits for, in the order that it was asked for; then what the latest walk asked for. */
@@ -87,12 +88,14 @@ void spl_io_end(struct spl_io *io, struct spl_io_read *read);
 /* Blocks until a read can be taken: true; false where none is under way, or none had ended by `deadline_ns`. */
 bool spl_io_wait(struct spl_io *io, uint64_t deadline_ns);
 
-/* When the read of the source that is longest under way was begun, or has last come on; where none is, when one of any
+/* When a read of the source that is under way was last begun, or has last come on; where none is, when one of any
  * source was last begun, has ended or was given back: what tells a disk that is slow from one that hangs. */
 uint64_t spl_io_get_moved_ns(struct spl_io *io, const void *source);
 
-/* Has a read of the source been under way for a second in which nothing came, and how many are there that have? */
+/* Has a read of the source, or of this part of it, been under way for a second in which nothing came, and how many are
+ * there that have? */
 bool spl_io_hangs(struct spl_io *io, const void *source);
+bool spl_io_part_hangs(struct spl_io *io, const void *source, uint32_t part);
 size_t spl_io_count_hanging(struct spl_io *io);
 
 /* Reads that wait, are being read, or were not taken yet. */

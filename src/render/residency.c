@@ -133,7 +133,8 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
                                .bytes = spl_slot_get_bytes(dataset, slot),
                                .owner = page,
                                .get_moved_ns = remote ? spl_slot_get_moved_ns : NULL,
-                               .at_once = remote ? remote_reads : 1};
+                               .at_once = remote ? remote_reads : 1,
+                               .part = spl_slot_get_part(dataset, slot)};
     if (page->read)
         spl_io_raise(residency->io, page->read, rank);
     else
@@ -183,7 +184,8 @@ static int ask(struct spl_residency *residency, struct spl_resident_dataset *res
         spl_residency_drop_slot(residency, page);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
-    if (resident->hangs && !spl_resident_has_room(page)) {
+    if (resident->hangs && !spl_resident_has_room(page) &&
+        spl_io_part_hangs(residency->io, resident->dataset, spl_slot_get_part(resident->dataset, slot))) {
         residency->crowded |= awaited;
         residency->stalled |= awaited;
         return awaited ? SPL_SLOT_CROWDED : SPL_SLOT_PENDING;

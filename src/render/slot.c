@@ -76,7 +76,15 @@ void spl_slot_let_go(const void *source)
     spl_dataset_let_go(source);
 }
 
-uint64_t spl_slot_get_moved_ns(const void *source)
+uint32_t spl_slot_get_part(const struct spl_dataset *dataset, uint32_t slot)
 {
-    return spl_dataset_get_moved_ns(source);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    if (!info->tiles) // whose slots are pages and their tables alone
+        return 0;
+    return spl_dataset_get_part(dataset, slot < info->pages ? slot : slot - spl_slot_of_tables(dataset, 0));
+}
+
+uint64_t spl_slot_get_moved_ns(const void *source, uint32_t slot)
+{
+    return spl_dataset_get_moved_ns(source, spl_slot_get_part(source, slot));
 }

@@ -31,6 +31,7 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
 /* spl_dataset_hold() and spl_dataset_let_go(), for spl_io_what. */
 void spl_slot_hold(const void *source);
 void spl_slot_let_go(const void *source);
-uint64_t spl_slot_get_moved_ns(const void *source); /* spl_dataset_get_moved_ns() */
+uint32_t spl_slot_get_part(const struct spl_dataset *dataset, uint32_t slot);
+uint64_t spl_slot_get_moved_ns(const void *source, uint32_t slot); /* spl_dataset_get_moved_ns() */
 
 #endif

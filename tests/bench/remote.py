@@ -2,8 +2,8 @@
 bounds what passes, with and without a page cache.
 
 usage: SPLATD_BINARY=build/src/splatd remote.py NAME.spld [--rtt-ms 20] [--mbit 1000] [VIEW-QUERY…]
-Each query is a place that nobody has looked at before: asked for as it is at once (wait=0), then complete, then again. Prints a
-table in Markdown, and fails where the pictures differ."""
+Each query is a place that nobody has looked at before: asked for as it is at once (wait=0), then complete, then again. Of a collection the
+other datasets of its folder, its tiles, are on the server too. Prints a table in Markdown, and fails where the pictures differ."""
 import argparse
 import http.client
 import json
@@ -23,7 +23,8 @@ from range_server import File, Server
 
 
 class Proxy:
-    """Passes bytes on half a round trip after they came, downwards no faster than so many a second, over all connections."""
+    """Passes bytes on half a round trip after they came, downwards no faster than so many a second, over all connections. Of a new
+    connection nothing passes for a round trip, as its handshake would take."""
 
     def __init__(self, port, rtt_s, bytes_per_s):
         self.target, self.delay_s, self.rate = port, rtt_s / 2, bytes_per_s
@@ -45,6 +46,8 @@ class Proxy:
         threading.Thread(target=self.write, args=(sink, line), daemon=True).start()
 
     def read(self, source, line, shaped):
+        if not shaped:
+            time.sleep(2 * self.delay_s)
         while True:
             try:
                 data = source.recv(1 << 17)
@@ -136,12 +139,16 @@ def main():
     queries = a.queries or ["width=1280&height=720"]
     data = pathlib.Path(a.dataset).read_bytes()
     name = pathlib.Path(a.dataset).name
-    with Server({f"/{name}": File(data)}) as server, tempfile.TemporaryDirectory() as pages:
+    tiles = json.loads(subprocess.check_output([os.environ["SPLATD_BINARY"], "info", "--json", "--no-verify", a.dataset]))["tiles"]
+    files = {f"/{name}": File(data)}
+    if tiles:
+        files.update({f"/{path.name}": File(path.read_bytes()) for path in pathlib.Path(a.dataset).parent.glob("*.spld")})
+    with Server(files) as server, tempfile.TemporaryDirectory() as pages:
         url = f"http://127.0.0.1:{Proxy(server.port, a.rtt_ms / 1000, a.mbit * 125000).port}/{name}"
         cases = [("file", measure(queries, a.dataset)), ("server", measure(queries, url)),
                  ("server, page cache empty", measure(queries, "--page-cache", pages, url)),
                  ("server, page cache as left", measure(queries, "--page-cache", pages, url))]
-    print(f"{len(data) / 1e6:.0f} MB, {a.rtt_ms:g} ms, {a.mbit:g} Mbit/s\n")
+    print(f"{sum(len(file.data) for file in files.values()) / 1e6:.0f} MB in {len(files)} files, {a.rtt_ms:g} ms, {a.mbit:g} Mbit/s\n")
     print("| from | ready, s | place | first picture, s | complete, s | again, s | MB read | MB of pages | requests | cache hits |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for label, (ready_s, rows, _, _) in cases:

@@ -70,6 +70,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         self.server.connections.add(self.client_address)
         self.server.agents.add(self.headers.get("User-Agent"))
+        self.server.asked.append((self.headers.get("Host"), self.path, self.headers.get("Authorization")))
         path = self.path.split("?")[0]
         if path in self.server.moved:
             return self.refuse(302, Location=self.server.moved[path])
@@ -129,7 +130,7 @@ class Server(http.server.ThreadingHTTPServer):
 
     def __init__(self, files, port=0, moved=()):
         super().__init__(("127.0.0.1", port), Handler)
-        self.files, self.moved, self.connections, self.agents = files, dict(moved), set(), set()
+        self.files, self.moved, self.connections, self.agents, self.asked = files, dict(moved), set(), set(), []
         self.port = self.server_address[1]
 
     def handle_error(self, request, client_address):  # who asked has left

@@ -188,6 +188,22 @@ def test_slow_servers_hold_up_nobody():
             assert slots(d)["stuck"]["state"] == "failed"
 
 
+def test_a_server_that_fails_later():
+    """What was opened and cannot be read any more is said as soon as it is known, not at the view's deadline."""
+    file = File(DATA)
+    with Server({"/hall.spld": file}) as server:
+        with Daemon(REAL, "--remote-deadline", "1000", "--watch", "0", "--deadline", "60000", datasets=[server.url("hall.spld")]) as d:
+            view(d, "hall", COARSE)
+            file.always = 503
+            began = time.monotonic()
+            for said in ("given up after", "given up a moment ago"):
+                reply = d.ask(fresh(f"/v1/datasets/hall/{QUERY}"))
+                assert reply.status == 503 and said in reply.json()["detail"] and reply.headers["Retry-After"], reply.body
+            assert time.monotonic() - began < 15 and counters(d)["frames"] < 5, counters(d)
+            file.always = None
+            eventually(lambda: d.ask(fresh(f"/v1/datasets/hall/{QUERY}")).status == 200)
+
+
 def test_names_that_take_long():
     """A resolver that does not answer is waited for no longer than a server."""
     with Daemon(FAKE, "--remote-deadline", "1000", "--watch", "0", datasets=["http://far.slow/hall.spld", WALL],

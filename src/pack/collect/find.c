@@ -141,11 +141,12 @@ static int check_tile(const struct spl_collect *c, const struct spl_collect_tile
                               "%.300s is an input too; choose another name, or name the folder, which stands for all "
                               "tiles in it",
                               output);
-    json_t *name = json_string(tile->name);
-    json_decref(name);
-    return name ? SPL_OK
-                : spl_fail_field(err, SPL_E_USAGE, "inputs", "%.300s: this name is no UTF-8; rename the file",
-                                 tile->path);
+    return *tile->name != '.' && !tile->name[strspn(tile->name, SPL_NAME_LETTERS)]
+               ? SPL_OK
+               : spl_fail_field(err, SPL_E_USAGE, "inputs",
+                                "%.300s: a tile's name is letters (a-z, A-Z), digits, '.', '_' and '-', the first of "
+                                "them not a '.'; rename the file",
+                                tile->path);
 }
 
 static int by_name(const void *a, const void *b)

@@ -2,7 +2,8 @@
  *
  * Invariant: a flight is in the list from its launch until it lands or its last ticket is dropped; a job whose flight
  * was given up has no owner and is destroyed when it comes back. The job's deadline is its latest ticket's: who boards
- * late raises it, and where the frame had begun under an earlier one, it is launched again for those with time left.
+ * late raises it, and where the frame had begun under an earlier one, it is launched again for those with time left. A
+ * server or a disk that was given up before is an answer for all.
  * Owned by the loop's thread. */
 #include "service/view/flights.h"
 
@@ -26,6 +27,7 @@ struct flight {
     struct spl_key key; /* with which device it was asked for; not where request.planned */
     uint64_t renderer;
     struct spl_job *job; // may be NULL: between landing and another launch
+    uint64_t launched_until_ns; /* the deadline that its job was launched with */
 };
 
 static void land(struct spl_job *job);
@@ -50,6 +52,7 @@ static int launch(struct flight *flight, uint64_t deadline_ns, struct spl_error 
         spl_job_destroy(job);
     else
         flight->job = job;
+    flight->launched_until_ns = deadline_ns;
     return rc;
 }
 
@@ -156,7 +159,9 @@ static void land(struct spl_job *job)
     }
     flight->job = NULL;
     LIST_REMOVE(flight, link);
-    if (job->err.code == SPL_E_TIMEOUT && go_on(flight, &job->err)) {
+    // before its deadline it was a disk or a server that was given up
+    const bool late = job->err.code == SPL_E_TIMEOUT && !spl_remaining_ns(flight->launched_until_ns);
+    if (late && go_on(flight, &job->err)) {
         LIST_INSERT_HEAD(&flight->service->views->flights, flight, link);
     } else {
         struct spl_rendering *rendering = unload(flight, job);

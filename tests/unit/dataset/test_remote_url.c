@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -49,6 +50,37 @@ static void test_urls(void **state)
     const struct spl_s3_account other = {.endpoint = "http://127.0.0.1:9000/"};
     expect_url("s3://bucket/hall.spld", &other, "http://127.0.0.1:9000/bucket/hall.spld", "s3://bucket/hall.spld",
                "hall");
+}
+
+/* A tile lies where its collection does, whatever both are called. */
+static void test_what_lies_beside(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *path, *name, *beside;
+    } rows[] = {{"/data/city.spld", "t-1.spld", "/data/t-1.spld"},
+                {"city.spld", "t-1.spld", "t-1.spld"},
+                {"a/b?c/city.spld", "t", "a/b?c/t"},
+                {"a/what?.spld", "t", "a/t"},
+                {"https://h:81/a/city.spld", "t-1.spld", "https://h:81/a/t-1.spld"},
+                {"https://u:p@h/a%20b/city", "t.x.spld", "https://u:p@h/a%20b/t.x.spld"},
+                {"https://h/a/city.spld?sig=a/b", "t", "https://h/a/t"},
+                {"https://h/city.spld", "t", "https://h/t"},
+                {"https://city.spld", "evil.example", "https://city.spld/evil.example"}, // no host of its own
+                {"http://u:p@h:8", "t", "http://u:p@h:8/t"},
+                {"https://h?a/b", "t", "https://h/t"},
+                {"s3://bucket/a b/city.spld", "t", "s3://bucket/a b/t"},
+                {"s3://bucket/city?x/y.spld", "t", "s3://bucket/city?x/t"},
+                {"S3://bucket/city.spld", "t", "S3://bucket/t"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char *beside = spl_remote_make_beside(rows[i].path, rows[i].name);
+        assert_string_equal(beside, rows[i].beside);
+        free(beside);
+    }
+    assert_true(spl_remote_has_query("https://h/a?b") && spl_remote_has_query("http://h?") &&
+                spl_remote_has_query("https://h/a#b"));
+    assert_false(spl_remote_has_query("https://h/a") || spl_remote_has_query("s3://b/a?b") ||
+                 spl_remote_has_query("/a/b?c"));
 }
 
 static void test_what_is_no_url(void **state)
@@ -140,6 +172,7 @@ static void test_policy(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_urls), cmocka_unit_test(test_what_is_no_url),
+                                       cmocka_unit_test(test_what_lies_beside),
                                        cmocka_unit_test(test_refused), cmocka_unit_test(test_secrets_are_in_no_message),
                                        cmocka_unit_test(test_policy)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,6 +14,7 @@
 #include <pthread.h>
 
 #include <cmocka.h>
+#include <xxhash.h>
 
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
@@ -313,7 +314,7 @@ static void test_only_beside_a_file(void **state)
     struct spl_dataset *city;
     struct spl_error err = {0};
     assert_int_equal(spl_dataset_open_source(&source, "city.spld", false, NULL, &city, &err), SPL_OK);
-    refuse_page(city, "files beside it on a disk");
+    refuse_page(city, "files beside it, on a disk or a server");
     spl_dataset_close(city);
     assert_int_equal(spl_dataset_open_whole(path_of("city.spld"), false, &city, &err), SPL_E_USAGE);
     assert_non_null(strstr(err.message, "collection of 8"));
@@ -364,6 +365,13 @@ static void test_forged(void **state)
     static const struct {
         const char *key, *value, *field;
     } rows[] = {{"file", "\"../tile-3.spld\"", "tiles[3].file"}, {"file", "\".hidden\"", "tiles[3].file"},
+                {"file", "\"\"", "tiles[3].file"},               {"file", "\"..\"", "tiles[3].file"},
+                {"file", "\"/etc/passwd\"", "tiles[3].file"},    {"file", "\"https://h/t.spld\"", "tiles[3].file"},
+                {"file", "\"..%2ft.spld\"", "tiles[3].file"},    {"file", "\"a%2ft.spld\"", "tiles[3].file"},
+                {"file", "\"a\\\\t.spld\"", "tiles[3].file"},    {"file", "\"t.spld?a\"", "tiles[3].file"},
+                {"file", "\"t.spld#a\"", "tiles[3].file"},       {"file", "\"h:80\"", "tiles[3].file"},
+                {"file", "\"u@h\"", "tiles[3].file"},            {"file", "\"a b.spld\"", "tiles[3].file"},
+                {"file", "\"a\\n.spld\"", "tiles[3].file"},      {"file", "\"t\u00fc.spld\"", "tiles[3].file"},
                 {"file", "5", "tiles[3].file"},                  {"version", "\"xyz\"", "tiles[3].version"},
                 {"node", "3", "tiles[3].node"},                  {"node", "0", "tiles[3].node"},
                 {"node", "9", "tiles[3].node"},                  {"node", "-1", "tiles[3].node"},
@@ -411,6 +419,60 @@ static void test_tiles_that_do_not_fit(void **state)
         refuse_page(city, rows[i].said);
         spl_dataset_close(city);
     }
+}
+
+/* A tile that is a collection itself is refused, whatever else it has. */
+static void test_tiles_that_hold_more(void **state)
+{
+    (void)state;
+    struct spl_dataset *inner = open_city("city.spld"), *city;
+    char version[24];
+    snprintf(version, sizeof version, "\"%016llx\"", (unsigned long long)spl_dataset_get_info(inner)->version);
+    json_t *forged = json_deep_copy(tiles), *entry = json_array_get(forged, 0);
+    json_object_set_new(entry, "file", json_string("city.spld"));
+    json_object_set_new(entry, "version", json_loads(version, JSON_DECODE_ANY, NULL));
+    make_city("forged.spld", forged);
+    city = open_city("forged.spld");
+    struct spl_error err = {0};
+    char *block = malloc(spl_dataset_get_tables_bytes(city, 1));
+    assert_int_equal(spl_dataset_read_tables(city, 1, block, &err), SPL_E_CORRUPT);
+    if (!strstr(err.message, "its tile city.spld is a collection itself"))
+        fail_msg("%s", err.message);
+    assert_true(!city->tiles->list[0].open && !city->tiles->open_count);
+    free(block);
+    json_decref(forged);
+    spl_dataset_close(inner);
+    spl_dataset_close(city);
+}
+
+/* However many sections its header lists: their table is not read. */
+static void test_a_tile_of_too_many_sections(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    struct spoil file = spoil_load(path_of("tile-0.spld"));
+    for (uint32_t more = 0; more < 2; more++) {
+        file.header->section_count = 2 + 64 + more; // of one page
+        file.header->header_hash = XXH3_64bits(file.header, offsetof(struct spl_file_header, header_hash));
+        spoil_store(&file, path_of("tile-0.spld"), false);
+        refuse_page(city, more ? "has another number of pages or levels" : "section table lies outside the file");
+    }
+    free(file.bytes);
+    make_tile(0, 0);
+    spl_dataset_close(city);
+}
+
+/* Of an open tile nothing stays but what its pages are read by. */
+static void test_what_stays_of_a_tile(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    struct spl_tables *read;
+    assert_non_null(spl_dataset_borrow_tables(city, 1, &read, NULL));
+    const struct spl_dataset *tile = city->tiles->list[0].open;
+    assert_true(tile && !tile->meta && !tile->stations && !tile->tables && !tile->whole.nodes);
+    free(read);
+    spl_dataset_close(city);
 }
 
 struct reader {
@@ -470,6 +532,9 @@ int main(void)
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_tiles_that_hold_more),
+        cmocka_unit_test(test_a_tile_of_too_many_sections),
+        cmocka_unit_test(test_what_stays_of_a_tile),
         cmocka_unit_test(test_few_are_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -430,6 +430,9 @@ static void test_what_is_no_city_is_refused(void **state)
     refuse(SPL_E_USAGE, "a.spld", "a.spld", "a.spld is named twice");
     refuse(SPL_E_INPUT, "a.spld", "city.spld", "city.spld: it is a collection itself");
     refuse(SPL_E_USAGE, "a.spld", "refused.spld", "refused.spld is an input too");
+    assert_int_equal(symlink("a.spld", in_folder("b.spld?c")), 0); // no name beside a URL
+    refuse(SPL_E_USAGE, "a.spld", "b.spld?c", "a tile's name is letters");
+    unlink(in_folder("b.spld?c"));
     refuse(SPL_E_NOT_FOUND, "a.spld", "nosuch.spld", "nosuch.spld");
     assert_int_equal(mkdir(in_folder("elsewhere"), 0777), 0);
     refuse(SPL_E_NOT_FOUND, "elsewhere", NULL, "no NAME.spld lies in this folder");

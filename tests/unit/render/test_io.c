@@ -373,8 +373,9 @@ static void a_file_that_hangs_holds_up_no_other(void **state)
 
 static _Atomic uint64_t sign_ns;
 
-static uint64_t get_sign_ns(const void *source)
+static uint64_t get_sign_ns(const void *source, uint32_t index)
 {
+    (void)index;
     assert_true(get_holds((struct file *)source) > 0); // it is asked of what may be there no longer else
     return atomic_load(&sign_ns);
 }
@@ -421,10 +422,43 @@ static void a_file_from_afar_is_read_by_several(void **state)
     spl_io_destroy(io);
 }
 
-static uint64_t never_moved(const void *source)
+static uint64_t never_moved(const void *source, uint32_t index)
 {
-    (void)source;
+    (void)source, (void)index;
     return 0;
+}
+
+/* Other parts of a source are read while one hangs, as many at once; until as many hang as may be read at once. */
+static void a_part_that_hangs_holds_up_no_other(void **state)
+{
+    (void)state;
+    enum { at_once = 2 };
+    struct spl_io *io = start();
+    const struct spl_io_rank rank = {.awaited = true, .walk = 1};
+    struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .source = &files[0], .bytes = 8,
+                               .owner = &files[0], .get_moved_ns = never_moved, .at_once = at_once, .part = 1};
+    assert_non_null(spl_io_try_begin(io, &what, rank));
+    await_asked(&files[0], 1);
+    while (!spl_io_part_hangs(io, &files[0], 1))
+        usleep(10000);
+    assert_true(spl_io_hangs(io, &files[0]) && !spl_io_part_hangs(io, &files[0], 2));
+    what.index = 1;
+    assert_non_null(spl_io_try_begin(io, &what, rank)); // no more of that part
+    for (what.part = 2, what.index = 2; what.index < 5; what.index++)
+        assert_non_null(spl_io_try_begin(io, &what, rank));
+    await_asked(&files[0], 1 + at_once);
+    assert_true(spl_now_ns() - spl_io_get_moved_ns(io, &files[0]) < SPL_NS_PER_S); // who waits for the other goes on
+    assert_true(files[0].order[1] >= 2 && files[0].order[2] >= 2);
+    while (!spl_io_part_hangs(io, &files[0], 2))
+        usleep(10000);
+    what.part = 3;
+    assert_non_null(spl_io_try_begin(io, &what, rank));
+    usleep(50000);
+    assert_int_equal(get_asked(&files[0]), 1 + at_once); // all of it seems to hang
+    let_pass(&files[0], 0, true);
+    for (uint32_t i = 0; i < 6; i++)
+        spl_io_end(io, take(io));
+    spl_io_destroy(io);
 }
 
 /* They fill what is read from afar, and what hangs of it counts apart; a disk has memory of its own, and places. */
@@ -505,6 +539,7 @@ int main(void)
         cmocka_unit_test(it_says_when_anything_moved),
         cmocka_unit_test(a_file_that_hangs_holds_up_no_other),
         cmocka_unit_test(a_file_from_afar_is_read_by_several),
+        cmocka_unit_test(a_part_that_hangs_holds_up_no_other),
         cmocka_unit_test(servers_that_hang_take_nothing_from_a_disk),
         cmocka_unit_test(reads_that_hang_are_left_behind_together),
     };

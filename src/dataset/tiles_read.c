@@ -1,0 +1,116 @@
+/* Reading of a collection what lies in its tiles: pages, tables and words, as of a dataset's own; see tiles.h. What is
+ * wrong with a tile is wrong with the collection, and said by the tile's name. Any thread; blocks on disk, or on a
+ * server. */
+#include <stdlib.h>
+
+#include "dataset/open.h"
+#include "dataset/tiles.h"
+
+struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page)
+{
+    const struct spl_tiles *tiles = dataset->tiles;
+    if (!tiles || page < tiles->own_pages)
+        return NULL;
+    uint32_t low = 0;
+    for (uint32_t high = tiles->count; high - low > 1;) {
+        uint32_t middle = low + (high - low) / 2;
+        if (tiles->list[middle].first_page <= page)
+            low = middle;
+        else
+            high = middle;
+    }
+    return &tiles->list[low];
+}
+
+/* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
+ * been put back meanwhile. A server that does not answer has not changed it. */
+static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, int rc, const struct spl_error *why,
+                       struct spl_error *err)
+{
+    const bool spoilt = rc && rc != SPL_E_TIMEOUT && rc != SPL_E_CANCELLED && rc != SPL_E_NOMEM;
+    if (rc)
+        rc = spl_tiles_fail(dataset, tile, why, err);
+    spl_tiles_give_back(dataset, tile, spoilt);
+    return rc;
+}
+
+int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own;
+    struct spl_error why = {0};
+    bool sound;
+    int rc = spl_tiles_borrow(dataset, tile, &own, err);
+    if (rc)
+        return rc;
+    const uint32_t index = page - tile->first_page;
+    rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
+    if (!rc && !sound) // nobody looked when it was opened, so it need not have been in use
+        rc = spl_fail(&why, SPL_E_CORRUPT, "page %u fails its checksum%s", index, own->remote ? ", fetched twice" : "");
+    return end_reading(dataset, tile, rc, &why, err);
+}
+
+uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page)
+{
+    const struct spl_tile *tile = spl_tiles_find(dataset, page);
+    return tile ? (uint32_t)(tile - dataset->tiles->list) + 1 : 0;
+}
+
+uint32_t spl_dataset_get_own_pages(const struct spl_dataset *dataset)
+{
+    return dataset->tiles ? dataset->tiles->own_pages : dataset->info.pages;
+}
+
+size_t spl_dataset_get_page_bytes(const struct spl_dataset *dataset, uint32_t index)
+{
+    spl_assert(index < dataset->info.pages);
+    const struct spl_tiles *tiles = dataset->tiles;
+    return tiles && index >= tiles->own_pages ? tiles->page_bytes[index - tiles->own_pages]
+                                              : dataset->pages[index]->bytes;
+}
+
+int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uint64_t word, uint32_t *out, size_t count,
+                           struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own = dataset;
+    struct spl_error why = {0};
+    int rc = tile ? spl_tiles_borrow(dataset, tile, &own, err) : SPL_OK;
+    if (rc)
+        return rc;
+    const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
+    rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, tile ? &why : err);
+    return tile ? end_reading(dataset, tile, rc, &why, err) : rc;
+}
+
+/* Numbers of a tile's own become those of the collection. */
+static void renumber(struct spl_tables *tables, const struct spl_tile *tile)
+{
+    tables->page += tile->first_page;
+    tables->first_node += tile->first_node;
+    tables->first_chunk += tile->first_chunk;
+    for (uint32_t n = 0; n < tables->node_count; n++) {
+        struct spl_node *node = &tables->nodes[n];
+        node->page = tables->page;
+        node->first_child += tile->first_node;
+        node->first_chunk += tile->first_chunk;
+        node->depth = (uint8_t)(node->depth + tile->depth); /* depths fit: spl_dataset_check_tiles() */
+    }
+    for (uint32_t c = 0; c < tables->chunk_count; c++)
+        tables->chunks[c].first_id += tile->first_id;
+}
+
+int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    const struct spl_dataset *own;
+    struct spl_error why = {0};
+    int rc = spl_tiles_borrow(dataset, tile, &own, err);
+    if (rc)
+        return rc;
+    rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
+    rc = end_reading(dataset, tile, rc, &why, err);
+    if (!rc)
+        renumber(block, tile);
+    return rc;
+}

@@ -1,0 +1,310 @@
+"""Collections that lie on a server, their tiles beside them: pictures and picks have the bytes that they have from disk, a
+tile is asked for when a view needs it and not before, and whatever befalls one is told by its name, stops nothing else and
+is over once it is mended."""
+import base64
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import tempfile
+import time
+
+from harness import REAL, SANITIZED, Daemon, eventually, fresh, run, together
+from range_server import File, Server
+from tiles import SIDE, VIEW, make, splatd, write_tile
+
+if os.environ.get("SPLATD_REMOTE") == "0":
+    print("skipped: built without servers")
+    raise SystemExit(77)
+
+for name in list(os.environ):  # of whoever runs this; nothing leaves this machine
+    if name.lower().endswith("_proxy") or name.startswith("AWS_"):
+        del os.environ[name]
+
+SECRET = "hush-5e3c7"
+ACCOUNT = ("AKIDEXAMPLE", SECRET, "eu-central-1")
+TILES = 3
+ALL = "eye=40,-30,60&target=40,40,0"
+IN = [f"eye={x},{y},12&target={x},{y + 1},0" for x, y in ((20, 20), (60, 20), (20, 60))]  # of a tile each
+AFAR = "eye=40,-900,600&target=40,40,0&lod=30"  # coarse levels do
+
+
+def make_once():
+    """A collection of three tiles, the second of them of some megabytes, and the same under another name."""
+    top = pathlib.Path(tempfile.mkdtemp())
+    make(top, (0.5, 0.08, 0.5), whole=False)
+    shutil.copy(top / "city/city.spld", top / "city/town.spld")
+    return top
+
+
+TOP = make_once()
+NAMES = ["city", *(f"tile-{k}" for k in range(TILES))]
+DATA = {name: (TOP / f"city/{name}.spld").read_bytes() for name in NAMES}
+assert len(DATA["tile-1"]) > 1.2 * 2**20 > 2**20 > len(DATA["tile-0"])
+
+
+def files(folder="", **more):
+    """Server's files; `more`: a File for a name with _ for -."""
+    return {f"/{folder}{name}.spld": more.get(name.replace("-", "_")) or File(data) for name, data in DATA.items()}
+
+
+def slots(daemon):
+    return {slot["id"]: slot for slot in daemon.ask("/v1/datasets").json()["datasets"]}
+
+
+def opened(daemon):
+    eventually(lambda: all(slot["state"] != "loading" for slot in slots(daemon).values()))
+    return slots(daemon)
+
+
+def view(daemon, where, dataset="city"):
+    return daemon.ask(fresh(f"/v1/datasets/{dataset}/view?{VIEW if 'format' not in where else VIEW[:-11]}&{where}"))
+
+
+def good(daemon, where, dataset="city"):
+    reply = view(daemon, where, dataset)
+    assert reply.status == 200 and reply.headers["Splatd-Complete"] == "true", reply.body
+    return reply.body
+
+
+def on_disk():
+    """What views and picks are from disk."""
+    with Daemon(REAL, datasets=[TOP / "city/town.spld"]) as d:
+        picks = [pick(d, "town", where, x, y) for where in IN for x, y in ((80, 60), (30, 100))]
+        return [good(d, where, "town") for where in (*IN, ALL, AFAR)], picks, good(d, ALL + "&layer=id&format=npy", "town")
+
+
+def pick(daemon, dataset, where, x, y):
+    reply = daemon.ask(f"/v1/datasets/{dataset}/pick?{VIEW.replace('&format=png', '')}&{where}&lod=0&x={x}&y={y}")
+    assert reply.status == 200, reply.body
+    return reply.json()
+
+
+TRUTH, PICKS, IDS = on_disk()
+assert {p["tile"] for p in PICKS} == {f"tile-{k}.spld" for k in range(TILES)}
+
+
+def counts(server):
+    return [len(server.files[f"/{name}.spld"].requests) for name in NAMES[1:]]
+
+
+def test_tiles_come_when_they_are_seen():
+    with Server(files()) as server, tempfile.TemporaryDirectory() as pages:
+        with Daemon(REAL, "--page-cache", pages, datasets=[server.url("city.spld")]) as d:
+            now = opened(d)["city"]
+            assert now["state"] == "ready" and d.ask("/v1/datasets/city").json()["tiles"] == TILES, now
+            assert good(d, AFAR) == TRUTH[4] and counts(server) == [0, 0, 0]
+            assert good(d, IN[0]) == TRUTH[0] and counts(server)[0] > 0 and counts(server)[1:] == [0, 0]
+            assert good(d, IN[2]) == TRUTH[2] and not counts(server)[1]
+            assert len(server.connections) <= 2 < len(server.asked), server.connections  # they share them
+            asked = counts(server)
+            part = view(d, IN[1] + "&wait=0")  # coarse, at once, and said to be so
+            assert part.status == 200 and part.headers["Splatd-Complete"] == "false" and part.body != TRUTH[1], part.headers
+            eventually(lambda: view(d, IN[1] + "&wait=0").headers["Splatd-Complete"] == "true")
+            assert [view(d, IN[1] + more).body for more in ("&wait=0", "")] == [TRUTH[1]] * 2
+            assert counts(server)[::2] == asked[::2] and 2 <= counts(server)[1] <= 4, counts(server)
+            assert good(d, ALL) == TRUTH[3] and good(d, ALL + "&layer=id&format=npy") == IDS
+            assert [pick(d, "city", where, x, y) for where in IN for x, y in ((80, 60), (30, 100))] == PICKS
+            now = d.status()["counters"]
+            assert now["page_cache_misses"] >= 1 and not now["remote_failures"], now
+            assert now["remote_bytes"] < 1.2 * sum(map(len, DATA.values())), now
+        before = counts(server)
+        with Daemon(REAL, "--page-cache", pages, datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3]
+            # whether it is still the same, in a few bytes
+            assert d.status()["counters"]["remote_bytes"] == 4096 * (TILES + 1), d.status()["counters"]
+            assert [b - a for a, b in zip(before, counts(server))] == [1, 1, 1] and d.status()["counters"]["page_cache_hits"] >= 1
+
+
+def test_views_at_once():
+    with Server(files(city=File(DATA["city"], delay_s=0.1), tile_0=File(DATA["tile-0"], delay_s=0.5))) as server:
+        with Daemon(REAL, datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            places = [0, 1, 2, 3] * 4
+            for i, picture in zip(places, together(len(places), lambda i: good(d, [*IN, ALL][places[i]]))):
+                assert picture == TRUTH[i]
+            assert [len([r for r in server.files[f"/{name}.spld"].requests if r and r[0] == 0]) for name in NAMES[1:]] == [1, 1, 1]
+
+
+def test_credentials_and_names_go_along():
+    login = base64.b64encode(f"me:{SECRET}".encode()).decode()
+    with Server(files("a%20b/".replace("%20", " "))) as server:
+        with Daemon(REAL, "--watch", "0", datasets=[server.url("a%20b/city.spld", user=f"me:{SECRET}")]) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3]
+            asked = {path: authorization for _, path, authorization in server.asked}
+            assert asked == {f"/a%20b/{name}.spld": f"Basic {login}" for name in NAMES}, asked
+            assert {host for host, _, _ in server.asked} == {f"127.0.0.1:{server.port}"}
+        with Daemon(REAL, "--watch", "0", datasets=[server.url(f"a%20b/city.spld?sig={SECRET}")]) as d:
+            now = opened(d)["city"]
+            assert now["state"] == "failed" and "behind '?'" in now["reason"] and "s3://" in now["reason"], now
+            assert not [line for line in d.lines if SECRET in line] and SECRET not in json.dumps(now)
+    keys = {"AWS_ACCESS_KEY_ID": ACCOUNT[0], "AWS_SECRET_ACCESS_KEY": SECRET, "AWS_REGION": ACCOUNT[2]}
+    with Server({path: File(file.data, account=ACCOUNT) for path, file in files("bucket/a b/").items()}) as server:
+        keys["AWS_ENDPOINT_URL"] = f"http://127.0.0.1:{server.port}"
+        with Daemon(REAL, datasets=["s3://bucket/a b/city.spld"], **keys) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3]
+        out = TOP / "render.png"
+        said, pictures = [], []
+        for where in ("s3://bucket/a b/city.spld", TOP / "city/city.spld"):
+            for command in (["info", where], ["render", where, "--eye", "40,-30,60", "--target", "40,40,0", "-o", out]):
+                done = subprocess.run([REAL, *map(str, command)], capture_output=True, text=True, env={**os.environ, **keys})
+                assert done.returncode == 0, done.stderr
+                said.append(done.stdout)
+            pictures.append(out.read_bytes())
+        assert said[:2] == said[2:] and pictures[0] == pictures[1], said
+
+
+def other_tile():
+    """Another dataset of the tile's name."""
+    with tempfile.TemporaryDirectory() as folder:
+        splatd("pack", write_tile(pathlib.Path(folder, "a.ply"), SIDE, 0, 77), "-o", pathlib.Path(folder, "tile-1.spld"))
+        return pathlib.Path(folder, "tile-1.spld").read_bytes()
+
+
+OTHER = other_tile()
+
+
+class Later(File):
+    """Becomes another file after so many requests."""
+
+    def __init__(self, before, after, **then):
+        self.then, self.after = {}, after
+        super().__init__(before)
+        self.then = then
+
+    def __getattribute__(self, name):
+        then = object.__getattribute__(self, "then")
+        if name in then and len(object.__getattribute__(self, "requests")) > object.__getattribute__(self, "after"):
+            return then[name]
+        return object.__getattribute__(self, name)
+
+
+def spoilt(data, kind):
+    """Bytes of its first section of a kind are others (api/format.md, 1)."""
+    row = data.index(kind, struct.unpack_from("<Q", data, 24)[0])
+    at = struct.unpack_from("<Q", data, row + 8)[0] + 8
+    return data[:at] + bytes(b ^ 1 for b in data[at:at + 16]) + data[at + 16:]
+
+
+def expect_fault(daemon, what, status, said):
+    eventually(lambda: b"given up a moment ago" not in view(daemon, IN[1]).body)  # as of the fault before
+    bad = view(daemon, IN[1])
+    assert bad.status == status, (what, bad.status)
+    detail = bad.json()["detail"]
+    assert "city: its tile tile-1.spld " in detail and said in detail, (what, detail)
+    assert "127.0.0.1" not in detail and "http" not in detail, (what, detail)
+    assert [good(daemon, IN[i]) for i in (0, 2)] == [TRUTH[0], TRUTH[2]], what
+    assert view(daemon, IN[1]).status == status, what
+    assert status == 500 or bad.headers["Retry-After"], bad.headers
+
+
+def expect_end_of_fault(server, daemon):
+    server.files["/tile-1.spld"] = File(DATA["tile-1"])
+    eventually(lambda: view(daemon, IN[1]).status == 200)
+    assert good(daemon, IN[1]) == TRUTH[1] and good(daemon, ALL) == TRUTH[3] and slots(daemon)["city"]["state"] == "ready"
+
+
+def test_a_tile_that_is_not_what_it_should_be():
+    data = DATA["tile-1"]
+    faults = {  # what lies there, status and what is said
+        "missing": (None, 500, "answers 404 (NoSuchKey)"), "forbidden": (File(data, always=403), 500, "answers 403"),
+        "gone": (File(data, always=410), 500, "answers 410"), "another": (File(OTHER), 500, "is another one now"),
+        "its neighbour": (File(DATA["tile-0"]), 500, "is another one now"), "the collection": (File(DATA["city"]), 500, "is another one now"),
+        "cut": (File(data[:-1000]), 500, "truncated"), "longer": (File(data + b"0" * 64), 500, "follow the end"),
+        "empty": (File(b""), 500, "empty"), "text": (File(b"no dataset at all" * 9), 500, "not a packed dataset"),
+        "header": (File(data[:40] + b"x" + data[41:]), 500, "header fails its checksum"),
+        "META": (File(spoilt(data, b"META")), 500, "META fails its checksum"),
+        "HEAD": (File(spoilt(data, b"HEAD")), 500, "HEAD 0 fails its checksum"),
+        "whole": (File(data, ranges=False), 500, "answers no byte ranges"), "packed": (File(data, gzip=True), 500, "packs what it sends"),
+        "busy": (File(data, always=503), 503, "given up a"), "resets": (File(data, always="reset"), 503, "given up a"),
+        "PAGE": (File(spoilt(data, b"PAGE")), 500, "page 0 fails its checksum, fetched twice")}
+    with Server(files()) as server:
+        with Daemon(REAL, "--remote-deadline", "1000", "--watch", "0", "--cache", "0", datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            for what, (file, status, said) in faults.items():
+                server.files.pop("/tile-1.spld", None)
+                if file:
+                    server.files["/tile-1.spld"] = file
+                expect_fault(d, what, status, said)
+            expect_end_of_fault(server, d)
+
+
+def test_a_tile_that_goes_while_it_is_read():
+    data = DATA["tile-1"]
+    faults = {"vanishes": (Later(data, 0, always=404), 500, "answers 404"), "changes": (Later(data, 1, etag='"2"'), 500, "changed while it was served"),
+              "shrinks": (Later(data, 1, data=data[:1 << 20]), 500, "changed while it was served"),
+              "is shut": (Later(data, 0, always=403), 500, "answers 403"), "is down": (Later(data, 0, always="reset"), 503, "given up after")}
+    with Server(files()) as server:
+        for what, (file, status, said) in faults.items():
+            server.files["/tile-1.spld"] = file
+            with Daemon(REAL, "--remote-deadline", "1000", "--watch", "0", "--cache", "0", datasets=[server.url("city.spld")]) as d:
+                opened(d)
+                bad = view(d, IN[1])
+                detail = bad.json()["detail"]
+                assert bad.status == status and "city: its tile tile-1.spld cannot be read" in detail and said in detail, (what, detail)
+                assert [good(d, IN[i]) for i in (0, 2)] == [TRUTH[0], TRUTH[2]], what
+                expect_end_of_fault(server, d)
+
+
+def test_what_passes():
+    """Faults that end by themselves are in no picture."""
+    data = DATA["tile-1"]
+    shaky = {"tile_0": File(DATA["tile-0"], faults=[503, "reset", "cut"]), "tile_2": File(DATA["tile-2"], faults=["cut", (429, 1)]),
+             "tile_1": File(data, faults=["flip", None, "cut", "reset", 500])}
+    with Server(files(**shaky)) as server:
+        with Daemon(REAL, "--remote-deadline", "6000", datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3] and [good(d, where) for where in IN] == TRUTH[:3]
+            assert not shaky["tile_0"].faults and not shaky["tile_2"].faults and not shaky["tile_1"].faults
+            now = d.status()["counters"]
+            assert now["remote_retries"] >= 5 and not now["remote_failures"], now
+
+
+def test_a_tile_that_is_slow():
+    """Whoever does not look at it is answered, what has not been read before too, and so is who takes what is there."""
+    slow = File(DATA["tile-1"], delay_s=12 + 20 * SANITIZED)
+    with Server(files(tile_1=slow)) as server:
+        with Daemon(REAL, "--watch", "0", "--deadline", "60000", "--remote-deadline", "60000", datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            assert good(d, IN[0]) == TRUTH[0]
+            began = time.monotonic()
+            part = view(d, IN[1] + "&wait=0")
+            assert part.headers["Splatd-Complete"] == "false"
+            time.sleep(1.5)  # by now it hangs
+            assert good(d, IN[2]) == TRUTH[2] and good(d, IN[0]) == TRUTH[0] and good(d, AFAR) == TRUTH[4] and d.ops("/readyz").status == 200
+            assert view(d, IN[1] + "&wait=0").headers["Splatd-Complete"] == "false"
+            assert time.monotonic() - began < 8 + 20 * SANITIZED and not slots(d)["city"].get("reason")
+            slow.delay_s = 0
+            eventually(lambda: view(d, IN[1] + "&wait=0").headers["Splatd-Complete"] == "true", 60)
+            assert good(d, IN[1]) == TRUTH[1]
+
+
+def test_a_collection_that_is_made_anew():
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        for name in NAMES[1:]:
+            (folder / f"{name}.spld").write_bytes(OTHER if name == "tile-1" else DATA[name])
+        splatd("collect", folder, "-o", folder / "city.spld")
+        with Server(files()) as server, Daemon(REAL, datasets=[folder / "city.spld"]) as disk:
+            with Daemon(REAL, "--watch", "200", datasets=[server.url("city.spld")]) as d:
+                version = opened(d)["city"]["version"]
+                server.files["/tile-1.spld"] = File(OTHER, etag='"2"')
+                bad = view(d, IN[1])
+                assert bad.status == 500 and "is another one now: make the collection anew" in bad.json()["detail"], bad.body
+                server.files["/city.spld"] = File((folder / "city.spld").read_bytes(), etag='"2"')
+                eventually(lambda: view(d, IN[1]).status == 200)  # it is seen by views that meet the other tile
+                assert slots(d)["city"]["version"] != version
+                asked = server.files["/city.spld"].requests
+                assert len(asked) < 6, asked
+                assert good(d, IN[1]) == good(disk, IN[1]) and good(d, ALL) == good(disk, ALL)
+
+
+try:
+    run(globals())
+finally:
+    shutil.rmtree(TOP)
