@@ -18,6 +18,8 @@
 #include "gpu/panel_scenes.h"
 #include "render/fault.h"
 #include "render/spread.h"
+#include "support/make_maps.h"
+#include "support/make_textures.h"
 #include "support/make_tree.h"
 
 /* Beside `renderer`. */
@@ -152,6 +154,95 @@ static void every_method_and_layer_has_the_same_bytes(void **state)
     done(dataset);
 }
 
+/* Of a hilly ground of 100 m. */
+static struct spl_view view_from_above(double x, double height)
+{
+    const double eye[3] = {x, 50, height}, target[3] = {x, 50, 0}, up[3] = {0, 1, 0};
+    struct spl_view view = looking(origin, 2, 200, 640);
+    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
+    view.lod = 0.5;
+    return view;
+}
+
+/* Of `methods`, bit per method, from before a page is there. */
+static void same_bytes(const struct spl_dataset *dataset, const struct spl_dataset *alike, struct spl_view view,
+                       uint32_t methods, const char *what)
+{
+    struct spl_renderer *both[2] = {open_renderer(0, 0), open_renderer(0, 0)};
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(spl_renderer_add(both[i], dataset, NULL), SPL_OK);
+    if (alike != dataset)
+        assert_int_equal(spl_renderer_add(both[0], alike, NULL), SPL_OK);
+    for (int method = 0; method < SPL_METHOD_COUNT; method++) {
+        if (!(methods >> method & 1))
+            continue;
+        view.method = (enum spl_method)method;
+        struct spl_frame spread = draw_by_turns(both, dataset, &view, (const int[]){1, 1});
+        struct spl_frame alone = render_with(both[0], alike, &view);
+        assert_true(alone.stats.complete);
+        assert_same(&alone, &spread, what);
+        assert_same_counts(&alone.stats, &spread.stats);
+        spl_frame_finish(&alone);
+        spl_frame_finish(&spread);
+    }
+    for (int i = 0; i < 2; i++)
+        spl_renderer_destroy(both[i]);
+}
+
+static void remove_file(char *path)
+{
+    unlink(path);
+    *strrchr(path, '/') = '\0';
+    rmdir(path);
+}
+
+/* Textures, and maps of stations, which colours come from and which trim. */
+static void pictures_have_the_same_bytes(void **state)
+{
+    (void)state;
+    char path[256];
+    struct spl_dataset *plain = random_cube(6000, origin, 0.1), *mapped;
+    struct spl_dictionary dictionary = make_dictionary(16, 8, 5);
+    struct spl_dataset *textured = make_textured(plain, &dictionary, 4, 7);
+    struct make_maps maps = make_maps(plain, 3, 11);
+    make_folder(path);
+    strcat(path, "/mapped.spld");
+    make_mapped_file(plain, &maps, path);
+    assert_int_equal(spl_dataset_open(path, true, &mapped, NULL), SPL_OK);
+    remove_file(path);
+    const uint32_t methods = 1u << SPL_METHOD_SPLAT | 1u << SPL_METHOD_NEAREST;
+    same_bytes(textured, textured, looking(origin, 2, 150, 300), methods, "textured");
+    same_bytes(mapped, mapped, looking(origin, 2, 150, 300), methods, "mapped");
+    spl_dictionary_finish(&dictionary);
+    free_maps(&maps);
+    spl_dataset_close(textured);
+    spl_dataset_close(mapped);
+    done(plain);
+}
+
+/* Tables that are not kept are waited for, by the walk that finds the weight of a tile, too. */
+static void tables_by_page_have_the_same_bytes(void **state)
+{
+    (void)state;
+    char path[256];
+    struct spl_dataset_source file;
+    struct spl_dataset *all, *by_page;
+    make_folder(path);
+    strcat(path, "/tree.spld");
+    make_tree_file(path, 60000, 1 << 14);
+    assert_int_equal(spl_dataset_open(path, true, &all, NULL), SPL_OK);
+    assert_int_equal(spl_dataset_source_open_file(path, &file, NULL), SPL_OK);
+    const struct spl_dataset_source borrowed = {.size = file.size, .read = file.read, .context = file.context};
+    const struct spl_dataset_opening how = {.tables_bytes = spl_dataset_get_all_tables_bytes(all) - 1};
+    assert_int_equal(spl_dataset_open_source_as(&borrowed, "tree.spld", &how, &by_page, NULL), SPL_OK);
+    assert_false(spl_dataset_keeps_all(by_page));
+    remove_file(path);
+    same_bytes(by_page, all, view_from_above(20, 40), UINT32_MAX, "by page");
+    spl_dataset_close(by_page);
+    spl_dataset_close(all);
+    spl_dataset_source_close(&file);
+}
+
 /* So many on a sample of one piece that the weight of the tile is less than others would have alone. */
 static void a_piece_has_the_weight_of_its_tile(void **state)
 {
@@ -251,19 +342,13 @@ static void pages_of_its_pieces_are_enough(void **state)
     (void)state;
     char path[256];
     struct spl_dataset *dataset;
-    struct spl_view view;
-    const double eye[3] = {50, 50, 90}, target[3] = {50, 50, 0}, up[3] = {0, 1, 0};
+    struct spl_view view = view_from_above(50, 90);
     make_folder(path);
     strcat(path, "/tree.spld");
     make_tree_file(path, 60000, 1 << 14);
     assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
-    unlink(path);
-    *strrchr(path, '/') = '\0';
-    rmdir(path);
+    remove_file(path);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-    view = looking(origin, 2, 200, 640);
-    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
-    view.lod = 0.5;
     struct spl_frame whole = render_with(renderer, dataset, &view), alone;
     struct spl_renderer *both[2] = {open_renderer(0, 0), NULL};
     assert_int_equal(spl_renderer_add(both[0], dataset, NULL), SPL_OK);
@@ -335,6 +420,8 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(every_method_and_layer_has_the_same_bytes),
+        frames_test(pictures_have_the_same_bytes),
+        frames_test(tables_by_page_have_the_same_bytes),
         frames_test(a_piece_has_the_weight_of_its_tile),
         frames_test(a_lost_one_leaves_its_piece_to_others),
         frames_test(steps_may_end_before_the_frame),
