@@ -77,8 +77,7 @@ static void take_result(struct spl_job *whole, struct spl_job *part)
 void spl_parts_give_back(struct spl_job *whole)
 {
     whole->away = false;
-    if (whole->inside)
-        spl_cancel_set(&whole->dropped); // they have nothing left to do
+    spl_cancel_set(&whole->dropped); // parts that are inside have nothing left to do
 }
 
 enum spl_parts_state spl_parts_take(struct spl_job *part, struct spl_job **out, unsigned *number)
