@@ -10,7 +10,7 @@
 #include "base/memory.h"
 
 /* Pieces a renderer: with fewer one waits longer for the last, with more each lists anew what lies at borders. */
-enum { pieces_each = 4, least_rows = 64, widest_border = 4 /* as many times what is drawn around is a piece */ };
+enum { pieces_each = 4, least_side = 64, widest_border = 4 /* as many times what is drawn around is a piece */ };
 static const size_t none = SIZE_MAX;
 
 struct stretch {
@@ -22,9 +22,11 @@ struct spl_spread {
     unsigned renderers;
     struct spl_view view;
     struct spl_frame frame;
-    uint32_t tile_width, tile_height, rows; /* of a piece; 0 = the first take() lays them out */
-    uint32_t columns;                       /* of tiles */
-    size_t cuts, left;                      /* pieces a tile, of which the last may be empty; that are not drawn */
+    uint32_t tile_width, tile_height; /* 0 = the first take() lays them out, and pieces */
+    uint32_t columns;                 /* of tiles */
+    uint32_t width, height;           /* of a piece */
+    size_t across, down;              /* pieces of a tile, of which the last may be empty */
+    size_t left;                      /* pieces that are not drawn */
     struct stretch stretches[SPL_SPREAD_MAX];
     size_t held[SPL_SPREAD_MAX], back[SPL_SPREAD_MAX], back_count;
     struct spl_frame_whole *wholes; /* of each tile */
@@ -68,39 +70,62 @@ static uint32_t divide_up(uint32_t a, uint32_t b)
     return a / b + (a % b != 0);
 }
 
-/* The tile of a piece, and the piece, which is empty where tiles are not as high as others. */
+/* What of `all` is left behind `from`, at most `most`. */
+static uint32_t rest(uint32_t all, uint32_t from, uint32_t most)
+{
+    const uint32_t behind = from < all ? all - from : 0;
+    return behind < most ? behind : most;
+}
+
+/* The tile of a piece, and the piece, column by column, so that what lies above and below is of one stretch; empty
+ * where tiles are smaller than others. */
 static void find(const struct spl_spread *spread, size_t number, struct spl_spread_piece *out)
 {
     const struct spl_camera *camera = &spread->view.camera;
-    const uint32_t index = (uint32_t)(number / spread->cuts), row = (uint32_t)(number % spread->cuts) * spread->rows;
+    const size_t cuts = spread->across * spread->down, cut = number % cuts;
+    const uint32_t index = (uint32_t)(number / cuts);
+    const uint32_t x = (uint32_t)(cut / spread->down) * spread->width;
+    const uint32_t y = (uint32_t)(cut % spread->down) * spread->height;
     struct spl_piece tile = {.x = index % spread->columns * spread->tile_width,
                              .y = index / spread->columns * spread->tile_height};
-    tile.width = camera->width - tile.x < spread->tile_width ? camera->width - tile.x : spread->tile_width;
-    tile.height = camera->height - tile.y < spread->tile_height ? camera->height - tile.y : spread->tile_height;
-    *out = (struct spl_spread_piece){.tile = tile, .piece = tile, .index = index, .whole = spread->wholes[index]};
-    out->piece.y += row;
-    out->piece.height = row < tile.height ? tile.height - row : 0;
-    out->piece.height = out->piece.height < spread->rows ? out->piece.height : spread->rows;
+    tile.width = rest(camera->width, tile.x, spread->tile_width);
+    tile.height = rest(camera->height, tile.y, spread->tile_height);
+    *out = (struct spl_spread_piece){.tile = tile, .index = index, .whole = spread->wholes[index]};
+    out->piece = (struct spl_piece){.x = tile.x + x,
+                                    .y = tile.y + y,
+                                    .width = rest(tile.width, x, spread->width),
+                                    .height = rest(tile.height, y, spread->height)};
+}
+
+static bool is_none(const struct spl_piece *piece)
+{
+    return !piece->width || !piece->height;
 }
 
 static bool is_empty(const struct spl_spread *spread, size_t number)
 {
     struct spl_spread_piece found;
     find(spread, number, &found);
-    return !found.piece.height;
+    return is_none(&found.piece);
 }
 
-/* Rows of a piece, such that most of what is drawn is its own. */
-static void lay_out_rows(struct spl_spread *spread, const struct spl_tiling *tiling, size_t tiles)
+/* Pieces are about as wide as high: they see less of a dataset than stripes, and have less border. Most of what is
+ * drawn is their own. */
+static void cut_tiles(struct spl_spread *spread, const struct spl_tiling *tiling, size_t tiles)
 {
-    const uint32_t side = (uint32_t)spread->view.supersample, height = tiling->height;
-    const uint32_t border = widest_border * 2 * tiling->reach.apron / side;
-    const size_t cuts = (pieces_each * spread->renderers + tiles - 1) / tiles;
-    uint32_t rows = divide_up(height, cuts < height ? (uint32_t)cuts : height);
-    rows = rows < border ? border : rows;
-    rows = divide_up(rows, least_rows) * least_rows;
-    spread->rows = spread->renderers == 1 || rows > height ? height : rows;
-    spread->cuts = divide_up(height, spread->rows);
+    const uint32_t border = widest_border * 2 * tiling->reach.apron / (uint32_t)spread->view.supersample;
+    const uint32_t least = 2 * (border < least_side ? least_side : border);
+    const size_t wanted = spread->renderers > 1 ? pieces_each * spread->renderers : 1;
+    uint32_t width = tiling->width, height = tiling->height;
+    for (size_t pieces = tiles; pieces < wanted && (width >= least || height >= least); pieces *= 2)
+        if (width > height)
+            width = divide_up(width, 2);
+        else
+            height = divide_up(height, 2);
+    spread->width = width < tiling->width ? divide_up(width, least_side) * least_side : width;
+    spread->height = height < tiling->height ? divide_up(height, least_side) * least_side : height;
+    spread->across = divide_up(tiling->width, spread->width);
+    spread->down = divide_up(tiling->height, spread->height);
 }
 
 static int lay_out(struct spl_spread *spread, const struct spl_tiling *tiling, struct spl_error *err)
@@ -108,7 +133,7 @@ static int lay_out(struct spl_spread *spread, const struct spl_tiling *tiling, s
     const struct spl_camera *camera = &spread->view.camera;
     const uint32_t columns = divide_up(camera->width, tiling->width);
     const size_t tiles = (size_t)columns * divide_up(camera->height, tiling->height);
-    if (spread->rows) {
+    if (spread->tile_width) {
         spl_assert(tiling->width == spread->tile_width && tiling->height == spread->tile_height);
         return SPL_OK;
     }
@@ -118,8 +143,8 @@ static int lay_out(struct spl_spread *spread, const struct spl_tiling *tiling, s
     spread->tile_height = tiling->height;
     spread->columns = columns;
     spread->frame.stats.tiles = (uint32_t)tiles;
-    lay_out_rows(spread, tiling, tiles);
-    const size_t pieces = tiles * spread->cuts;
+    cut_tiles(spread, tiling, tiles);
+    const size_t pieces = tiles * spread->across * spread->down;
     for (unsigned i = 0; i < spread->renderers; i++)
         spread->stretches[i] = (struct stretch){pieces * i / spread->renderers, pieces * (i + 1) / spread->renderers};
     for (size_t i = 0; i < pieces; i++)
@@ -148,9 +173,9 @@ int spl_spread_take(struct spl_spread *spread, unsigned number, const struct spl
     pthread_mutex_lock(&spread->mutex);
     spl_assert(number < spread->renderers && spread->held[number] == none);
     int rc = lay_out(spread, tiling, err);
-    while (!rc && !out->piece.height && (spread->held[number] = choose(spread, number)) != none)
+    while (!rc && is_none(&out->piece) && (spread->held[number] = choose(spread, number)) != none)
         find(spread, spread->held[number], out);
-    if (!out->piece.height)
+    if (is_none(&out->piece))
         *out = (struct spl_spread_piece){0};
     spread->pixels_left -= (uint64_t)out->piece.width * out->piece.height;
     pthread_mutex_unlock(&spread->mutex);

@@ -261,7 +261,8 @@ static int take_piece(struct spl_frame_steps *steps, struct spl_error *err)
         steps->slow = false;
         spl_pieces_begin(&steps->pieces, &steps->taken.piece);
     }
-    if (job->whole.pixels || steps->taken.piece.height == steps->taken.tile.height)
+    const struct spl_spread_piece *taken = &steps->taken;
+    if (job->whole.pixels || (taken->piece.width == taken->tile.width && taken->piece.height == taken->tile.height))
         return SPL_OK;
     struct spl_tile tile = place(steps, &steps->taken.tile);
     int rc = spl_frame_know_tile(job, &tile, &drawn, err);

@@ -327,8 +327,9 @@ def spread():
     """Large views for one client: two devices of a core each against one of a core, view by view in turn. Beside the
     latency, which others on the machine lengthen, the processor time of the thread that has most of it: of two devices
     the one that others wait for."""
-    with Service("--cache", "0", "--device", "vulkan:0", LP_NUM_THREADS="0") as one, \
-            Service("--cache", "0", "--device", "vulkan:0,vulkan:0", LP_NUM_THREADS="0") as two:
+    options = ("--cache", "0", "--deadline", "60000")
+    with Service(*options, "--device", "vulkan:0", LP_NUM_THREADS="0") as one, \
+            Service(*options, "--device", "vulkan:0,vulkan:0", LP_NUM_THREADS="0") as two:
         for width, height in ((3840, 2160), (1920, 1080), (1600, 900), (1280, 800)):
             paths = [view_query(i / 9).replace("width=1280&height=720", f"width={width}&height={height}")
                      for i in range(10)]
@@ -338,7 +339,10 @@ def spread():
                 took, bodies = [], []
                 for s in (one, two):
                     before, began = busiest_s(s.pid), time.monotonic()
-                    bodies.append(get(s.port, path)[2])
+                    status, _, body, _ = get(s.port, path)
+                    if status != 200:
+                        sys.exit(body)
+                    bodies.append(body)
                     wall, after = time.monotonic() - began, busiest_s(s.pid)
                     took += [wall, max(after[t] - before.get(t, 0) for t in after)]
                 same &= bodies[0] == bodies[1]

@@ -78,7 +78,8 @@ static void each_pixel_is_had_once(void **state)
                     assert_true(taken.piece.width > 0 || spl_spread_get_left(spread) == 0);
                     if (!taken.piece.width)
                         break;
-                    assert_true(taken.piece.y >= taken.tile.y && taken.piece.width == taken.tile.width &&
+                    assert_true(taken.piece.y >= taken.tile.y && taken.piece.x >= taken.tile.x &&
+                                taken.piece.x + taken.piece.width <= taken.tile.x + taken.tile.width &&
                                 taken.piece.y + taken.piece.height <= taken.tile.y + taken.tile.height);
                     if (++turns % 5 == 0) {
                         spl_spread_leave(spread, number, 1);
@@ -96,28 +97,27 @@ static void each_pixel_is_had_once(void **state)
             }
 }
 
-/* Its own comes first, from its upper end; then the lower end of who has most left. */
+/* Its own comes first, from its beginning; then the end of who has most left. */
 static void each_has_a_stretch_of_its_own(void **state)
 {
     (void)state;
     const struct spl_tiling tiling = tiles_of(1000, 1536, 0);
     struct spl_spread *spread = make_spread(1000, 1536, 2);
-    uint32_t above = 0, below = 768;
-    for (int i = 0; i < 3; i++) {
-        assert_int_equal(take(spread, 0, &tiling).piece.y, above);
-        assert_int_equal(take(spread, 1, &tiling).piece.y, below);
+    uint32_t y = 0;
+    for (int i = 0; i < 3; i++, y += 384) {
+        const struct spl_piece left = take(spread, 0, &tiling).piece, right = take(spread, 1, &tiling).piece;
+        assert_true(left.x == 0 && left.y == y && left.width == 512 && left.height == 384);
+        assert_true(right.x == 512 && right.y == y && right.width == 488 && right.height == 384);
         assert_false(drawn(spread, 0));
         assert_false(drawn(spread, 1));
-        above += 192;
-        below += 192;
     }
-    assert_int_equal(take(spread, 1, &tiling).piece.y, below);
+    assert_int_equal(take(spread, 1, &tiling).piece.x, 512);
     assert_false(drawn(spread, 1));
-    assert_int_equal(take(spread, 1, &tiling).piece.y, above); // the first's last
+    assert_int_equal(take(spread, 1, &tiling).piece.x, 0); // the first's last
     assert_int_equal(take(spread, 0, &tiling).piece.width, 0);
     spl_spread_leave(spread, 0, 7); // it has none
     spl_spread_leave(spread, 1, 9); // is lost
-    assert_int_equal(take(spread, 0, &tiling).piece.y, above);
+    assert_int_equal(take(spread, 0, &tiling).piece.y, y);
     assert_true(drawn(spread, 0));
     struct spl_frame frame;
     spl_spread_hand_out(spread, &frame);
