@@ -26,6 +26,8 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     struct spl_error why = {0};
+    if (job->counts && slot < spl_slot_of_tables(job->resident->dataset, 0))
+        return SPL_SELECT_YES;
     bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
@@ -184,7 +186,8 @@ static void count_drawn(const struct spl_draw_list *list, struct spl_frame_stats
 }
 
 /* The tile is known for its pieces. */
-static void know_whole(struct spl_frame_job *job, const struct spl_tile *tile, uint64_t work)
+static void know_whole(struct spl_frame_job *job, const struct spl_tile *tile, uint64_t work,
+                       struct spl_frame_stats *drawn)
 {
     if (job->whole.pixels)
         return;
@@ -192,7 +195,7 @@ static void know_whole(struct spl_frame_job *job, const struct spl_tile *tile, u
                                           .work = work,
                                           .weight_max = tile->params.weight_max,
                                           .complete = job->renderer->list.complete};
-    count_drawn(&job->renderer->list, &job->frame->stats);
+    count_drawn(&job->renderer->list, drawn);
 }
 
 static uint64_t count_work(const struct spl_tile *tile)
@@ -233,7 +236,7 @@ static bool is_too_much(struct spl_frame_job *job, struct spl_tile *tile)
             tile->until_ns = spl_now_ns() + patience * r->step_ns;
         return false;
     }
-    know_whole(job, tile, work);
+    know_whole(job, tile, work, &job->frame->stats);
     return true;
 }
 
@@ -248,6 +251,19 @@ static void learn_pace(struct spl_frame_job *job, const struct spl_tile *tile, i
         *known = 0;
     else if (!drawn && work >= r->work_a_step / 8)
         *known = *known > 0 ? *known + (each - *known) / 4 : each;
+}
+
+int spl_frame_know_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_frame_stats *drawn,
+                        struct spl_error *err)
+{
+    uint64_t clock = spl_now_ns();
+    job->counts = true;
+    int rc = select_tile(job, tile, err);
+    job->counts = false;
+    job->frame->stats.select_ms += spl_since_ms(&clock);
+    if (!rc)
+        know_whole(job, tile, count_work(tile), drawn);
+    return rc;
 }
 
 /* Selects and uploads. Pages are taken while selecting; where they leave the draw list no room, it takes that of some,
@@ -398,7 +414,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
         learn_pace(job, tile, rc, spl_now_ns() - clock);
     }
     if (rc == SPL_FRAME_TOO_MUCH || (rc == SPL_FRAME_PAUSED && !job->pause.words))
-        know_whole(job, tile, count_work(tile));
+        know_whole(job, tile, count_work(tile), stats);
     if (rc == SPL_FRAME_PAUSED)
         add_times(tile, stats);
     if (rc)

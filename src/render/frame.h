@@ -8,15 +8,8 @@
 #include "render/hold.h"
 #include "render/renderer.h"
 #include "render/soft/pause.h"
+#include "render/spread.h"
 #include "render/tiling.h"
-
-/* What is known of a tile that is too much work, for its pieces. */
-struct spl_frame_whole {
-    uint64_t pixels;     /* 0 = nothing is known: what is drawn is a tile itself */
-    uint64_t work;       /* of work.c */
-    uint32_t weight_max; /* of its sums */
-    bool complete;       /* its draw list was */
-};
 
 struct spl_frame_job {
     struct spl_renderer *renderer;
@@ -30,7 +23,8 @@ struct spl_frame_job {
     const atomic_bool *cancelled;  // may be NULL
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
-    struct spl_frame_whole whole;
+    struct spl_frame_whole whole;  /* of a tile that is cut */
+    bool counts;                   /* nothing is drawn of what is walked: pages count as if they were there */
     struct spl_soft_pause pause;   /* what of the piece is walked */
     double advance; /* of spl_camera_advance(): what depths of the view are more by than those that are drawn */
 };
@@ -55,6 +49,12 @@ int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, 
  * SPL_E_TIMEOUT where the view's deadline had passed before. */
 enum { SPL_FRAME_TOO_MUCH = SPL_SLOT_PENDING + 1, SPL_FRAME_PAUSED };
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
+
+/* Finds what is to be known of `tile` for its pieces, as it is with all its pages: job->whole; no page is asked for,
+ * but tables are. *drawn: what it draws. SPL_SLOT_PENDING where it has these to wait for; SPL_E_LIMIT as of rendering.
+ */
+int spl_frame_know_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_frame_stats *drawn,
+                        struct spl_error *err);
 
 /* Milliseconds since *from, which becomes now. */
 static inline double spl_since_ms(uint64_t *from)

@@ -41,6 +41,10 @@ struct spl_frame_steps {
     struct spl_pieces pieces; /* of it that are to be drawn; none: it was not begun */
     uint32_t row;  /* of `enlarged`, the next */
     uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
+    struct spl_spread *spread; // may be NULL: these make all of it
+    unsigned number;           /* among those that draw the spread */
+    struct spl_spread_piece taken; /* of it, where `pieces` has some */
+    bool drew_last;            /* of its pieces */
     bool prepared; /* its plan is made, for which it may have waited */
     bool slow;     /* a piece of this tile gave way and was too large to be kept: others are cut before they do */
     bool paused;   /* the last step gave way in the middle of a piece */
@@ -86,8 +90,10 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
     struct spl_reach *reach = &job->tiling.reach;
     *reach = (struct spl_reach){.align = 1, .apron = apron};
     int rc = find_resident(steps, err);
+    job->counts = steps->spread; // all of them plan the same
     if (!rc && method->prepare)
         rc = method->prepare(job, err);
+    job->counts = false;
     const uint32_t shade = spl_shade_get_reach(view, spl_dataset_get_info(steps->dataset));
     if (view->surrounded)
         reach->guard += (apron + shade + 3) / 4 * 4; // as guards are: whole groups of lanes
@@ -102,8 +108,8 @@ static int prepare(struct spl_frame_steps *steps, struct spl_error *err)
 /* What can be refused is, before the device or a page is touched. `options` NULL: a frame in steps, of which all layers
  * are handed out; `handed_out`: those that have no image of the caller's are. */
 static int begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
-                 const struct spl_render_options *options, bool handed_out, struct spl_frame_steps **out,
-                 struct spl_error *err)
+                 const struct spl_render_options *options, bool handed_out, struct spl_spread *spread, unsigned number,
+                 struct spl_frame_steps **out, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
     struct spl_view known;
@@ -119,6 +125,8 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     if (!steps)
         return SPL_E_NOMEM;
     steps->dataset = dataset;
+    steps->spread = spread;
+    steps->number = number;
     steps->wanted = *view;
     steps->wanted.method = spl_method_for(view->method, info);
     steps->view = steps->wanted;
@@ -161,7 +169,19 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
 int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dataset, const struct spl_view *view,
                     struct spl_frame_steps **out, struct spl_error *err)
 {
-    return begin(renderer, dataset, view, NULL, true, out, err);
+    return begin(renderer, dataset, view, NULL, true, NULL, 0, out, err);
+}
+
+int spl_frame_begin_spread(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                           const struct spl_view *view, struct spl_spread *spread, unsigned number,
+                           struct spl_frame_steps **out, struct spl_error *err)
+{
+    return begin(renderer, dataset, view, NULL, true, spread, number, out, err);
+}
+
+bool spl_frame_drew_last(const struct spl_frame_steps *steps)
+{
+    return steps->drew_last;
 }
 
 void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel)
@@ -192,6 +212,20 @@ static void cut_slow(struct spl_frame_steps *steps)
     }
 }
 
+static struct spl_tile place(struct spl_frame_steps *steps, const struct spl_piece *piece)
+{
+    struct spl_frame_job *job = &steps->job;
+    struct spl_tile tile = {.renderer = job->renderer,
+                            .resident = job->resident,
+                            .view = &steps->view,
+                            .paint = job->paint.kind ? &job->paint : NULL,
+                            .cancelled = job->cancelled,
+                            .pause = &job->pause,
+                            .advance = job->advance};
+    spl_tiling_place(&job->tiling, piece, &tile);
+    return tile;
+}
+
 /* Draws the next piece; what is too much is cut until it is not. */
 static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
 {
@@ -199,14 +233,7 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
     if (steps->slow)
         cut_slow(steps);
     for (;;) {
-        struct spl_tile tile = {.renderer = job->renderer,
-                                .resident = job->resident,
-                                .view = &steps->view,
-                                .paint = job->paint.kind ? &job->paint : NULL,
-                                .cancelled = job->cancelled,
-                                .pause = &job->pause,
-                                .advance = job->advance};
-        spl_tiling_place(&job->tiling, &steps->pieces.left[steps->pieces.count - 1], &tile);
+        struct spl_tile tile = place(steps, &steps->pieces.left[steps->pieces.count - 1]);
         int rc = spl_frame_render_tile(job, &tile, err);
         steps->paused = rc == SPL_FRAME_PAUSED;
         if (steps->paused && !job->pause.words) {
@@ -219,6 +246,46 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
         bool cut = spl_pieces_cut(&steps->pieces);
         spl_assert(cut); // a pixel is never too much
     }
+}
+
+/* The next of the spread, if there is one; its tile becomes known where it is cut. */
+static int take_piece(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    struct spl_frame_job *job = &steps->job;
+    struct spl_frame_stats drawn = {.complete = true};
+    if (!steps->pieces.count) {
+        int rc = spl_spread_take(steps->spread, steps->number, &job->tiling, &steps->taken, err);
+        if (rc || !steps->taken.piece.width)
+            return rc;
+        job->whole = steps->taken.whole;
+        steps->slow = false;
+        spl_pieces_begin(&steps->pieces, &steps->taken.piece);
+    }
+    const struct spl_spread_piece *taken = &steps->taken;
+    if (job->whole.pixels || (taken->piece.width == taken->tile.width && taken->piece.height == taken->tile.height))
+        return SPL_OK;
+    struct spl_tile tile = place(steps, &steps->taken.tile);
+    int rc = spl_frame_know_tile(job, &tile, &drawn, err);
+    if (!rc)
+        spl_spread_tell(steps->spread, steps->taken.index, &job->whole, &drawn);
+    return rc;
+}
+
+/* Draws a piece of what the spread has left, or of the one that it is at. */
+static int make_piece(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    int rc = find_resident(steps, err);
+    rc = rc ? rc : take_piece(steps, err);
+    if (rc || !steps->pieces.count)
+        return rc;
+    rc = spl_spread_get_images(steps->spread, spl_frame_make_images, steps->frame.images, err);
+    steps->borrowed = steps->wanted.layers;
+    if (rc || (rc = draw_piece(steps, err)))
+        return steps->paused ? SPL_OK : rc;
+    spl_pieces_remove(&steps->pieces);
+    if (!steps->pieces.count)
+        steps->drew_last = spl_spread_done(steps->spread, steps->number, &steps->frame.stats);
+    return SPL_OK;
 }
 
 static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
@@ -295,7 +362,7 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
     if (!steps->prepared && (rc = prepare(steps, err)))
         return rc;
     if (steps->y < steps->view.camera.height) {
-        rc = make_tile(steps, err);
+        rc = steps->spread ? make_piece(steps, err) : make_tile(steps, err);
         if (!rc && steps->y == steps->view.camera.height && steps->around)
             go_round(steps);
         return rc;
@@ -325,6 +392,9 @@ bool spl_frame_is_waiting(struct spl_frame_steps *steps)
 
 uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
 {
+    const uint64_t of_pixel = (uint64_t)(steps->view.supersample * steps->view.supersample);
+    if (steps->spread)
+        return spl_spread_get_left(steps->spread) + (steps->pieces.count ? steps->pieces.pixels * of_pixel : 0);
     const struct spl_camera *camera = &steps->view.camera, *wanted = &steps->wanted.camera;
     uint64_t side = (uint64_t)steps->view.supersample, rows = camera->height - steps->y;
     uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
@@ -343,7 +413,11 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         return;
     struct spl_frame *made = get_made(steps);
     spl_frame_give_images_back(made, steps->borrowed);
-    if (frame && !spl_frame_get_samples_left(steps)) {
+    if (steps->spread) {
+        spl_spread_leave(steps->spread, steps->number, steps->frame.stats.total_ms);
+        if (frame && steps->drew_last)
+            spl_spread_hand_out(steps->spread, frame);
+    } else if (frame && !spl_frame_get_samples_left(steps)) {
         steps->enlarged.stats = steps->frame.stats;
         *frame = *made;
         *made = (struct spl_frame){0};
@@ -372,7 +446,7 @@ int spl_renderer_render_with(struct spl_renderer *renderer, const struct spl_dat
     bool more = true;
     int rc = spl_sized_read(options, &known, sizeof known, "spl_render_options", err);
     if (!rc)
-        rc = begin(renderer, dataset, view, &known, frame, &steps, err);
+        rc = begin(renderer, dataset, view, &known, frame, NULL, 0, &steps, err);
     while (!rc && more) {
         rc = spl_frame_step(steps, steps->wanted.deadline_ns, &more, err);
         if (!rc && more && spl_frame_is_waiting(steps))

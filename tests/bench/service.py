@@ -1,6 +1,6 @@
 """The figures of RESULTS.md about the service under load, one subcommand each, on the scan that measure.py takes.
 
-usage: service.py cached|saturation|overload|throughput|devices|connections|tours [FRAMES]
+usage: service.py cached|saturation|overload|throughput|devices|spread|connections|tours [FRAMES]
 
 Prints what was measured and how it stands to its bound; exit 1 beyond one, 77 without the data. What is bounded is a
 ratio of one run, or processor time: machines are shared and change within minutes. Where two programs are compared
@@ -313,6 +313,51 @@ def devices():
                 bound("time of a view with two devices to that with one", 1 / rate, 1 / 1.6, "times")
 
 
+def busiest_s(pid):
+    """Processor time of each thread of a process that lives."""
+    times = {}
+    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(OSError):
+            fields = (task / "stat").read_text().rsplit(")", 1)[1].split()
+            times[task.name] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return times
+
+
+def spread():
+    """Large views for one client: two devices of a core each against one of a core, view by view in turn. Beside the
+    latency, which others on the machine lengthen, the processor time of the thread that has most of it: of two devices
+    the one that others wait for."""
+    options = ("--cache", "0", "--deadline", "60000")
+    with Service(*options, "--device", "vulkan:0", LP_NUM_THREADS="0") as one, \
+            Service(*options, "--device", "vulkan:0,vulkan:0", LP_NUM_THREADS="0") as two:
+        for width, height in ((3840, 2160), (1920, 1080), (1600, 900), (1280, 800)):
+            paths = [view_query(i / 9).replace("width=1280&height=720", f"width={width}&height={height}")
+                     for i in range(10)]
+            same, rows = True, []
+            for path in paths:
+                get(one.port, path), get(two.port, path)
+                took, bodies = [], []
+                for s in (one, two):
+                    before, began = busiest_s(s.pid), time.monotonic()
+                    status, _, body, _ = get(s.port, path)
+                    if status != 200:
+                        sys.exit(body)
+                    bodies.append(body)
+                    wall, after = time.monotonic() - began, busiest_s(s.pid)
+                    took += [wall, max(after[t] - before.get(t, 0) for t in after)]
+                same &= bodies[0] == bodies[1]
+                rows.append(took)
+            a, b, c, d = (1000 * statistics.median(x) for x in zip(*rows))
+            ratio = statistics.median(row[2] / row[0] for row in rows)
+            busy = statistics.median(row[3] / row[1] for row in rows)
+            print(f"{width}x{height}: {a:.0f} ms with one device, {c:.0f} with two, {ratio:.2f} of it; the busiest thread "
+                  f"{b:.0f} and {d:.0f} ms of processor time, {busy:.2f} of it; bytes {'equal' if same else 'DIFFER'}",
+                  flush=True)
+            if height > 1000:
+                bound(f"processor time of the busiest thread at {width}x{height}, with two devices to one", busy, 0.65,
+                      "times")
+
+
 def tours():
     total = int(sys.argv[2]) if len(sys.argv) > 2 else 300
     path = {"keyframes": [{"camera": camera} for camera in cameras(2)]}
@@ -421,7 +466,7 @@ def connections():
 
 
 if __name__ == "__main__":
-    figures = {f.__name__: f for f in (cached, saturation, overload, throughput, devices, connections, tours)}
+    figures = {f.__name__: f for f in (cached, saturation, overload, throughput, devices, spread, connections, tours)}
     if not 2 <= len(sys.argv) <= (3 if sys.argv[1:2] == ["tours"] else 2) or sys.argv[1] not in figures:
         sys.exit(__doc__)
     CACHE.mkdir(parents=True, exist_ok=True)

@@ -37,6 +37,35 @@ def test_the_bytes_are_those_of_one_device():
         assert sum("rendering on " in line for line in d.lines) == 2
 
 
+# From some 1280x720 samples on: by pieces, of all methods and what looks beyond the borders of one.
+LARGE = [f"?width=1280&height=1000&eye=3,{y},1&target=0,0,1&method={method}&format=png"
+         for y, method in enumerate(("splat", "points", "fill", "nearest"))]
+LARGE += ["?width=2500&height=2000&format=png&shade=edl", "?width=700&height=600&supersample=2&format=png",
+          "?width=1280&height=1000&layers=depth,normal,id,coverage,primitive&container=zip&format=npy",
+          "?width=1280&height=1000&soft=plane:0,0,1,0,0,1%3E0&clip=y%3C2&format=png",
+          "?width=1100&height=1100&projection=orthographic&units_per_pixel=0.005&eye=0,0,9&target=0,0,0&format=png"]
+
+
+def test_a_large_view_of_all_devices_has_the_bytes_of_one():
+    with Daemon(REAL, "--cache", "0") as d:
+        [device] = d.status()["devices"]
+        one = [d.ask(VIEW + view) for view in LARGE]
+    twice = ",".join([f'{device["backend"]}:{device["index"]}'] * 2)
+    with Daemon(REAL, "--cache", "0", "--device", twice) as d:
+        for view, a in zip(LARGE, one):
+            b = d.ask(VIEW + view)
+            assert (a.status, b.status, b.body == a.body, b.headers["ETag"] == a.headers["ETag"]) == (
+                200, 200, True, True), (view, a.status, b.status)
+            told = [name for name in a.headers if name.startswith("Splatd-") and name != "Splatd-Soft-Drawn"]  # by piece
+            assert [b.headers[name] for name in told] == [a.headers[name] for name in told], view
+        assert d.status()["counters"]["frames"] == len(LARGE)
+    with Daemon(REAL, "--cache", "0", "--device", twice, SPLATD_INJECT_LOSS_AFTER="1x1") as d:
+        assert d.ask(fresh(SMALL)).status == 200
+        b = d.ask(VIEW + LARGE[0])
+        assert (b.status, b.body == one[0].body) == (200, True), b.status
+        assert d.status()["counters"]["device_losses"] == 1
+
+
 def test_views_are_drawn_side_by_side():
     with Daemon(FAKE, "--device", "fake:0,fake:1,fake:2", FAKE_FRAME_MS=600) as d:
         began = time.monotonic()

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/memory.h"
 #include "render/fault.h"
+#include "render/spread.h"
 #include "render/turns.h"
 
 struct spl_renderer {
@@ -176,6 +177,10 @@ struct spl_frame_steps {
     uint64_t left;     /* samples */
     uint64_t there_ns; /* when its pages are */
     uint64_t drawn_ns; /* of the tile, before it gave way */
+    struct spl_spread *spread; // may be NULL
+    unsigned number;
+    struct spl_spread_piece taken; /* of it; width 0: none */
+    bool drew_last;
     bool paused;
     spl_frame_gives_way *asked; // may be NULL
     void *context;
@@ -195,6 +200,23 @@ int spl_frame_begin(struct spl_renderer *renderer, const struct spl_dataset *dat
                                       .left = spl_view_get_samples(view),
                                       .there_ns = spl_now_ns() + (uint64_t)setting("FAKE_PAGES_MS", 0) * SPL_NS_PER_MS};
     return 0;
+}
+
+int spl_frame_begin_spread(struct spl_renderer *renderer, const struct spl_dataset *dataset,
+                           const struct spl_view *view, struct spl_spread *spread, unsigned number,
+                           struct spl_frame_steps **out, struct spl_error *err)
+{
+    int rc = spl_frame_begin(renderer, dataset, view, out, err);
+    if (rc)
+        return rc;
+    (*out)->spread = spread;
+    (*out)->number = number;
+    return 0;
+}
+
+bool spl_frame_drew_last(const struct spl_frame_steps *steps)
+{
+    return steps->drew_last;
 }
 
 void spl_frame_set_cancel(struct spl_frame_steps *steps, const struct spl_cancel *cancel)
@@ -220,12 +242,42 @@ static bool gives_way(const struct spl_frame_steps *steps, uint64_t began)
     return walks && steps->asked && steps->asked(steps->context, spl_now_ns() - began, 0);
 }
 
-static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
+static int fill_all(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err)
 {
     for (int layer = 0; layer < SPL_LAYER_COUNT; layer++)
-        if (steps->view.layers >> layer & 1 &&
-            fill(&steps->frame.images[layer], (enum spl_layer)layer, &steps->view, err))
+        if (view->layers >> layer & 1 && !frame->images[layer].pixels &&
+            fill(&frame->images[layer], (enum spl_layer)layer, view, err))
             return SPL_E_NOMEM;
+    return 0;
+}
+
+/* Samples of the tile or piece that is next; 0: there is no piece left. */
+static uint64_t find_next(struct spl_frame_steps *steps)
+{
+    const struct spl_tiling tiling = {.width = steps->view.camera.width, .height = steps->view.camera.height};
+    if (!steps->spread)
+        return steps->left < SPL_TILE_SAMPLES ? steps->left : SPL_TILE_SAMPLES;
+    if (!steps->taken.piece.width)
+        spl_spread_take(steps->spread, steps->number, &tiling, &steps->taken, NULL);
+    double pixels = (double)steps->taken.piece.width * steps->taken.piece.height;
+    return (uint64_t)(pixels * steps->view.supersample * steps->view.supersample);
+}
+
+/* The piece is drawn. */
+static int finish_piece(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    struct spl_frame_stats stats = {.complete = true};
+    struct spl_image images[SPL_LAYER_COUNT];
+    int rc = spl_spread_get_images(steps->spread, fill_all, images, err);
+    steps->taken = (struct spl_spread_piece){0};
+    steps->drew_last = !rc && spl_spread_done(steps->spread, steps->number, &stats);
+    return rc;
+}
+
+static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
+{
+    if (fill_all(&steps->frame, &steps->view, err))
+        return SPL_E_NOMEM;
     steps->frame.stats.soft_ms = soft_ms(&steps->view);
     steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
     steps->frame.stats.pending = !steps->frame.stats.complete;
@@ -238,16 +290,20 @@ bool spl_frame_is_waiting(struct spl_frame_steps *steps)
            (spl_remaining_ns(steps->there_ns) || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
+static int lose(struct spl_renderer *renderer, struct spl_error *err)
+{
+    renderer->lost = true;
+    return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
+}
+
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
     struct spl_renderer *renderer = steps->renderer;
-    uint64_t tile = steps->left < SPL_TILE_SAMPLES ? steps->left : SPL_TILE_SAMPLES;
+    uint64_t tile = find_next(steps);
     double share = (double)tile / (double)spl_view_get_samples(&steps->view);
     *more = false;
-    if (renderer->lose_next || renderer->lost || setting("FAKE_LOSE_FRAME", 0)) {
-        renderer->lost = true;
-        return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
-    }
+    if (renderer->lose_next || renderer->lost || setting("FAKE_LOSE_FRAME", 0))
+        return lose(renderer, err);
     if (spl_frame_is_waiting(steps)) {
         *more = true;
         return spl_remaining_ns(deadline_ns) ? 0 : spl_fail(err, SPL_E_TIMEOUT, "the deadline passed");
@@ -255,6 +311,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     if (!renderer->hung) {
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
+        if (setting("FAKE_LOSE_FRAME", 0))
+            return lose(renderer, err);
     }
     const uint64_t began = spl_now_ns(), whole = (uint64_t)((double)frame_ns(&steps->view) * share);
     const uint64_t until = began + (whole > steps->drawn_ns ? whole - steps->drawn_ns : 0);
@@ -271,20 +329,29 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
             return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
         usleep(500);
     }
-    steps->left -= tile;
     steps->drawn_ns = 0;
+    if (steps->spread) {
+        int rc = tile ? finish_piece(steps, err) : 0;
+        *more = !rc && spl_spread_get_left(steps->spread);
+        return rc;
+    }
+    steps->left -= tile;
     *more = steps->left;
     return *more ? 0 : make_images(steps, err);
 }
 
 uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
 {
-    return steps->left;
+    return steps->spread ? spl_spread_get_left(steps->spread) : steps->left;
 }
 
 void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
 {
-    if (frame) {
+    if (steps && steps->spread)
+        spl_spread_leave(steps->spread, steps->number, 0);
+    if (frame && steps->drew_last) {
+        spl_spread_hand_out(steps->spread, frame);
+    } else if (frame) {
         *frame = steps->frame;
         steps->frame = (struct spl_frame){0};
     }

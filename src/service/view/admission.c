@@ -85,8 +85,9 @@ static void sweep(struct spl_pipeline *pipeline, struct spl_queue *queue)
 int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err)
 {
     job->large = spl_request_is_large(&job->request);
-    job->samples = job->samples_left = get_samples(&job->request);
-    job->bytes = spl_view_get_frame_bytes(&job->request.view);
+    const unsigned of = job->whole ? job->whole->of : 1; // that share what it counts for
+    job->samples = job->samples_left = (get_samples(&job->request) + of - 1) / of;
+    job->bytes = (spl_view_get_frame_bytes(&job->request.view) + of - 1) / of;
     struct spl_load *load = get_load(pipeline, job);
     struct spl_queue *queue = job->behind ? pipeline->behind : job->large ? pipeline->large : pipeline->render;
     bool full = spl_queue_get_length(queue) == spl_queue_get_capacity(queue);

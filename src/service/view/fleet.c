@@ -10,6 +10,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/view/device_list.h"
+#include "service/view/parts.h"
 
 struct spl_fleet {
     struct spl_device_list devices;
@@ -196,6 +197,12 @@ static size_t find_home(const struct spl_fleet *fleet, const struct spl_job *job
     return job->entry->home + (piece < (double)fleet->count ? (size_t)piece : fleet->count - 1);
 }
 
+static bool can_draw(struct spl_fleet *fleet, const struct spl_job *job, size_t device)
+{
+    return spl_pipeline_get_state(fleet->pipelines[device]) == SPL_PIPELINE_READY &&
+           (!job->entry || job->entry->replicas[device].there);
+}
+
 /* Where a job goes, of those that were not `tried`; NULL: none can draw it. */
 static struct spl_pipeline *choose(struct spl_fleet *fleet, const struct spl_job *job, uint32_t tried)
 {
@@ -206,8 +213,7 @@ static struct spl_pipeline *choose(struct spl_fleet *fleet, const struct spl_job
         size_t device = (i + home) % fleet->count;
         struct spl_pipeline *pipeline = fleet->pipelines[device];
         struct spl_pipeline_status status;
-        if (tried >> device & 1 || spl_pipeline_get_state(pipeline) != SPL_PIPELINE_READY ||
-            (job->entry && !job->entry->replicas[device].there))
+        if (tried >> device & 1 || !can_draw(fleet, job, device))
             continue;
         spl_pipeline_get_status(pipeline, &status);
         uint64_t work = job->behind ? status.behind_length : status.samples_inside;
@@ -219,6 +225,27 @@ static struct spl_pipeline *choose(struct spl_fleet *fleet, const struct spl_job
     return best;
 }
 
+/* Gives a large view to all devices that have nothing to do, where there are several. Each has the same stretch of the
+ * image whatever others do, so that it comes back to the same pages. */
+static bool submit_parts(struct spl_fleet *fleet, struct spl_job *job)
+{
+    struct spl_pipeline *idle[SPL_DEVICES_MAX];
+    struct spl_pipeline_status status;
+    unsigned count = 0;
+    for (size_t i = 0; i < fleet->count; i++) {
+        spl_pipeline_get_status(fleet->pipelines[i], &status);
+        if (!status.samples_inside && can_draw(fleet, job, i))
+            idle[count++] = fleet->pipelines[i];
+    }
+    if (count < 2 || spl_parts_begin(job, count, NULL))
+        return false;
+    for (unsigned i = 0; i < count; i++)
+        spl_parts_submit(job, i, idle[i], NULL); // the others draw what one has no room for
+    if (!job->away)
+        spl_parts_undo(job);
+    return job->away;
+}
+
 int spl_fleet_submit(struct spl_fleet *fleet, struct spl_job *job, struct spl_error *err)
 {
     struct spl_pipeline *pipeline;
@@ -227,6 +254,8 @@ int spl_fleet_submit(struct spl_fleet *fleet, struct spl_job *job, struct spl_er
     int rc = SPL_E_BUSY;
     if (fleet->count == 1) // its own words for whatever state it is in
         return spl_pipeline_submit(fleet->pipelines[0], job, err);
+    if (spl_parts_can(job) && submit_parts(fleet, job))
+        return SPL_OK;
     spl_fail(&why, rc, "no device is ready; come back later");
     while ((pipeline = choose(fleet, job, tried))) {
         why = (struct spl_error){0};
@@ -238,13 +267,32 @@ int spl_fleet_submit(struct spl_fleet *fleet, struct spl_job *job, struct spl_er
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
+/* A part has come back: the whole that comes with it, or NULL. What a lost device has left another draws, once: a view
+ * that costs every device shall not go round. */
+static struct spl_job *take_part(struct spl_fleet *fleet, struct spl_job *part, size_t device)
+{
+    struct spl_job *whole;
+    unsigned number;
+    enum spl_parts_state state = spl_parts_take(part, &whole, &number);
+    whole->lost |= part->err.code == SPL_E_DEVICE_LOST ? 1u << device : 0;
+    if (state == SPL_PARTS_LEFT) {
+        struct spl_pipeline *pipeline = whole->again ? NULL : choose(fleet, whole, whole->lost);
+        whole->again = true;
+        if (pipeline && !spl_parts_submit(whole, number, pipeline, NULL))
+            state = SPL_PARTS_INSIDE;
+        else
+            spl_parts_give_back(whole);
+    }
+    spl_job_destroy(part);
+    return state == SPL_PARTS_INSIDE ? NULL : whole;
+}
+
 struct spl_job *spl_fleet_take(struct spl_fleet *fleet)
 {
-    for (size_t i = 0; i < fleet->count; i++) {
-        struct spl_job *job = spl_pipeline_take(fleet->pipelines[i]);
-        if (job)
-            return job;
-    }
+    for (size_t i = 0; i < fleet->count; i++)
+        for (struct spl_job *job; (job = spl_pipeline_take(fleet->pipelines[i]));)
+            if (!job->whole || (job = take_part(fleet, job, i)))
+                return job;
     return NULL;
 }
 

@@ -1,9 +1,10 @@
 /* The devices that serve: a pipeline each, side by side, and in front of them one of everything that the loop asks.
  *
  * A view goes to the device that has the least to do, and of those alike to the home of its dataset and place, so that
- * devices hold different pages and have room for more of them together. They are of one kind, so the bytes are those of
- * any of them. A dataset is resident on each that has room for it; a device that is lost, or gone for good, leaves the
- * others serving. All calls are the loop thread's unless they say otherwise, and none of them blocks but destroy(). */
+ * devices hold different pages and have room for more of them together. A large one is drawn by all that have nothing
+ * to do (parts.h). They are of one kind, so the bytes are those of any of them. A dataset is resident on each that has
+ * room for it; a device that is lost, or gone for good, leaves the others serving. All calls are the loop thread's
+ * unless they say otherwise, and none of them blocks but destroy(). */
 #ifndef SPL_SERVICE_FLEET_H
 #define SPL_SERVICE_FLEET_H
 

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "render/spread.h"
 #include "render/turns.h"
 #include "service/view/gpu.h"
 
@@ -83,9 +84,12 @@ static int begin(struct gpu *gpu, struct spl_job *job)
     if (replica && replica->aside)
         return spl_fail(&job->err, replica->err.code, "%s", replica->err.message);
     spl_gpu_inject(gpu);
-    int rc = spl_frame_begin(gpu->renderer, job->dataset, &job->request.view, &job->steps, &job->err);
+    const struct spl_view *view = &job->request.view;
+    int rc = job->whole ? spl_frame_begin_spread(gpu->renderer, job->dataset, view, job->whole->spread, job->number,
+                                                 &job->steps, &job->err)
+                        : spl_frame_begin(gpu->renderer, job->dataset, view, &job->steps, &job->err);
     if (!rc) {
-        spl_frame_set_cancel(job->steps, &job->dropped);
+        spl_frame_set_cancel(job->steps, &spl_job_get_whole(job)->dropped);
         spl_frame_set_gives_way(job->steps, gives_way, gpu);
     }
     return rc;
@@ -105,17 +109,20 @@ static void follow(_Atomic uint64_t *mean, uint64_t took)
     atomic_store(mean, old ? (7 * old + took) / 8 : took);
 }
 
-/* After the last tile. */
+/* After the last tile, or what there was of it for a part: the frame is that of who drew the last piece. */
 static void complete(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
+    job->drew_last = job->whole && spl_frame_drew_last(job->steps);
     spl_frame_end(job->steps, &job->frame);
     job->steps = NULL;
-    gpu->frames++;
-    atomic_store(&pipeline->frames, gpu->frames);
-    spl_count(pipeline->options.counters, frames);
-    follow(&pipeline->frame_ns, job->frame_ns);
-    if (job->frame.stats.pages_loaded)
+    if (!job->whole || job->drew_last) {
+        gpu->frames++;
+        atomic_store(&pipeline->frames, gpu->frames);
+        spl_count(pipeline->options.counters, frames);
+        follow(&pipeline->frame_ns, job->frame_ns);
+    }
+    if (job->whole || job->frame.stats.pages_loaded)
         spl_gpu_publish_residency(gpu);
     else
         atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
@@ -154,9 +161,10 @@ static void put_aside(struct gpu *gpu, struct spl_job *job)
 }
 
 /* Who stands behind others has no deadline, but does not take longer for a piece than a view may. */
-static uint64_t get_turn_end(const struct gpu *gpu, const struct spl_job *job)
+static uint64_t get_turn_end(const struct gpu *gpu, struct spl_job *job)
 {
-    const uint64_t given = gpu->pipeline->options.turn_ns, now = spl_now_ns(), deadline = job->deadline_ns;
+    const uint64_t given = gpu->pipeline->options.turn_ns, now = spl_now_ns();
+    const uint64_t deadline = spl_job_get_whole(job)->deadline_ns;
     const uint64_t longest = given ? given : behind_turn_ns;
     uint64_t end = now + (job->piece_ns < longest ? longest - job->piece_ns : 0);
     return job->behind && end < deadline ? end : deadline;
@@ -211,7 +219,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     }
     complete(gpu, job);
     detach(gpu, job);
-    if (spl_pipeline_pass_on(pipeline, job))
+    if ((job->whole && !job->drew_last) || spl_pipeline_pass_on(pipeline, job))
         spl_pipeline_finish_job(pipeline, job);
     return true;
 }
@@ -250,8 +258,9 @@ static uint64_t look_after_all(struct gpu *gpu)
         look_after(job);
         if (job->waits && until > soon)
             until = soon;
-        if (job->waits && until > job->deadline_ns)
-            until = job->deadline_ns;
+        const uint64_t deadline = spl_job_get_whole(job)->deadline_ns;
+        if (job->waits && until > deadline)
+            until = deadline;
     }
     if (gpu->behind)
         look_after(gpu->behind);

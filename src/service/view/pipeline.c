@@ -11,26 +11,37 @@
 #include "base/memory.h"
 #include "dataset/dataset.h"
 #include "geom/ray_list.h"
+#include "render/spread.h"
 #include "service/view/stages.h"
 
 void spl_job_destroy(struct spl_job *job)
 {
     if (!job)
         return;
+    if (job->parts) {
+        job->given_up = true;
+        spl_cancel_set(&job->dropped);
+        return;
+    }
+    struct spl_job *whole = job->whole;
+    spl_spread_destroy(job->spread);
     spl_frame_finish(&job->frame);
     spl_encoded_finish(&job->encoded);
     spl_catalog_entry_unref(job->entry);
     spl_rays_destroy((struct spl_rays *)job->request.view.rays);
     free(job);
+    if (whole && !--whole->parts && (whole->given_up || whole->away))
+        spl_job_destroy(whole);
 }
 
 bool spl_job_is_over(struct spl_job *job)
 {
-    if (spl_cancel_is_set(&job->dropped))
+    struct spl_job *whole = spl_job_get_whole(job);
+    if (spl_cancel_is_set(&whole->dropped))
         spl_fail(&job->err, SPL_E_CANCELLED, "the client has left");
-    else if (!spl_remaining_ns(job->deadline_ns))
+    else if (!spl_remaining_ns(whole->deadline_ns))
         spl_fail(&job->err, SPL_E_TIMEOUT, "the deadline of %.0f ms passed before the view was ready",
-                 (double)(job->deadline_ns - job->accepted_ns) / SPL_NS_PER_MS);
+                 (double)(whole->deadline_ns - job->accepted_ns) / SPL_NS_PER_MS);
     return job->err.code != SPL_OK;
 }
 
@@ -51,7 +62,7 @@ int spl_pipeline_pass_on(struct spl_pipeline *pipeline, struct spl_job *job)
     if (job->request.picks && job->dataset && spl_dataset_is_remote(job->dataset))
         return spl_far_picks_take(pipeline, job);
     if (!spl_pipeline_image_is_large(&job->request.view))
-        return spl_queue_push(pipeline->encode, job, job->deadline_ns, &job->err);
+        return spl_queue_push(pipeline->encode, job, spl_job_get_whole(job)->deadline_ns, &job->err);
     bool room = spl_queue_try_push(pipeline->encode_large, job);
     spl_assert(room); // for all jobs that can be inside; it is closed after the gpu thread has gone
     return 0;

@@ -8,7 +8,8 @@
  *
  * A job belongs to whoever holds its pointer: the caller until submit() succeeds, the pipeline until take() gives it
  * back, always with either `encoded` filled or `err` set. Versions of datasets come and go beside them: add() and
- * drop() send their replicas to the gpu thread, take_change() brings them back. Several are a fleet (fleet.h). */
+ * drop() send their replicas to the gpu thread, take_change() brings them back. Several are a fleet (fleet.h),
+ * which may have several draw one view (parts.h). */
 #ifndef SPL_SERVICE_PIPELINE_H
 #define SPL_SERVICE_PIPELINE_H
 
@@ -34,6 +35,17 @@ struct spl_job {
     size_t frame_number;               /* of it */
     void *owner;                       // owned by: loop
     void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
+
+    /* Of a frame that several devices draw, see parts.h. */
+    struct spl_job *whole;     // of a part, which holds it; NULL: it is none
+    unsigned number;           /* of a part, below of */
+    bool drew_last;            /* a part that has the whole's frame, or bytes of it */
+    struct spl_spread *spread; // of a whole
+    unsigned of, parts;        /* of a whole: how many draw it; parts that there are. Owned by the loop, as the next */
+    unsigned inside;           /* parts in pipelines */
+    bool away, given_up;       /* it is with its parts; it was destroyed, and goes with them */
+    uint32_t lost;             /* bit per device that a part of it was lost with */
+    bool again;                /* a part was made anew */
 
     TAILQ_ENTRY(spl_job) turn; // owned by: gpu, as the next three; while it waits for one
     bool in_turns;
@@ -61,8 +73,14 @@ struct spl_job {
     struct spl_error err;
 };
 
-/* Releases everything and the job itself; NULL-safe. */
+/* Releases everything and the job itself, of a whole once its last part is destroyed; NULL-safe. The loop's thread. */
 void spl_job_destroy(struct spl_job *job);
+
+/* Who says whether it is dropped, and how long it has: the job, or what it is part of. */
+static inline struct spl_job *spl_job_get_whole(struct spl_job *job)
+{
+    return job->whole ? job->whole : job;
+}
 
 struct spl_pipeline_options {
     unsigned number; /* of the device, below SPL_DEVICES_MAX: which replica of an entry is its own */
