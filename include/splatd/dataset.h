@@ -170,7 +170,7 @@ struct spl_open_options {
     const struct spl_cancel *cancel; // may be NULL; borrowed until close (from a server: until reads have ended, too):
                                      // ends whatever takes long with the dataset
     const struct spl_reader *reader; // NULL = the file at `path`; the struct itself is read while opening only
-    uint64_t tables_bytes;           /* what tables may take; 0 = 64 MiB */
+    uint64_t tables_bytes;           /* what tables may take; 0 = 256 MiB */
 };
 
 static inline void spl_open_options_init(struct spl_open_options *options)

@@ -43,7 +43,7 @@ enum spl_file_kind {
 
 struct spl_dataset_opening {
     bool verify;                  /* as of spl_dataset_open() */
-    uint64_t tables_bytes;        /* all tables stay where they take no more; spl_dataset_open(): SPL_TABLES_BYTES */
+    uint64_t tables_bytes;        /* UINT64_MAX: all are read at first and stay; spl_dataset_open(): SPL_TABLES_BYTES */
     const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
     struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
     uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */

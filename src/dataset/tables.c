@@ -302,9 +302,12 @@ int spl_dataset_check_heads(struct spl_dataset *dataset, struct spl_error *err)
         return collection ? spl_fail(err, SPL_E_CORRUPT, "%s is a collection itself", dataset->name) : SPL_OK;
     }
     if (collection && spl_dataset_get_all_tables_bytes(dataset) > coarse_bytes_max)
-        return spl_fail(err, SPL_E_LIMIT, "%s: it is a collection, of whose coarse levels the tables take more than %d "
-                        "MiB", dataset->name, (int)(coarse_bytes_max >> 20));
-    bool whole = collection || spl_dataset_get_all_tables_bytes(dataset) <= dataset->tables_limit;
+        return spl_fail(err, SPL_E_LIMIT,
+                        "%s: it is a collection, of whose coarse levels the tables take more than %d "
+                        "MiB",
+                        dataset->name, (int)(coarse_bytes_max >> 20));
+    const uint64_t limit = dataset->tables_limit, most = limit < UINT64_MAX ? SPL_TABLES_WHOLE : limit;
+    bool whole = collection || spl_dataset_get_all_tables_bytes(dataset) <= (limit < most ? limit : most);
     int rc = whole ? allocate_whole(dataset, err) : keep_first(dataset, err);
     if (whole && dataset->info.pages)
         spl_dataset_expect(dataset, dataset->found[SPL_KIND_HEADS].at[0],

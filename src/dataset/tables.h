@@ -13,8 +13,10 @@
 #include "dataset/map.h"
 #include "dataset/streams.h"
 
-/* What the tables of a dataset may take before they are read by page: 10^8 splats and more. */
-#define SPL_TABLES_BYTES (64ull << 20)
+/* What the tables of a dataset may take: those of all pages that a view of a dense place needs. Up to the other one,
+ * 10^8 splats, all are read at first; larger ones are read by page. */
+#define SPL_TABLES_BYTES (256ull << 20)
+#define SPL_TABLES_WHOLE (64ull << 20)
 
 struct spl_tables { /* written by who reads them, and by nobody afterwards */
     uint32_t page, node_count, chunk_count, stream_count;

@@ -193,6 +193,22 @@ def test_a_long_frame_is_no_hang():
         assert d.ops("/healthz").status == 200
 
 
+def test_a_process_that_was_not_run_did_not_hang():
+    """As with its machine or container, for longer than all limits together, in the middle of a frame."""
+    with Daemon(FAKE, "--stall", "1000", "--deadline", "1000", FAKE_FRAME_MS=800) as d:
+        work = threading.Thread(target=d.ask, args=(SMALL,))
+        work.start()
+        time.sleep(0.3)
+        d.process.send_signal(signal.SIGSTOP)
+        time.sleep(6)
+        d.process.send_signal(signal.SIGCONT)
+        for _ in range(10):
+            assert d.ops("/healthz").status == 200
+            time.sleep(0.1)
+        work.join()
+        assert d.ask(fresh(SMALL)).status == 200
+
+
 def test_a_full_main_listener_does_not_keep_probes_out():
     with Daemon(FAKE, "--connections", "50") as d:
         crowd = []

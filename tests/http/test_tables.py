@@ -20,7 +20,7 @@ def view(*arguments):
 
 def test_bytes_are_the_same_while_tables_come_by_page():
     whole, _, pick, limit = view()
-    assert whole.headers["Splatd-Complete"] == "true" and limit == 64 << 20
+    assert whole.headers["Splatd-Complete"] == "true" and limit == 256 << 20
     part, _, pick_again, limit = view("--tables", "120000")
     assert limit == 120000
     assert part.headers["Splatd-Complete"] == "true" and part.body == whole.body

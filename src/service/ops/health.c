@@ -2,8 +2,9 @@
  *
  * A frame that does not end is normally found by the renderer's own deadlines, which reopen the device. What is left is
  * a thread that hangs inside a driver: it can be neither woken nor stopped, so /healthz fails once nothing has moved
- * for deadline + stall, and when another stall has passed the process ends and leaves the rest to its supervisor. Owned
- * by the loop's thread. */
+ * for deadline + stall, and when another stall has passed the process ends and leaves the rest to its supervisor. What
+ * the whole process was not run for, as with its machine or container, is held against nobody. Owned by the loop's
+ * thread. */
 #include "service/ops/health.h"
 
 #include <stdio.h>
@@ -18,12 +19,16 @@
 #include "service/state.h"
 #include "service/view/views.h"
 
-enum { look_ms = 500 };
+enum { look_ms = 500, asleep_ms = 2000 /* between two looks: it was not run */ };
 
 static uint64_t get_still_ms(const struct spl_service *service)
 {
     struct spl_fleet *fleet = service->views->fleet;
-    return fleet ? spl_fleet_get_still_ns(fleet) / SPL_NS_PER_MS : 0;
+    const uint64_t now_ns = spl_now_ns(), awake_ns = now_ns - service->ops->woke_ns;
+    if (!fleet || now_ns - service->ops->looked_ns > asleep_ms * SPL_NS_PER_MS)
+        return 0;
+    const uint64_t still_ns = spl_fleet_get_still_ns(fleet);
+    return (still_ns < awake_ns ? still_ns : awake_ns) / SPL_NS_PER_MS;
 }
 
 bool spl_health_is_alive(struct spl_service *service, char why[SPL_HEALTH_TEXT])
@@ -82,6 +87,10 @@ static void on_look(uv_timer_t *timer)
     struct spl_service *service = timer->data;
     const struct spl_service_options *options = service->options;
     char why[SPL_HEALTH_TEXT];
+    const uint64_t now_ns = spl_now_ns();
+    if (now_ns - service->ops->looked_ns > asleep_ms * SPL_NS_PER_MS)
+        service->ops->woke_ns = now_ns;
+    service->ops->looked_ns = now_ns;
     say_status(service);
     if (spl_health_is_alive(service, why))
         spl_supervisor_say_alive();
@@ -99,5 +108,6 @@ void spl_health_watch(struct spl_service *service)
 {
     uint64_t watchdog_ms = spl_supervisor_get_watchdog_ms();
     uint64_t every_ms = watchdog_ms && watchdog_ms / 3 < look_ms ? watchdog_ms / 3 + 1 : look_ms;
+    service->ops->looked_ns = service->ops->woke_ns = spl_now_ns();
     uv_timer_start(&service->ops->look_timer, on_look, every_ms, every_ms);
 }

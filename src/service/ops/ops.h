@@ -24,6 +24,7 @@ struct spl_ops {
     uint64_t started_ns;
     double started_unix_s;              /* the same by the clock on the wall, read once */
     uv_timer_t look_timer;              /* health.c */
+    uint64_t looked_ns, woke_ns;        /* health.c */
     enum spl_pipeline_state said_state; /* to the supervisor; health.c */
 
     int listen_fd;             /* passed by the supervisor; -1 = none, or once MHD has it */
