@@ -156,8 +156,9 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
  * that is what is meant; without the number it may be, and nobody can tell. */
 static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fields)
 {
-    static const char *const numbers[] = {"nr",      "ptnr",        "pktnr",    "pkt",    "punkt",    "pnr",
-                                          "punktnr", "punktnummer", "punkt-nr", "pkt-nr", "punktname"};
+    static const char *const numbers[] = {"nr",        "ptnr",    "pktnr",       "pkt",      "punkt",
+                                          "pnr",       "punktnr", "punktnummer", "punkt-nr", "pkt-nr",
+                                          "punktname", "pkt.nr",  "pkt.-nr"};
     static const char *const heights[] = {"h", "hoehe", "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he", "h\xd6he"};
     const char *name;
     size_t length;
@@ -166,8 +167,9 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
         length = without_unit(name, length);
         numbered |= !stage && IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && IS_ONE_OF(heights, name, length) && layout->column[i] == SPL_COLUMN_Z;
+        bool either = stage == 2 && numbered && is(name, length, "z"); /* a German number, no German height */
         stage = stage == 1 && is(name, length, "x") ? 2 : is(name, length, "y") ? 1 : 0;
-        layout->doubtful |= height && !numbered;
+        layout->doubtful |= either || (height && !numbered);
         if (height && numbered) {
             layout->surveyors = true;
             layout->column[i - 2] = SPL_COLUMN_X;

@@ -264,8 +264,11 @@ static void many_headings_are_cut(void **state)
 static void surveyors_y_is_the_east(void **state)
 {
     static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n", "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
-                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n"};
-    static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n"};
+                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n",
+
+                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n"};
+    static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n",
+                                           "PtNr Y X Z\nP1 1 2 3\n"};
     struct loaded l;
     (void)state;
     for (size_t i = 0; i < sizeof meant / sizeof *meant; i++) {
@@ -276,7 +279,7 @@ static void surveyors_y_is_the_east(void **state)
     }
     for (size_t i = 0; i < sizeof doubtful / sizeof *doubtful; i++)
         refused_text(doubtful[i], SPL_E_INPUT, "x", "may be a surveyor's, with Y as the east, or not");
-    load_text("PtNr Y X Z\nP1 1 2 3\n", NULL, &l); /* no German height: as it says */
+    load_text("id Y X Z\nP1 1 2 3\n", NULL, &l); /* as it says */
     assert_point(&l, 0, 2, 1, 3);
     assert_false(l.surveyors);
     loaded_finish(&l);
