@@ -8,6 +8,8 @@
 #include "base/parallel.h"
 #include "image/rows.h"
 
+enum { strip = 256 }; /* columns, whose places are those of all rows */
+
 struct job {
     const struct spl_image *small;
     struct spl_image *large;
@@ -45,19 +47,19 @@ static struct taps place_taps(const struct axis *x, const struct axis *y, uint32
     };
 }
 
+typedef float four __attribute__((vector_size(16)));
+
 static void color(const uint8_t *from, const struct taps *t, uint8_t *to)
 {
-    float sum[3] = {0}, alpha = 0;
+    four sum = {0}; /* r g b alpha */
     for (int i = 0; i < 4; i++) {
         const uint8_t *p = from + 4 * t->at[i];
-        float weight = t->weight[i] * p[3];
-        for (int c = 0; c < 3; c++)
-            sum[c] += weight * p[c];
-        alpha += weight;
+        sum += t->weight[i] * p[3] * (four){p[0], p[1], p[2], 1};
     }
+    const four mean = sum / sum[3] + 0.5f;
     for (int c = 0; c < 3; c++)
-        to[c] = alpha > 0 ? (uint8_t)(sum[c] / alpha + 0.5f) : 0;
-    to[3] = (uint8_t)(alpha + 0.5f);
+        to[c] = sum[3] > 0 ? (uint8_t)mean[c] : 0;
+    to[3] = (uint8_t)(sum[3] + 0.5f);
 }
 
 static float distance(const float *from, const struct taps *t, float tolerance)
@@ -122,13 +124,18 @@ static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worke
     (void)worker;
     const struct job *j = context;
     const size_t pixel_bytes = spl_pixel_bytes(j->large->type);
-    for (size_t y = j->first + begin; y < j->first + end; y++) {
-        struct axis row = place(((double)y + 0.5) * j->scale, j->small->height);
-        char *to = spl_image_row(j->large, y);
-        for (uint32_t x = 0; x < j->large->width; x++, to += pixel_bytes) {
-            struct axis column = place((x + 0.5) * j->scale, j->small->width);
-            struct taps t = place_taps(&column, &row, j->small->width);
-            sample(j->small, &t, 0.01f / (float)j->scale, to);
+    struct axis columns[strip];
+    for (uint32_t first = 0; first < j->large->width; first += strip) {
+        const uint32_t count = j->large->width - first < strip ? j->large->width - first : strip;
+        for (uint32_t x = 0; x < count; x++)
+            columns[x] = place((first + x + 0.5) * j->scale, j->small->width);
+        for (size_t y = j->first + begin; y < j->first + end; y++) {
+            struct axis row = place(((double)y + 0.5) * j->scale, j->small->height);
+            char *to = (char *)spl_image_row(j->large, y) + first * pixel_bytes;
+            for (uint32_t x = 0; x < count; x++, to += pixel_bytes) {
+                struct taps t = place_taps(&columns[x], &row, j->small->width);
+                sample(j->small, &t, 0.01f / (float)j->scale, to);
+            }
         }
     }
 }
