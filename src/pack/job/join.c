@@ -38,7 +38,9 @@ static void add_missing(struct missing *m, uint32_t number)
     m->first = m->last = number;
 }
 
-static int check_dataset(const struct spl_job *job, uint32_t number, const char *path, struct spl_error *err)
+/* *points grows by those of the part, as they were read. */
+static int check_dataset(const struct spl_job *job, uint32_t number, const char *path, uint64_t *points,
+                         struct spl_error *err)
 {
     const struct spl_dataset_opening how = {.tables_bytes = 1};
     struct spl_dataset *dataset = NULL;
@@ -46,6 +48,7 @@ static int check_dataset(const struct spl_job *job, uint32_t number, const char 
     int rc = spl_dataset_open_as(path, &how, &dataset, err);
     if (!rc)
         rc = spl_part_recognise(job, number, spl_dataset_get_meta(dataset), path, &older, err);
+    *points += rc ? 0 : spl_dataset_get_info(dataset)->points;
     spl_dataset_close(dataset);
     return rc;
 }
@@ -60,10 +63,25 @@ static bool is_marked(const struct spl_job *job, uint32_t number)
     return is;
 }
 
+/* Each point is in one part. A scan that changed in its middle, where no part looks for it, moved some. */
+static int check_points(const struct spl_job *job, uint64_t points, struct spl_error *err)
+{
+    uint64_t planned = 0;
+    for (size_t i = 0; i < job->input_count; i++)
+        planned += job->inputs[i].points;
+    return points == planned
+               ? SPL_OK
+               : spl_fail_field(err, SPL_E_INPUT, "part",
+                                "%.300s: its parts have %llu points and the plan %llu: a scan has changed "
+                                "since; make the plan and all parts anew",
+                                job->folder, (unsigned long long)points, (unsigned long long)planned);
+}
+
 /* Fills `paths` with those of parts that have points. */
 static int find_parts(const struct spl_job *job, char **paths, size_t *count, struct spl_error *err)
 {
     struct missing missing = {0};
+    uint64_t points = 0;
     int rc = SPL_OK;
     for (uint32_t k = 0; !rc && k < job->part_count; k++) {
         char *path = spl_job_part_path(job, k, false);
@@ -71,7 +89,7 @@ static int find_parts(const struct spl_job *job, char **paths, size_t *count, st
             return spl_fail(err, SPL_E_NOMEM, "out of memory for the names of parts");
         if (!access(path, F_OK)) {
             paths[(*count)++] = path;
-            rc = check_dataset(job, k, path, err);
+            rc = check_dataset(job, k, path, &points, err);
             continue;
         }
         free(path);
@@ -79,7 +97,7 @@ static int find_parts(const struct spl_job *job, char **paths, size_t *count, st
             add_missing(&missing, k);
     }
     if (rc || !missing.count)
-        return rc;
+        return rc ? rc : check_points(job, points, err);
     add_run(&missing);
     return spl_fail_field(
         err, SPL_E_NOT_FOUND, "part",

@@ -274,6 +274,33 @@ static void refuse_join(const char *folder, int rc, const char *says)
         fail_msg("%s", err.message);
 }
 
+/* A scan whose middle changes between two parts: its size and ends say nothing, the points that are missing do. */
+static void test_a_join_knows_how_many_points_there_are(void **state)
+{
+    static const char before[] = "\n50003", after[] = "\n50001";
+    char bytes[64 << 10];
+    (void)state;
+    plan_well("middle", &(struct spl_pack_options){0}, 2);
+    pack_well("middle", 0, 1, SPL_PART_MADE);
+    FILE *f = fopen(in_folder("scan-1.ply"), "r+b");
+    assert_true(f && !fseek(f, 200 << 10, SEEK_SET));
+    const size_t count = fread(bytes, 1, sizeof bytes - 1, f);
+    bytes[count] = '\0';
+    assert_non_null(strstr(bytes, before));
+    for (char *at = bytes; (at = strstr(at, before)); at++)
+        memcpy(at, after, sizeof after - 1);
+    assert_int_equal(fseek(f, 200 << 10, SEEK_SET), 0);
+    assert_true(fwrite(bytes, 1, count, f) == count && !fclose(f));
+    pack_well("middle", 1, 1, SPL_PART_MADE);
+    refuse_join("middle", SPL_E_INPUT, "points and the plan 36000: a scan has changed since");
+    write_scan(1);
+    unlink(in_job("middle", "part-1.spld"));
+    pack_well("middle", 1, 1, SPL_PART_MADE);
+    struct spl_error err = {0};
+    if (join("middle", &err))
+        fail_msg("%s", err.message);
+}
+
 static void test_inputs_that_vanish_or_change_are_named(void **state)
 {
     (void)state;
@@ -593,6 +620,7 @@ int main(void)
         cmocka_unit_test(test_inputs_that_vanish_or_change_are_named),
         cmocka_unit_test(test_joining_names_what_is_missing_or_foreign),
         cmocka_unit_test(test_parts_without_points_leave_a_mark),
+        cmocka_unit_test(test_a_join_knows_how_many_points_there_are),
         cmocka_unit_test(test_all_parts_know_all_stations),
         cmocka_unit_test(test_what_cannot_be_split_is_refused),
         cmocka_unit_test(test_nothing_is_left_of_what_fails),
