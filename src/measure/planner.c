@@ -268,9 +268,7 @@ static bool better(const struct spl_demand *demand, const struct spl_candidate *
         return x->accurate;
     if (!isnan(demand->psnr) && x->accurate) // both: the cheaper
         return x->ms < y->ms;
-    double gain = isnan(demand->psnr) ? rank(a->psnr) - rank(b->psnr) : rank(a->bound) - rank(b->bound);
-    if (isnan(gain) || gain == 0) // two of unknown accuracy, or two equals
-        gain = rank(a->psnr) - rank(b->psnr);
+    double gain = rank(a->psnr) - rank(b->psnr); // what they do, not what they promise; NAN: both unknown
     return isnan(gain) || gain == 0 ? x->ms < y->ms : gain > 0;
 }
 

@@ -65,8 +65,8 @@ void spl_planner_finish(struct spl_planner *planner);
 
 /* budget alone: the most accurate setting whose 97 % quantile stays below 1.2 times the budget and whose expected time
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
- * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the one of the
- * highest bound (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
+ * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the most
+ * accurate (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:
  * what is learned may bring them to the front; one that needs more samples than samples_max is none. SPL_E_INPUT names
  * the kept parameter that no setting has. Atoms that nobody measured are kept: they are drawn in place of the next
  * more, or the most, that were measured, whose time they are taken to need, and nothing is promised of their accuracy;

@@ -105,6 +105,8 @@ static void test_psnr_takes_the_cheapest_that_reaches_it(void **state)
     expect(&planner, demand(NAN, 25.5), 1, true);
     expect(&planner, demand(NAN, 26.5), 2, true);
     expect(&planner, demand(NAN, 32), 3, false);
+    planner.candidates[3].bound = 20; // nobody promises 32 dB: the most accurate, not what promises most
+    expect(&planner, demand(NAN, 32), 3, false);
     struct spl_choice choice;
     struct spl_demand wanted = demand(NAN, 25.5);
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
