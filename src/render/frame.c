@@ -404,7 +404,7 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
     struct spl_frame_stats *stats = &job->frame->stats;
     uint64_t clock;
     if (spl_now_ns() >= job->view->deadline_ns)
-        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+        return spl_fail(err, SPL_E_TIMEOUT, SPL_FRAME_LATE);
     int rc = list_tile(job, tile, err);
     if (!rc)
         rc = spl_frame_make_images(job->frame, job->view, err);

@@ -56,6 +56,11 @@ int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, stru
 int spl_frame_know_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_frame_stats *drawn,
                         struct spl_error *err);
 
+/* What a view is told whose deadline has passed while it was drawn. */
+#define SPL_FRAME_LATE                                                                                                 \
+    "the deadline passed before the frame was rendered: a smaller view, less supersample, a larger lod or a budget "   \
+    "take less"
+
 /* Milliseconds since *from, which becomes now. */
 static inline double spl_since_ms(uint64_t *from)
 {

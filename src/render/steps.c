@@ -354,8 +354,8 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
     if (!rc)
         rc = spl_hold_poll(&steps->job.hold, err);
     if (rc >= 0 && clock >= deadline_ns)
-        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered%s",
-                        rc ? ": its pages had not come" : "");
+        return spl_fail(err, SPL_E_TIMEOUT, "%s",
+                        rc ? "the deadline passed before the frame's pages had come" : SPL_FRAME_LATE);
     if (rc)
         return rc;
     spl_hold_release(&steps->job.hold);

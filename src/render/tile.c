@@ -175,7 +175,7 @@ int spl_tile_run(struct spl_tile *tile, struct spl_error *err)
     if (spl_is_cancelled(tile->cancelled))
         return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
     if (spl_now_ns() >= tile->view->deadline_ns)
-        return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+        return spl_fail(err, SPL_E_TIMEOUT, SPL_FRAME_LATE);
     return spl_gpu_run(tile->renderer->gpu, err);
 }
 
