@@ -119,14 +119,14 @@ static void every_method_and_layer_has_the_same_bytes(void **state)
     (void)state;
     static const int turns[][2] = {{1, 1}, {1, 5}};
     struct spl_dataset *dataset = random_panels(4, 4000, origin, 0.02, 4);
-    static const uint64_t scratches[] = {0, 160 * 160};
+    static const uint64_t scratches[] = {0, 112 * 112};
     for (size_t s = 0; s < 2; s++) {
         struct spl_renderer *both[2] = {open_renderer(0, scratches[s]), open_renderer(0, scratches[s])};
         for (int i = 0; i < 2; i++)
             assert_int_equal(spl_renderer_add(both[i], dataset, NULL), SPL_OK);
         for (int method = 0; method < SPL_METHOD_COUNT; method++)
             for (int kind = 0; kind < (s ? 1 : 4); kind++) {
-                struct spl_view view = looking(origin, 2, 201, 275);
+                struct spl_view view = looking(origin, 2, 131, 201);
                 char what[64];
                 view.method = (enum spl_method)method;
                 view.supersample = kind == 1 ? 2 : 1;
@@ -211,8 +211,8 @@ static void pictures_have_the_same_bytes(void **state)
     assert_int_equal(spl_dataset_open(path, true, &mapped, NULL), SPL_OK);
     remove_file(path);
     const uint32_t methods = 1u << SPL_METHOD_SPLAT | 1u << SPL_METHOD_NEAREST;
-    same_bytes(textured, textured, looking(origin, 2, 150, 300), methods, "textured");
-    same_bytes(mapped, mapped, looking(origin, 2, 150, 300), methods, "mapped");
+    same_bytes(textured, textured, looking(origin, 2, 80, 190), methods, "textured");
+    same_bytes(mapped, mapped, looking(origin, 2, 80, 190), methods, "mapped");
     spl_dictionary_finish(&dictionary);
     free_maps(&maps);
     spl_dataset_close(textured);
