@@ -11,7 +11,7 @@
 #include "base/memory.h"
 #include "sparse/blas.h"
 
-enum { width = 4, scan_run = 64 };
+enum { width = 4 };
 static const double independent = 1e-3; /* of an atom's square, what those before it must leave */
 
 struct sum {
@@ -59,16 +59,33 @@ void spl_beam_destroy(struct spl_beam *beam)
     free(beam);
 }
 
+/* No less than which the `width` largest are: as many runs have one of it or more. */
+static float floor_of(const float *largest, uint32_t runs)
+{
+    float top[width] = {0};
+    for (uint32_t r = 0; r < runs; r++)
+        for (uint32_t i = 0; i < width; i++)
+            if (largest[r] > top[i]) {
+                memmove(top + i + 1, top + i, (width - 1 - i) * sizeof *top);
+                top[i] = largest[r];
+                break;
+            }
+    return top[width - 1];
+}
+
 /* The atoms of the `width` largest magnitudes, the first of equals first; returns how many there are. */
 static uint32_t best_matches(const float *match, uint32_t count, uint32_t best[width])
 {
-    float least = 0, magnitude[width];
+    float largest[(SPL_DICTIONARY_MAX + SPL_PURSUIT_RUN - 1) / SPL_PURSUIT_RUN], magnitude[width];
+    const uint32_t runs = spl_largest_magnitudes(match, count, largest);
+    const float least = floor_of(largest, runs);
     uint32_t found = 0;
-    for (uint32_t first = 0; first < count; first += scan_run) {
-        uint32_t end = count - first < scan_run ? count : first + scan_run;
-        for (uint32_t a = spl_largest_magnitude(match + first, end - first) > least ? first : end; a < end; a++) {
+    for (uint32_t r = 0; r < runs; r++) {
+        if (!(largest[r] > 0) || largest[r] < least || (found == width && !(largest[r] > magnitude[width - 1])))
+            continue;
+        for (uint32_t a = r * SPL_PURSUIT_RUN; a < count && a < (r + 1) * SPL_PURSUIT_RUN; a++) {
             float m = fabsf(match[a]);
-            if (!(m > least))
+            if (!(m > 0) || m < least || (found == width && !(m > magnitude[width - 1])))
                 continue;
             uint32_t at = found < width ? found++ : width - 1;
             for (; at > 0 && magnitude[at - 1] < m; at--) {
@@ -77,7 +94,6 @@ static uint32_t best_matches(const float *match, uint32_t count, uint32_t best[w
             }
             magnitude[at] = m;
             best[at] = a;
-            least = found < width ? 0 : magnitude[width - 1];
         }
     }
     return found;

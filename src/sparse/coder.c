@@ -31,6 +31,7 @@ struct pursuit {
     struct spl_candidates candidates;
     struct spl_chunk_code *code;
     double enough;                   /* squared error at which a texture needs no further atom */
+    double price;                    /* that an atom must save to be taken at all; 0 of the greedy pursuit */
     uint32_t rows;                   /* textures */
     uint8_t splat[SPL_CHUNK_SPLATS]; /* of each row */
     double error[SPL_CHUNK_SPLATS];  /* of each row: squared, as far as coded */
@@ -229,9 +230,8 @@ static int code_jointly(struct pursuit *p, struct spl_error *err)
     const struct spl_coder *coder = p->coder;
     const struct spl_atoms *atoms = &coder->atoms;
     struct spl_beam *beam = spl_beam_create(atoms, err);
-    struct spl_beam_aim aim = {.atoms = coder->settings.atoms, .enough = p->enough};
+    const struct spl_beam_aim aim = {.atoms = coder->settings.atoms, .enough = p->enough, .price = p->price};
     double norm[SPL_CHUNK_SPLATS], saved = 0;
-    aim.price = (double)coder->settings.lambda * (coder->index_bits + expected_weight_bits + 1);
     if (!beam)
         return SPL_E_NOMEM;
     for (uint32_t row = 0; row < p->rows; row++) {
@@ -289,6 +289,8 @@ int spl_coder_code(const struct spl_coder *coder, const uint8_t *const *texture,
     p->coder = coder;
     p->code = out;
     p->enough = coder->settings.psnr > 0 ? n * pow(10, -coder->settings.psnr / 10.0) : 0;
+    if (coder->settings.lambda > 0 && coder->gram)
+        p->price = (double)coder->settings.lambda * (coder->index_bits + expected_weight_bits + 1);
     for (uint32_t i = 0; i < splats; i++) {
         if (!texture[i])
             continue;
@@ -299,7 +301,15 @@ int spl_coder_code(const struct spl_coder *coder, const uint8_t *const *texture,
             mean[i][c] = (uint8_t)(exact[c] * 255.0f + 0.5f);
         double rounding = mean_error(exact, mean[i], texels);
         sums->squared_error += rounding;
-        sums->plain_error += rounding + p->error[p->rows++];
+        sums->plain_error += rounding + p->error[p->rows];
+        sums->values += n;
+        sums->splats++;
+        if (p->error[p->rows] > fmax(p->enough, p->price)) {
+            p->rows++;
+        } else { /* no atom could save what it costs */
+            sums->squared_error += p->error[p->rows];
+            sums->histogram[0]++;
+        }
     }
     if (p->rows && coder->atoms.count) {
         spl_block_begin(&p->block, y, p->rows);
@@ -315,8 +325,6 @@ int spl_coder_code(const struct spl_coder *coder, const uint8_t *const *texture,
         sums->squared_error += p->error[row] > 0 ? p->error[row] : 0;
         sums->histogram[out->splat[p->splat[row]].count]++;
     }
-    sums->splats += p->rows;
-    sums->values += (uint64_t)p->rows * n;
     sums->bits += spl_chunk_code_bits(out);
     rc = 0;
 done:

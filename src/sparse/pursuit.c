@@ -9,7 +9,7 @@
 #include "base/parallel.h"
 #include "sparse/blas.h"
 
-enum { gram_rows = 64, best_run = 64 };
+enum { gram_rows = 64 };
 
 struct gram_job {
     const struct spl_atoms *atoms;
@@ -93,36 +93,68 @@ static int32_t magnitude(float value)
     return bits & INT32_MAX;
 }
 
-float spl_largest_magnitude(const float *values, uint32_t count)
+/* Of at least one. */
+static int32_t largest_of(const float *values, uint32_t count)
 {
     int32_t largest = 0;
-    float out;
     for (uint32_t i = 0; i < count; i++) {
         int32_t m = magnitude(values[i]);
         largest = m > largest ? m : largest;
     }
-    memcpy(&out, &largest, sizeof out);
-    return out;
+    return largest;
+}
+
+static uint32_t run_length(uint32_t first, uint32_t end)
+{
+    return end - first < SPL_PURSUIT_RUN ? end - first : SPL_PURSUIT_RUN;
+}
+
+uint32_t spl_largest_magnitudes(const float *values, uint32_t count, float largest[])
+{
+    uint32_t runs = 0;
+    for (uint32_t first = 0; first < count; first += SPL_PURSUIT_RUN, runs++) {
+        int32_t bits = largest_of(values + first, run_length(first, count));
+        memcpy(&largest[runs], &bits, sizeof bits);
+    }
+    return runs;
 }
 
 uint32_t spl_block_best(const struct spl_block *block, uint32_t row, uint32_t begin, uint32_t end)
 {
     const float *match = block->match + (size_t)row * block->atoms->count;
     int32_t best = -1;
-    uint32_t run = begin;
-    for (uint32_t first = begin; first < end; first += best_run) {
-        uint32_t last = end - first < best_run ? end : first + best_run;
-        int32_t largest = 0;
-        for (uint32_t k = first; k < last; k++) {
-            int32_t m = magnitude(match[k]);
-            largest = m > largest ? m : largest;
-        }
+    uint32_t at = begin;
+    for (uint32_t first = begin; first < end; first += SPL_PURSUIT_RUN) {
+        int32_t largest = largest_of(match + first, run_length(first, end));
         if (largest > best) {
             best = largest;
-            run = first;
+            at = first;
         }
     }
-    while (magnitude(match[run]) != best)
-        run++;
-    return run;
+    while (magnitude(match[at]) != best)
+        at++;
+    return at;
+}
+
+uint32_t spl_block_best_two(const struct spl_block *block, uint32_t row, float *second)
+{
+    const uint32_t count = block->atoms->count;
+    const float *match = block->match + (size_t)row * count;
+    int32_t best = -1, next = 0;
+    uint32_t run = 0;
+    for (uint32_t first = 0; first < count; first += SPL_PURSUIT_RUN) {
+        int32_t largest = largest_of(match + first, run_length(first, count));
+        int32_t less = largest > best ? best : largest;
+        next = less > next ? less : next;
+        run = largest > best ? first : run;
+        best = largest > best ? largest : best;
+    }
+    uint32_t at = run;
+    while (magnitude(match[at]) != best)
+        at++;
+    for (uint32_t k = run; k < run + run_length(run, count); k++)
+        if (k != at && magnitude(match[k]) > next)
+            next = magnitude(match[k]);
+    memcpy(second, &next, sizeof next);
+    return at;
 }

@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 
-enum { SPL_BLOCK_TEXTURES = 128 };
+enum { SPL_BLOCK_TEXTURES = 128, SPL_PURSUIT_RUN = 64 };
 
 /* Atoms of norm 1, one a row. */
 struct spl_atoms {
@@ -44,10 +44,13 @@ void spl_block_begin(struct spl_block *block, const float *y, uint32_t rows);
 void spl_block_move(struct spl_block *block, uint32_t row, uint32_t atom, float change);
 void spl_block_step(struct spl_block *block);
 
-/* The largest magnitude of values[count]; 0 of none. */
-float spl_largest_magnitude(const float *values, uint32_t count);
+/* The largest magnitude of each run of SPL_PURSUIT_RUN of values[count], the last one shorter; returns how many. */
+uint32_t spl_largest_magnitudes(const float *values, uint32_t count, float largest[]);
 
 /* The atom in [begin, end) whose match has the largest magnitude; the first of equals. begin < end. */
 uint32_t spl_block_best(const struct spl_block *block, uint32_t row, uint32_t begin, uint32_t end);
+
+/* The same of all atoms, and the largest magnitude of the others; 0 where there are none. */
+uint32_t spl_block_best_two(const struct spl_block *block, uint32_t row, float *second);
 
 #endif

@@ -184,7 +184,7 @@ static int plan(struct spl_training *t, bool *gram, struct spl_error *err)
     if (batch > t->population)
         batch = t->population;
     *gram = 4 * k * k <= memory / 4;
-    uint64_t block = spl_block_bytes(t->count, t->m, *gram);
+    uint64_t block = spl_block_bytes(t->count, t->m, *gram) + 4ull * SPL_BLOCK_TEXTURES * t->m;
     uint64_t fixed = 8 * k * m + 32 * k + (*gram ? 4 * k * k : 0) + batch * row + 2 * read_textures * (uint64_t)t->n +
                      4ull * planned_threads * t->n + (t->basis ? 4ull * t->n * t->m : 0) + planned_threads * block;
     uint64_t each = texture + (whole ? row : 0) + 4 /* its slot while reading */;

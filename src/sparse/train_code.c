@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "sparse/blas.h"
 #include "sparse/training.h"
@@ -66,25 +67,22 @@ struct row_state {
     bool done;
 };
 
-/* What the squared error would fall by without `best`. */
-static float second_best(const struct coding *c, const struct spl_block *block, uint32_t row, uint32_t best)
+/* Squared error at which a row needs no further atom: none could save what it costs. */
+static float least(const struct spl_training *t)
 {
-    const float *match = block->match + (size_t)row * c->atoms.count;
-    float left = best > 0 ? match[spl_block_best(block, row, 0, best)] : 0;
-    float right = best + 1 < c->atoms.count ? match[spl_block_best(block, row, best + 1, c->atoms.count)] : 0;
-    return fmaxf(left * left, right * right);
+    return fmaxf(fmaxf(spl_training_price(t), spl_training_enough(t)), 1e-9f);
 }
 
+/* One more atom, unless none is worth it. */
 static void take(const struct coding *c, struct spl_block *block, uint32_t row, struct spl_sparse_row *out,
                  struct row_state *state)
 {
-    float price = spl_training_price(c->t), enough = spl_training_enough(c->t);
+    float price = spl_training_price(c->t);
     const float *match = block->match + (size_t)row * c->atoms.count;
     state->done = true;
-    if (!(state->error > enough))
-        return;
-    uint32_t atom = spl_block_best(block, row, 0, c->atoms.count), count = out->count;
-    float gain = match[atom] * match[atom], weight[SPL_ATOMS_MAX];
+    float second, weight[SPL_ATOMS_MAX];
+    uint32_t atom = spl_block_best_two(block, row, &second), count = out->count;
+    float gain = match[atom] * match[atom];
     if (!(gain > price) || !(gain > 1e-9f))
         return;
     state->match[count] = match[atom]; /* plus what earlier atoms took of it */
@@ -99,34 +97,42 @@ static void take(const struct coding *c, struct spl_block *block, uint32_t row, 
         return;
     out->atom[count] = (uint16_t)atom;
     out->weight[count] = 0;
-    out->margin[count] = gain - second_best(c, block, row, atom);
+    out->margin[count] = gain - second * second;
     out->count++;
     double explained = 0;
-    for (uint32_t i = 0; i <= count; i++) {
-        spl_block_move(block, row, out->atom[i], weight[i] - out->weight[i]);
-        out->weight[i] = weight[i];
+    for (uint32_t i = 0; i <= count; i++)
         explained += (double)weight[i] * state->match[i];
-    }
     state->error = state->norm - (float)explained;
-    state->done = out->count == c->t->settings->atoms;
+    state->done = out->count == c->t->settings->atoms || !(state->error > least(c->t));
+    for (uint32_t i = 0; i <= count; i++) {
+        if (!state->done)
+            spl_block_move(block, row, out->atom[i], weight[i] - out->weight[i]);
+        out->weight[i] = weight[i];
+    }
 }
 
-static void code_block(struct coding *c, struct spl_block *block, size_t begin, uint32_t rows)
+static void code_block(struct coding *c, struct spl_block *block, float *y, size_t begin, uint32_t rows)
 {
     struct spl_training *t = c->t;
     struct row_state state[SPL_BLOCK_TEXTURES];
-    const float *y = t->y + (c->first + begin) * t->m;
-    spl_block_begin(block, y, rows);
+    struct spl_sparse_row *out[SPL_BLOCK_TEXTURES];
+    const size_t first = c->first + begin;
+    uint32_t live = 0;
     for (uint32_t i = 0; i < rows; i++) {
-        state[i].norm = state[i].error = t->norm[c->first + begin + i];
-        state[i].done = false;
         t->row[begin + i].count = 0;
+        if (!(t->norm[first + i] > least(t)))
+            continue;
+        memcpy(y + (size_t)live * t->m, t->y + (first + i) * t->m, t->m * sizeof *y);
+        state[live] = (struct row_state){.norm = t->norm[first + i], .error = t->norm[first + i]};
+        out[live++] = &t->row[begin + i];
     }
-    for (uint32_t step = 0, live = rows; step < t->settings->atoms && live; step++) {
+    const uint32_t taken = live;
+    spl_block_begin(block, y, taken);
+    for (uint32_t step = 0; step < t->settings->atoms && live; step++) {
         live = 0;
-        for (uint32_t i = 0; i < rows; i++) {
+        for (uint32_t i = 0; i < taken; i++) {
             if (!state[i].done)
-                take(c, block, i, &t->row[begin + i], &state[i]);
+                take(c, block, i, out[i], &state[i]);
             live += !state[i].done;
         }
         if (live)
@@ -135,11 +141,11 @@ static void code_block(struct coding *c, struct spl_block *block, size_t begin, 
     for (uint32_t i = 0; i < rows; i++) {
         const struct spl_sparse_row *row = &t->row[begin + i];
         float *r = t->residual + (begin + i) * t->m;
-        memcpy(r, y + (size_t)i * t->m, t->m * sizeof *r);
+        memcpy(r, t->y + (first + i) * t->m, t->m * sizeof *r);
         float inside = spl_blas_dot(t->m, r, r);
         for (uint32_t k = 0; k < row->count; k++)
             spl_blas_add(t->m, -row->weight[k], t->atoms + (size_t)row->atom[k] * t->m, r);
-        t->error[c->first + begin + i] = t->norm[c->first + begin + i] - inside + spl_blas_dot(t->m, r, r);
+        t->error[first + i] = t->norm[first + i] - inside + spl_blas_dot(t->m, r, r);
     }
 }
 
@@ -149,11 +155,17 @@ static void code_piece(void *context, size_t begin, size_t end, unsigned worker)
     struct spl_block block;
     if (c->error[worker].code || spl_block_init(&block, &c->atoms, &c->error[worker]))
         return;
+    float *y = spl_alloc_raw(SPL_BLOCK_TEXTURES * (size_t)c->t->m, sizeof *y, &c->error[worker]);
+    if (!y) {
+        spl_block_finish(&block);
+        return;
+    }
     for (size_t b = begin; b < end; b++) {
         size_t first = b * SPL_BLOCK_TEXTURES, left = c->count - first;
-        code_block(c, &block, first, left < SPL_BLOCK_TEXTURES ? (uint32_t)left : SPL_BLOCK_TEXTURES);
+        code_block(c, &block, y, first, left < SPL_BLOCK_TEXTURES ? (uint32_t)left : SPL_BLOCK_TEXTURES);
     }
     spl_block_finish(&block);
+    free(y);
 }
 
 int spl_training_code(struct spl_training *t, size_t first, size_t count, struct spl_error *err)

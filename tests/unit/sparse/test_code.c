@@ -4,11 +4,13 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <cmocka.h>
+#include <math.h>
 
 #include "base/memory.h"
 #include "sparse/beam.h"
 #include "sparse/blas.h"
 #include "sparse/code.h"
+#include "sparse/pursuit.h"
 #include "unit/sparse/plant.h"
 
 static const struct spl_code_settings paper = {.atoms = 8, .psnr = 40, .weight_bits = 4};
@@ -386,9 +388,41 @@ static void test_no_memory(void **state)
     plant_finish(&p);
 }
 
+/* Of every length up to several runs, with equals and zeroes among them. */
+static void test_two_best_are_those_of_a_plain_search(void **state)
+{
+    (void)state;
+    float match[3 * SPL_PURSUIT_RUN + 5], largest[4];
+    uint32_t seed = 7;
+    for (uint32_t count = 1; count <= sizeof match / sizeof *match; count++) {
+        const struct spl_atoms atoms = {.count = count};
+        const struct spl_block block = {.atoms = &atoms, .match = match};
+        uint32_t best = 0;
+        float second = 0, found, run_best = 0;
+        for (uint32_t i = 0; i < count; i++) {
+            seed = seed * 1664525 + 1013904223;
+            match[i] = (float)(seed >> 24) - (count % 3 ? 128 : 0); /* equals are frequent */
+            match[i] = count % 7 ? match[i] : 0;
+        }
+        for (uint32_t i = 1; i < count; i++)
+            best = fabsf(match[i]) > fabsf(match[best]) ? i : best;
+        for (uint32_t i = 0; i < count; i++)
+            second = i != best ? fmaxf(second, fabsf(match[i])) : second;
+        assert_int_equal(spl_block_best_two(&block, 0, &found), best);
+        assert_true(found == second);
+        assert_int_equal(spl_block_best(&block, 0, 0, count), best);
+        uint32_t runs = spl_largest_magnitudes(match, count, largest);
+        assert_int_equal(runs, (count + SPL_PURSUIT_RUN - 1) / SPL_PURSUIT_RUN);
+        for (uint32_t i = 0; i < runs; i++)
+            run_best = fmaxf(run_best, largest[i]);
+        assert_true(run_best == fabsf(match[best]));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_two_best_are_those_of_a_plain_search),
         cmocka_unit_test(test_refuses),
         cmocka_unit_test(test_steps),
         cmocka_unit_test(test_pursuit_is_search),
