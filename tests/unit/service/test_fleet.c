@@ -1,39 +1,18 @@
 /* Devices side by side, on fake renderers: versions of datasets come and go on all of them, each view goes to one, and
  * those that are lost leave the others serving. */
 #include "dataset/dataset.h"
-#include "pipelines.h"
+#include "fleets.h"
 #include "service/view/device_list.h"
-#include "service/view/fleet.h"
 #include "support/make_dataset.h"
-
-static struct spl_fleet *start_on(const char *devices, size_t queue)
-{
-    struct spl_fleet_options options = {
-        .devices = devices, .pipeline = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake}};
-    struct spl_fleet *fleet = NULL;
-    memset(&counters, 0, sizeof counters);
-    assert_int_equal(spl_fleet_create(&options, &fleet, NULL), 0);
-    while (spl_fleet_get_state(fleet) == SPL_PIPELINE_STARTING)
-        usleep(1000);
-    return fleet;
-}
 
 static struct spl_fleet *start(size_t queue)
 {
-    return start_on("fake", queue);
+    return start_fleet("fake", queue);
 }
 
 static struct spl_job *make_job(unsigned deadline_ms)
 {
     return make_view("width=8&height=4&format=raw", deadline_ms);
-}
-
-static struct spl_job *take_job(struct spl_fleet *fleet)
-{
-    struct spl_job *job;
-    while (!(job = spl_fleet_take(fleet)))
-        usleep(500);
-    return job;
 }
 
 /* A version of a dataset of one splat, or of two that lie apart; the caller owns its reference. */
@@ -237,7 +216,7 @@ static void views_go_where_the_least_waits(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "300", 1);
-    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entries[2] = {open_entry(), open_entry()};
     for (int i = 0; i < 2; i++) {
         spl_fleet_add(fleet, entries[i]);
@@ -272,7 +251,7 @@ static void places_of_a_dataset_have_homes(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "50", 1);
-    struct spl_fleet *fleet = start_on("fake:0,fake:1,fake:2", 9);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 9);
     struct spl_catalog_entry *before = open_entry(), *entry = open_splats(2);
     spl_fleet_add(fleet, before); // whose home is the first
     assert_ptr_equal(take_change(fleet), before);
@@ -299,7 +278,7 @@ static void all_queues_are_full_before_a_view_is_refused(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "500", 1);
-    struct spl_fleet *fleet = start_on("fake,fake,fake", 6);
+    struct spl_fleet *fleet = start_fleet("fake,fake,fake", 6);
     struct spl_job *job;
     struct spl_error err = {0};
     int accepted = 0, rc;
@@ -318,7 +297,7 @@ static void all_queues_are_full_before_a_view_is_refused(void **state)
 static void a_lost_device_leaves_the_others(void **state)
 {
     (void)state;
-    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entry = open_entry();
     spl_fleet_add(fleet, entry);
     assert_ptr_equal(take_change(fleet), entry);
@@ -346,7 +325,7 @@ static void a_device_that_is_gone_is_given_up(void **state)
 {
     (void)state;
     setenv("SPLATD_INJECT_LOSS_AFTER", "10x100", 1); // the second after twenty
-    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entry = open_entry(), *later = open_entry();
     spl_fleet_add(fleet, entry);
     assert_ptr_equal(take_change(fleet), entry);
@@ -379,7 +358,7 @@ static void a_device_that_is_gone_is_given_up(void **state)
 static void a_dataset_has_room_on_some_devices(void **state)
 {
     (void)state;
-    struct spl_fleet *fleet = start_on("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entry = open_entry(), *large = open_entry();
     setenv("FAKE_REFUSE", "1", 1);
     spl_fleet_add(fleet, entry);
@@ -406,7 +385,7 @@ static void a_dataset_has_room_on_some_devices(void **state)
 static void devices_are_of_one_kind(void **state)
 {
     (void)state;
-    struct spl_fleet *fleet = start_on("fake,other", 8);
+    struct spl_fleet *fleet = start_fleet("fake,other", 8);
     assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_FAILED);
     assert_non_null(strstr(spl_fleet_get_failure(fleet)->message, "two kinds"));
     assert_string_equal(spl_fleet_get_failure(fleet)->field, "device");
@@ -448,7 +427,7 @@ static void devices_are_lost_while_all_goes_on(void **state)
 {
     (void)state;
     setenv("SPLATD_INJECT_LOSS_AFTER", "7x2", 1);
-    struct spl_fleet *fleet = start_on("fake:0,fake:1,fake:2", 32);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 32);
     int back = 0, sent = 0;
     for (int i = 0; i < 12; i++) {
         struct spl_catalog_entry *entry = open_entry();

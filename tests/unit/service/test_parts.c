@@ -1,28 +1,7 @@
 /* A large view that several devices draw together, on fake renderers: who has nothing to do takes part, and whatever
  * becomes of a part, the view comes back once, as one. */
-#include "pipelines.h"
-#include "service/view/fleet.h"
+#include "fleets.h"
 #include "service/view/parts.h"
-
-static struct spl_fleet *start(const char *devices, size_t queue)
-{
-    struct spl_fleet_options options = {
-        .devices = devices, .pipeline = {.queue = queue, .encoders = 2, .counters = &counters, .wake = no_wake}};
-    struct spl_fleet *fleet = NULL;
-    memset(&counters, 0, sizeof counters);
-    assert_int_equal(spl_fleet_create(&options, &fleet, NULL), 0);
-    while (spl_fleet_get_state(fleet) == SPL_PIPELINE_STARTING)
-        usleep(1000);
-    return fleet;
-}
-
-static struct spl_job *take_job(struct spl_fleet *fleet)
-{
-    struct spl_job *job;
-    while (!(job = spl_fleet_take(fleet)))
-        usleep(500);
-    return job;
-}
 
 /* Eight pieces for two devices. */
 static struct spl_job *make_large(unsigned deadline_ms)
@@ -82,14 +61,14 @@ static void idle_devices_draw_it_together(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "800", 1);
-    struct spl_fleet *one = start("fake:0", 8);
+    struct spl_fleet *one = start_fleet("fake:0", 8);
     struct spl_job *job = make_large(60000), *alone;
     uint64_t began = spl_now_ns();
     submit(one, job);
     alone = take_job(one);
     uint64_t took_alone = spl_now_ns() - began;
     spl_fleet_destroy(one);
-    struct spl_fleet *two = start("fake:0,fake:1", 8);
+    struct spl_fleet *two = start_fleet("fake:0,fake:1", 8);
     job = make_large(60000);
     began = spl_now_ns();
     submit(two, job);
@@ -114,7 +93,7 @@ static void others_have_one_device(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "300", 1);
-    struct spl_fleet *fleet = start("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_job *jobs[4] = {make_view("width=1280&height=720&format=raw", 60000), make_large(60000),
                                make_large(60000), make_large(60000)};
     jobs[1]->behind = true;
@@ -140,7 +119,7 @@ static void what_a_lost_device_had_others_draw(void **state)
 {
     (void)state;
     setenv("SPLATD_INJECT_LOSS_AFTER", "1x1", 1);
-    struct spl_fleet *fleet = start("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_job *job = make_small();
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0); // by the first device, which is lost in its next frame
@@ -153,7 +132,7 @@ static void what_a_lost_device_had_others_draw(void **state)
     spl_fleet_destroy(fleet);
 
     setenv("FAKE_HANG_MS", "700", 1);
-    fleet = start("fake:0,fake:1", 8);
+    fleet = start_fleet("fake:0,fake:1", 8);
     job = make_small();
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0);
@@ -177,7 +156,7 @@ static void what_a_lost_device_had_others_draw(void **state)
 static void all_may_be_lost(void **state)
 {
     (void)state;
-    struct spl_fleet *fleet = start("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     setenv("FAKE_LOSE_FRAME", "1", 1);
     struct spl_job *job = make_large(60000);
     submit(fleet, job);
@@ -196,7 +175,7 @@ static void its_deadline_is_that_of_its_parts(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "4000", 1);
-    struct spl_fleet *fleet = start("fake:0,fake:1", 8);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_job *job = make_large(150);
     submit(fleet, job);
     job->deadline_ns += 150 * SPL_NS_PER_MS; // the loop may
@@ -213,7 +192,7 @@ static void who_leaves_ends_all_parts(void **state)
 {
     (void)state;
     setenv("FAKE_FRAME_MS", "60000", 1);
-    struct spl_fleet *fleet = start("fake:0,fake:1,fake:2", 9);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 9);
     struct spl_job *job = make_large(60000);
     submit(fleet, job);
     usleep(20000);
@@ -232,7 +211,7 @@ static void a_fleet_ends_with_parts_inside(void **state)
     (void)state;
     setenv("FAKE_FRAME_MS", "30", 1);
     for (int taken = 0; taken < 3; taken++) {
-        struct spl_fleet *fleet = start("fake:0,fake:1", 8);
+        struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
         for (int i = 0; i < 3; i++)
             submit(fleet, make_large(60000));
         for (int i = 0; i < taken; i++)
@@ -247,7 +226,7 @@ static void many_come_and_go(void **state)
 {
     (void)state;
     setenv("SPLATD_INJECT_LOSS_AFTER", "5x3", 1);
-    struct spl_fleet *fleet = start("fake:0,fake:1,fake:2", 6);
+    struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 6);
     int inside = 0, good = 0;
     for (int i = 0; i < 200 || good <= 20 || inside; i++) { /* how many find room is a matter of the machine */
         struct spl_job *job = i % 3 ? make_large(60000) : make_small();
@@ -275,14 +254,10 @@ static void many_come_and_go(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(idle_devices_draw_it_together),
-        cmocka_unit_test(others_have_one_device),
-        cmocka_unit_test(what_a_lost_device_had_others_draw),
-        cmocka_unit_test(all_may_be_lost),
-        cmocka_unit_test(its_deadline_is_that_of_its_parts),
-        cmocka_unit_test(who_leaves_ends_all_parts),
-        cmocka_unit_test(a_fleet_ends_with_parts_inside),
-        cmocka_unit_test(many_come_and_go),
+        cmocka_unit_test(idle_devices_draw_it_together),      cmocka_unit_test(others_have_one_device),
+        cmocka_unit_test(what_a_lost_device_had_others_draw), cmocka_unit_test(all_may_be_lost),
+        cmocka_unit_test(its_deadline_is_that_of_its_parts),  cmocka_unit_test(who_leaves_ends_all_parts),
+        cmocka_unit_test(a_fleet_ends_with_parts_inside),     cmocka_unit_test(many_come_and_go),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
