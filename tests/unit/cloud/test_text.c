@@ -309,6 +309,47 @@ static void the_option_is_checked(void **state)
     refused(&b, "x,y,z,-,class", SPL_E_INPUT, "class", "column 5");
 }
 
+/* By name, with the way out; a mesh's faces and normals would else be points. */
+static void what_is_no_scan_is_named(void **state)
+{
+    static const struct {
+        const char *bytes;
+        size_t length;
+        const char *message;
+    } files[] = {
+        {"\x1f\x8b\x08\0\0", 5, "is packed with gzip: unpack it first"},
+        {"PK\3\4\0\0", 6, "is a ZIP file"},
+        {"\xff\xfe"
+         "1\0 \0"
+         "2\0",
+         8, "is text in UTF-16: write it as UTF-8 first"},
+        {"1\0 \0"
+         "2\0 \0",
+         8, "may be text in UTF-16"},
+        {"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1 2 3\n", 42, "is a model of Wavefront's (OBJ)"},
+        {"# by hand\r\n\r\nmtllib a.mtl\r\nv 0 0 0\r\n", 39, "is a model of Wavefront's (OBJ)"},
+        {"ncols 3\nnrows 1\nxllcorner 0\n1 2 3\n", 36, "is a raster of heights (Esri's grid)"},
+        {"NCOLS 3\nNROWS 1\n1 2 3\n", 23, "is a raster of heights (Esri's grid)"},
+        {"# vtk DataFile Version 3.0\nx y z\n1 2 3\n", 39, "is a VTK file"},
+        {"OFF\n3 0 0\n1 2 3\n", 16, "is a mesh (OFF)"},
+        {"{\"type\":1}", 10, "is JSON"},
+        {"<!DOCTYPE HTML>404", 18, "is a web page"},
+        {"II*\0abc", 7, "is a TIFF"},
+        {"II*abc", 6, "no column has this name"},
+    };
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        b.length = 0;
+        put(&b, files[i].bytes, files[i].length);
+        refused(&b, NULL, SPL_E_INPUT, i + 1 < sizeof files / sizeof *files ? "" : "x", files[i].message);
+    }
+    load_text("offset x y z\n9 1 2 3\n", NULL, &l); /* a heading, not a mesh */
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+}
+
 static void other_files_are_refused(void **state)
 {
     struct loaded l;
@@ -355,6 +396,7 @@ int main(void)
         cmocka_unit_test(broken_text_is_refused),
         cmocka_unit_test(the_option_is_checked),
         cmocka_unit_test(other_files_are_refused),
+        cmocka_unit_test(what_is_no_scan_is_named),
         cmocka_unit_test(lines_have_a_limit),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
