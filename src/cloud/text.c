@@ -11,8 +11,6 @@
 #include "base/memory.h"
 #include "cloud/fields.h"
 
-enum { SAMPLE_LINES = 1000 };
-
 struct text {
     struct spl_layout layout;
     uint64_t start, start_line; /* of the first line of numbers */
@@ -215,7 +213,7 @@ static int find_separator(struct spl_cloud *cloud, bool named, const char *line,
     tried.separator = tried.separator == ';' ? ';' : ' ';
     tried.comma = true;
     begin_again(cloud);
-    while (code > 0 && commas.lines < SAMPLE_LINES) {
+    while (code > 0 && commas.lines < SPL_TEXT_SAMPLE) {
         code = sample_line(cloud, &line, &length, err);
         if (code > 0 && !spl_text_commas_add(&commas, &tried, named, line, length))
             break;
@@ -246,7 +244,7 @@ static int look_at_first(struct spl_cloud *cloud, struct spl_error *err)
     int code = 1;
 
     begin_again(cloud);
-    while (code > 0 && look.lines < SAMPLE_LINES) {
+    while (code > 0 && look.lines < SPL_TEXT_SAMPLE) {
         code = sample_line(cloud, &line, &length, err);
         if (code > 0 && !spl_text_look_add(&look, &text->layout, line, length))
             break;
@@ -260,10 +258,65 @@ static int look_at_first(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Which columns hold numbers. */
+static int find_kinds(struct spl_cloud *cloud, struct spl_text_kinds *kinds, struct spl_error *err)
+{
+    const struct text *text = cloud->state;
+    const char *line;
+    size_t length;
+    int code;
+
+    *kinds = (struct spl_text_kinds){0};
+    begin_again(cloud);
+    do {
+        code = sample_line(cloud, &line, &length, err);
+    } while (code > 0 && spl_text_kinds_add(kinds, &text->layout, line, length));
+    return code < 0 ? code : SPL_OK;
+}
+
+/* A named column that nothing but text stands in is none of numbers, unless a user says so. */
+static int drop_texts(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct text *text = cloud->state;
+    struct spl_layout *layout = &text->layout;
+    struct spl_text_kinds kinds;
+    uint32_t may = (1u << SPL_COLUMN_KEPT) - (1u << SPL_COLUMN_CLASS), named = cloud->keep.named;
+    if (cloud->options->columns || !(spl_layout_taken(layout) & may & ~named))
+        return SPL_OK;
+    int code = find_kinds(cloud, &kinds, err);
+    for (unsigned i = 0; code == SPL_OK && i < layout->fields; i++) {
+        int column = layout->column[i];
+        char *unused = cloud->info.unused;
+        size_t used = strlen(unused);
+        if (column < SPL_COLUMN_CLASS || column >= SPL_COLUMN_KEPT || named >> column & 1 || kinds.numbers[i] ||
+            !kinds.texts[i])
+            continue;
+        layout->column[i] = SPL_COLUMN_SKIP;
+        snprintf(unused + used, sizeof cloud->info.unused - used, "%s%s (text)", used ? ", " : "",
+                 spl_column_name(column));
+    }
+    return code;
+}
+
+/* What the columns were taken for, "x,y,z,text", or "x,y,z and text" where lines end in words. */
+static void tell_guess(struct spl_cloud *cloud)
+{
+    const struct text *text = cloud->state;
+    char *guessed = cloud->info.guessed;
+    size_t used = 0, size = sizeof cloud->info.guessed;
+    for (unsigned i = 0; i < text->layout.fields && used < size; i++)
+        used += (size_t)snprintf(
+            guessed + used, size - used, "%s%s", i ? "," : "",
+            i >= text->layout.first && text->layout.texts >> i & 1 ? "text" : spl_column_name(text->layout.column[i]));
+    if (!text->layout.exact && used < size)
+        snprintf(guessed + used, size - used, " and text");
+}
+
 static int recognise(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct text *text = cloud->state;
     struct spl_text_sample sample = {0};
+    struct spl_text_kinds kinds;
     const char *line;
     size_t length;
 
@@ -276,22 +329,24 @@ static int recognise(struct spl_cloud *cloud, struct spl_error *err)
         return spl_source_fail_line(&cloud->source, cloud->source.line, "", err,
                                     "%zu values; a point needs x y z, and at most %d columns are known here", fields,
                                     SPL_TEXT_FIELDS);
-    text->layout.fields = (unsigned)fields;
-    text->layout.exact = true;
+    if ((code = find_kinds(cloud, &kinds, err)) < 0)
+        return code;
+    bool tail = kinds.ragged && !kinds.uneven && kinds.leading >= 3; /* words behind the numbers, not always as many */
+    text->layout.fields = tail ? kinds.leading : (unsigned)fields;
+    text->layout.exact = !tail;
+    for (unsigned i = 0; i < text->layout.fields; i++)
+        text->layout.texts |= (uint64_t)(kinds.texts[i] > kinds.numbers[i]) << i;
     code = look_at_first(cloud, err);
     if (code < 0)
         return code;
     begin_again(cloud);
     while ((code = sample_line(cloud, &line, &length, err)) > 0)
-        if (!spl_text_sample_add(&sample, &text->layout, line, length) || sample.lines == SAMPLE_LINES)
+        if (!spl_text_sample_add(&sample, &text->layout, line, length) || sample.lines == SPL_TEXT_SAMPLE)
             break;
     if (code < 0)
         return code;
     spl_layout_recognise(&text->layout, &sample);
-    char *guessed = cloud->info.guessed;
-    for (size_t i = 0, used = 0; i < fields && used < sizeof cloud->info.guessed; i++)
-        used += (size_t)snprintf(guessed + used, sizeof cloud->info.guessed - used, "%s%s", i ? "," : "",
-                                 spl_column_name(text->layout.column[i]));
+    tell_guess(cloud);
     return SPL_OK;
 }
 
@@ -314,8 +369,8 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     code = find_separator(cloud, named, line, length, err);
-    if (code == SPL_OK && !named)
-        code = recognise(cloud, err);
+    if (code == SPL_OK)
+        code = named ? drop_texts(cloud, err) : recognise(cloud, err);
     if (code < 0)
         return code;
     for (unsigned i = 0; i < text->layout.fields; i++)
@@ -352,27 +407,33 @@ static int refuse_number(const struct spl_cloud *cloud, const struct spl_layout 
 {
     const struct spl_source *source = &cloud->source;
     char shown[32];
-    const char *text = spl_fields_show(fields, shown);
-    bool names = column == 0 && cloud->info.guessed[0] && layout->fields > 3 && !strchr("+-.0123456789", text[0]);
+    const char *text = spl_fields_show(fields, shown), *hint = "";
+    bool word = !strchr("+-.0123456789", text[0]);
+    if (is_decimal_comma(fields))
+        hint = "; decimal commas are read where no number of the first lines has a point, and semicolons, tabs or "
+               "blanks separate the columns: write 1.5 for 1,5 (sed 's/,/./g' where commas do not separate them)";
+    else if (column == 0 && cloud->info.guessed[0] && layout->fields > 3 && word)
+        hint = "; where it names points, --columns -,x,y,z and so on skips it";
+    else if (layout->column[column] >= SPL_COLUMN_KEPT)
+        hint = "; text cannot be kept, --keep takes columns of numbers";
+    else if (layout->column[column] >= SPL_COLUMN_CLASS && word)
+        hint = "; where the column holds text, '-' in its place of --columns skips it";
     return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, layout->column[column]), err,
-                                "\"%s\" in column %u is not a number%s", text, column + 1,
-                                is_decimal_comma(fields)
-                                    ? "; decimal commas are read where no number of the first lines has a point, and "
-                                      "semicolons, tabs or blanks separate the columns: write 1.5 for 1,5 (sed "
-                                      "'s/,/./g' where commas do not separate them)"
-                                : names ? "; where it names points, --columns -,x,y,z and so on skips it"
-                                        : "");
+                                "\"%s\" in column %u is not a number%s", text, column + 1, hint);
 }
 
-/* Is the field that no number was found in a blank between separators, or behind the line's last,
- * where one more is due? */
-static bool is_empty(const struct spl_fields *fields, bool is_last, const char *line, size_t length)
+/* With a field that is no number, or the end of a line that is due to go on: does it say that there is no value? Then
+ * goes over it. */
+static bool take_nothing(struct spl_fields *fields, bool is_last, const char *line, size_t length)
 {
-    if (fields->separator == ' ')
-        return false;
-    if (fields->start < fields->end)
-        return *fields->start == fields->separator;
-    if (!is_last)
+    struct spl_fields next = *fields;
+    size_t size;
+    enum spl_field got = spl_fields_text(&next, &size);
+    if (got == SPL_FIELD_OK && spl_text_is_missing(next.start, size)) {
+        *fields = next;
+        return true;
+    }
+    if (got != SPL_FIELD_END || fields->separator == ' ' || !is_last)
         return false;
     while (length > 0 && (line[length - 1] == ' ' || line[length - 1] == '\t'))
         length--;
@@ -394,11 +455,10 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
         int column = layout->column[i];
         enum spl_field got =
             column >= 0 ? take_number(&fields, &rows->value[column][row]) : spl_fields_text(&fields, &ignored);
-        if (got != SPL_FIELD_OK && (column < 0 || column >= SPL_COLUMN_INTENSITY) &&
-            is_empty(&fields, i + 1 == layout->fields, line, length)) {
+        if (got != SPL_FIELD_OK && take_nothing(&fields, i + 1 == layout->fields, line, length)) {
             if (column >= 0)
                 rows->value[column][row] = (double)NAN;
-            got = spl_fields_text(&fields, &ignored) == SPL_FIELD_BAD ? SPL_FIELD_BAD : SPL_FIELD_OK;
+            continue;
         }
         if (got == SPL_FIELD_END)
             return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, column), err,

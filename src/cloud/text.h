@@ -5,7 +5,7 @@
 #include "cloud/fields.h"
 #include "cloud/reader.h"
 
-enum { SPL_TEXT_FIELDS = 64 };
+enum { SPL_TEXT_FIELDS = 64, SPL_TEXT_SAMPLE = 1000 /* lines that decide */ };
 
 struct spl_layout {
     int8_t column[SPL_TEXT_FIELDS]; /* enum spl_column of each field */
@@ -16,6 +16,7 @@ struct spl_layout {
     bool surveyors; /* names: Y and X, the east and the north of German geodesy, are x and y here */
     bool doubtful;  /* names: they may be that, or not */
     char separator; /* ' ', ',' or ';' */
+    uint64_t texts; /* 1 << field of those that hold text, which are skipped */
 };
 
 static inline struct spl_fields spl_layout_fields(const struct spl_layout *layout, const char *line, size_t length)
@@ -74,17 +75,33 @@ struct spl_text_pairs {
     unsigned zeros;  /* 1 << field: some of them begins with 0 */
 };
 
+/* Which columns hold numbers, and which text. Zero-initialised. */
+struct spl_text_kinds {
+    unsigned lines, fields; /* fields: of the last line */
+    unsigned leading;       /* numbers before the first text, which the first column may be */
+    bool ragged, uneven;    /* lines have not all as many fields; not all as many leading numbers */
+    unsigned numbers[SPL_TEXT_FIELDS], texts[SPL_TEXT_FIELDS];
+};
+
+/* False when enough lines were added. */
+bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length);
+
+/* Does a field say that it has no value: "", "-", "NULL", "n/a", …? */
+bool spl_text_is_missing(const char *text, size_t length);
+
 /* What the first columns of lines without names look like. Zero-initialised. */
 struct spl_text_look {
-    unsigned lines;
-    bool unnumbered; /* the first column does not rise, or too few numbers come behind */
-    bool gaps;       /* it rises by more than one somewhere */
-    bool coarse;     /* one of the next three is a whole number */
-    bool unnamed;    /* it is no text everywhere */
-    bool varies;     /* the one behind it does */
-    bool fraction;   /* not all are whole numbers */
+    unsigned lines, places; /* places: lines with three finite numbers behind the first column */
+    bool bare;              /* the first column is no whole number, or too few numbers come behind */
+    bool unsorted;          /* it does not count by one */
+    bool falling;           /* it falls somewhere */
+    bool unnamed;           /* it is no text everywhere */
+    bool varies;            /* the one behind it does */
+    bool fraction;          /* not all are whole numbers */
+    bool near;              /* the three behind it are not a place on a map: two of six digits, and a height */
+    bool fine[3];           /* of the three behind it, some are no whole numbers */
     uint64_t last;
-    double y;
+    double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */
 };
 
@@ -95,10 +112,14 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
 unsigned spl_text_look_first(const struct spl_text_look *look);
 int spl_text_look_doubled(const struct spl_text_look *look, char separator);
 
-/* What the first lines look like, from which nameless columns are recognised. Zero-initialised. */
+/* What the first lines look like, from which nameless columns are recognised. Zero-initialised. What is missing says
+ * nothing. */
 struct spl_text_sample {
     unsigned lines;
-    bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer, or no number */
+    bool given[SPL_TEXT_FIELDS];    /* some value is a number */
+    bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer */
+    bool clear[SPL_TEXT_FIELDS];    /* some value is not what is opaque */
+    double apart[SPL_TEXT_FIELDS];  /* how far its values are from those of the next column, in all */
     bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
     bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
     bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */

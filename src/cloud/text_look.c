@@ -2,15 +2,20 @@
  * numbers decimal commas? And are commas both those and what separates columns, so that nobody can tell them apart?
  * Pure functions.
  *
- * A first column that counts by one may also be x along a row of a grid of whole metres: there y stays the same. One
- * that rises by other steps numbers points that are left of more, where no coordinate behind it is a whole number. */
+ * A first column of whole numbers that stands before three with fractions is none of the coordinates, which would be
+ * written alike: x is whole only where y is, and z only where both are. Where that does not decide, one that counts by
+ * one numbers the points; but it may also be x along a row of a grid of whole metres, and there y stays the same. And
+ * two columns of six digits before one of four are a place on a map, whatever stands before them. */
 #include <math.h>
+#include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
 
-/* Fewer count by chance; of nothing but whole numbers a diagonal does, and with gaps points in the order of x. */
-enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100, COUNTED_GAP_LINES = 20 };
+/* Fewer count by chance; of nothing but whole numbers a diagonal does. */
+enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
+static const double map_least = 1e5, height_most = 1e4;
 
 /* The next field as a whole number, with zeros in front and a sign if need be. */
 struct whole {
@@ -52,6 +57,38 @@ bool spl_text_names_point(const char *line, size_t length, char separator, bool 
         if (take_number(comma, &fields, &v) != SPL_FIELD_OK)
             return false;
     return true;
+}
+
+bool spl_text_is_missing(const char *text, size_t length)
+{
+    static const char *const words[] = {"", "-", "--", "NULL", "NA", "N/A", "#N/A", "none", "nil"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strlen(words[i]) == length && !strncasecmp(words[i], text, length))
+            return true;
+    return false;
+}
+
+bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length)
+{
+    struct spl_fields fields = spl_layout_fields(layout, line, length);
+    unsigned leading = 0, i = 0;
+    for (; i < SPL_TEXT_FIELDS; i++) {
+        struct spl_fields field = fields;
+        size_t size;
+        double v;
+        bool number = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
+        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
+            break;
+        bool text = !number && !spl_text_is_missing(fields.start, size);
+        kinds->numbers[i] += number;
+        kinds->texts[i] += text;
+        leading += leading == i && (!text || i == 0);
+    }
+    kinds->ragged |= kinds->lines && i != kinds->fields;
+    kinds->uneven |= kinds->lines && leading != kinds->leading;
+    kinds->fields = i;
+    kinds->leading = leading;
+    return ++kinds->lines < SPL_TEXT_SAMPLE;
 }
 
 bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
@@ -100,29 +137,34 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
     struct whole all[SPL_TEXT_FIELDS];
-    double v = 0, y = 0;
+    double v = 0;
     unsigned count = 0;
     bool whole = true;
-    if (spl_fields_count(line, length, layout->separator) != layout->fields)
+    size_t found = spl_fields_count(line, length, layout->separator);
+    if (layout->exact ? found != layout->fields : found < layout->fields)
         return false;
     bool names = spl_text_names_point(line, length, layout->separator, layout->comma);
     while (count < layout->fields && take_whole(&fields, &all[count])) {
         whole &= all[count].is || (names && count == 0);
         count++;
     }
-    bool numbers = count > 3 && all[0].is && !all[0].sign &&
-                   spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
-    for (int i = 0; i < 3 && numbers; i++) {
-        numbers = spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
-        y = i ? y : v;
-        look->coarse |= all[1 + i].is;
-    }
-    numbers &= !look->lines || all[0].value > look->last;
-    look->gaps |= numbers && look->lines && all[0].value != look->last + 1;
-    look->varies |= numbers && look->lines && y != look->y;
-    look->y = numbers ? y : look->y;
+    bool numbers = count > 3 && spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
+    double n = v, of[3] = {0};
+    for (int i = 0; i < 3 && numbers; i++)
+        numbers = spl_layout_number(layout, &first, &of[i]) == SPL_FIELD_OK;
+    look->bare |= !numbers || !all[0].is || all[0].sign;
+    look->unsorted |= look->bare || (look->lines && all[0].value != look->last + 1);
+    look->falling |= !numbers || !(n >= 0) || (look->lines && n < look->first);
+    look->varies |= numbers && look->lines && of[0] != look->y;
+    bool place = numbers && isfinite(of[0]) && isfinite(of[1]) && isfinite(of[2]);
+    look->places += place;
+    look->near |= place && !(fabs(of[0]) >= map_least && fabs(of[1]) >= map_least && fabs(of[2]) < height_most &&
+                             n < fabs(of[1]));
+    for (int i = 0; i < 3; i++)
+        look->fine[i] |= place && !all[1 + i].is;
+    look->first = n;
+    look->y = of[0];
     look->last = count > 0 ? all[0].value : 0;
-    look->unnumbered |= !numbers;
     look->unnamed |= !names;
     look->fraction |= !whole;
     for (unsigned at = 0; at < 2 && !look->fraction; at++) {
@@ -135,14 +177,24 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
 
 static bool counts(const struct spl_text_look *look)
 {
-    return !look->unnumbered && look->lines >= (look->gaps ? COUNTED_GAP_LINES : COUNTED_LINES) &&
-           !(look->gaps && look->coarse);
+    return !look->bare && !look->unsorted && look->lines >= COUNTED_LINES;
+}
+
+static bool is_numbered(const struct spl_text_look *look)
+{
+    const bool *fine = look->fine;
+    if (look->places && !look->near && !(look->bare && look->falling))
+        return true;
+    if (fine[0] && fine[1])
+        return fine[2] && !look->bare && look->lines >= COUNTED_LINES;
+    if (fine[1]) /* z, behind x and y of whole numbers */
+        return false;
+    return counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
 }
 
 unsigned spl_text_look_first(const struct spl_text_look *look)
 {
-    bool numbered = counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
-    return look->lines > 0 && (numbered || !look->unnamed);
+    return look->lines > 0 && (is_numbered(look) || !look->unnamed);
 }
 
 /* Whole numbers have no zeros in front, decimals have, every tenth. */

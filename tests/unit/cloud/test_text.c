@@ -186,6 +186,66 @@ static void a_column_that_is_skipped_may_hold_text(void **state)
     }
 }
 
+/* Behind the numbers too; one that is named is told, one that is to be kept refused. */
+static void columns_of_text_are_left_out(void **state)
+{
+    static const struct {
+        const char *text, *guessed, *unused;
+    } files[] = {
+        {"1 2 3 TREE\n4 5 6 EDGE\n", "x,y,z,text", ""},
+        {"1,2,3,\"Baum, gro\xc3\x9f\"\n4,5,6,\n", "x,y,z and text", ""},
+        {"1,2,3,\"Baum, gro\xc3\x9f\"\n4,5,6,EDGE\n", "x,y,z,text", ""},
+        {"1 2 3 9 0 0 TREE 12:30:05\n4 5 6 255 0 0 EDGE 12:30:06\n", "x,y,z,red,green,blue,text,text", ""},
+        {"1;2;3;TREE;9;0;0\n4;5;6;EDGE;255;0;0\n", "x,y,z,text,red,green,blue", ""},
+        {"7 1 2.5 3 TREE\n8 4 5.5 6 EDGE\n", "x,y,z,intensity,text", "?"},
+        {"P1 1 2 3 TREE\nP2 4 5 6 EDGE\n", "-,x,y,z,text", ""},
+        {"1 2 3\n4 5 6 EDGE\n", "x,y,z and text", ""},
+        {"1 2 3 a big tree\n4 5 6 EDGE\n", "x,y,z and text", ""},
+        {"1,2,3,\n4,5,6,EDGE\n", "x,y,z and text", ""},
+        {"x,y,z,label,code\n1,2,3,tree,A\n4,5,6,edge,B\n", "", "code, class (text)"},
+        {"x,y,z,class\n1,2,3,tree\n4,5,6,\n", "", "class (text)"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        struct loaded l;
+        load_text(files[i].text, NULL, &l);
+        if (l.points != 2 || strcmp(l.guessed, files[i].guessed) != 0)
+            fail_msg("%zu: %llu points, \"%s\", %s", i, (unsigned long long)l.points, l.guessed, l.err.message);
+        if (*files[i].unused != '?') {
+            assert_string_equal(l.unused, files[i].unused);
+            assert_point(&l, 0, 1, 2, 3);
+            assert_point(&l, 1, 4, 5, 6);
+        }
+        loaded_finish(&l);
+    }
+    refused_text("1 2 3 9\n4 5 6 EDGE\n", SPL_E_INPUT, "intensity",
+                 "\"EDGE\" in column 4 is not a number; where the column holds text, '-' in its place of --columns");
+    refused_text("1 2 3 EDGE\n4 5 6 7 8\n", SPL_E_INPUT, "intensity", "\"EDGE\" in column 4 is not a number");
+    refused_text("x y z class\n4 5 6 7\n1 2 3 tree\n", SPL_E_INPUT, "class", "\"tree\" in column 4 is not a number");
+}
+
+/* Cells that say that there is nothing: points without a place are none, colours black. */
+static void missing_values_are_known(void **state)
+{
+    struct loaded l;
+    (void)state;
+    static const char *const texts[] = {"x,y,z,r,g,b,i\n1,2,3,9,8,7,5\n,,,1,1,1,1\n4,5,6,,,,\n",
+                                        "x;y;z;r;g;b;i\n1;2;3;9;8;7;5\nNULL;null;N/A;1;1;1;1\n4;5;6;NA;na;-;none\n",
+                                        "1,2,3,9,8,7,500\n,,,1,1,1,1\n4,5,6,,,,\n",
+                                        "1 2 3 9 8 7 500\nNA NA NA 1 1 1 1\n4 5 6 - - - -\n"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        load_text(texts[i], NULL, &l);
+        if (l.points != 2)
+            fail_msg("%zu: %llu points, \"%s\", %s", i, (unsigned long long)l.points, l.guessed, l.err.message);
+        assert_int_equal(l.skipped, 1);
+        assert_point(&l, 1, 4, 5, 6);
+        assert_color(&l, 0, 9, 8, 7);
+        assert_color(&l, 1, 0, 0, 0);
+        loaded_finish(&l);
+    }
+    refused_text("1,2,3\n4,5\n", SPL_E_INPUT, "z", "line 2: z: column 3 of 3 is missing");
+}
+
 static void words_where_numbers_are_due_are_named(void **state)
 {
     static struct bytes b;
@@ -269,8 +329,8 @@ static void broken_text_is_refused(void **state)
     refused_text("1 2 3\n4 5 six\n", SPL_E_INPUT, "z", "\"six\"");
     refused_text("1,5;2,5;3.5\n", SPL_E_INPUT, "x", "\"1,5\"");
     refused_text("X,Y,Z\n1,2,3,4\n", SPL_E_INPUT, "", "line 2");
-    refused_text("1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
-    refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "intensity", "column 7");
+    refused_text("1 2 3 4\n1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
+    refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "blue", "column 7");
     b.length = 0;
     put(&b, "1 2 3\n4 5 6\n7 8\0009\n", 18); /* a zero byte makes it no text */
     refused(&b, NULL, SPL_E_INPUT, "", "no point cloud known");
@@ -390,6 +450,8 @@ int main(void)
         cmocka_unit_test(a_header_without_names_asks_for_columns),
         cmocka_unit_test(surveyors_names_are_coordinates),
         cmocka_unit_test(a_column_that_is_skipped_may_hold_text),
+        cmocka_unit_test(columns_of_text_are_left_out),
+        cmocka_unit_test(missing_values_are_known),
         cmocka_unit_test(words_where_numbers_are_due_are_named),
         cmocka_unit_test(decimal_commas_are_named),
         cmocka_unit_test(samples_are_checked_against_the_rest),

@@ -64,16 +64,38 @@ static void a_first_column_that_counts_is_no_x(void **state)
     }
 }
 
-/* What is left of more points, as every third one; in the order of x it is no number where y or z are whole ones. */
-static void numbers_with_gaps_are_no_x(void **state)
+/* A first column of whole numbers before three with fractions numbers the points in whatever order, and once for
+ * several: coordinates would be written alike. */
+static void numbers_in_any_order_are_no_x(void **state)
 {
     static const struct {
         unsigned lines;
         int step;
-        const char *z, *guessed;
+        const char *format, *guessed;
     } rows[] = {
-        {19, 3, "2.5", "x,y,z,intensity"}, {20, 3, "2.5", "-,x,y,z"},           {200, 1, "2.5", "-,x,y,z"},
-        {200, 3, "2", "x,y,z,intensity"},  {200, -1, "2.5", "x,y,z,intensity"}, {200, 0, "2.5", "x,y,z,intensity"},
+        {2, 3, "%d %d.25 %d.75 2.5\n", "x,y,z,intensity"},
+        {3, 3, "%d %d.25 %d.75 2.5\n", "-,x,y,z"},
+        {200, 1, "%d %d.25 %d.75 2.5\n", "-,x,y,z"},
+        {200, -1, "%d %d.25 %d.75 2.5\n", "-,x,y,z"},
+        {200, 0, "%d %d.25 %d.75 2.5 9 8 255\n", "-,x,y,z,red,green,blue"},
+        {200, 7, "%05d %d.25 %d.75 2.5\n", "-,x,y,z"},
+        {200, 3, "%d.0 %d.25 %d.75 2.5\n", "x,y,z,intensity"},
+        {200, 3, "-%d %d.25 %d.75 2.5\n", "x,y,z,intensity"},
+        /* x and y are alike, and z is no whole number where they are none */
+        {200, 1, "%d %d.25 %d.75 2\n", "x,y,z,intensity"},
+        {200, 1, "%d %d.25 %d.75 9 8 255\n", "x,y,z,red,green,blue"},
+        {200, 1, "%d %d %d.75 20\n", "x,y,z,intensity"},
+        {200, 1, "%d %d %d.75 2.5\n", "x,y,z,intensity"},
+        {200, 3, "%d %d %d 2\n", "x,y,z,intensity"},
+        /* a place on a map */
+        {1, 3, "%d 5000%02d.25 53000%02d.5 412.75\n", "-,x,y,z"},
+        {200, 0, "%d 5000%02d 53000%02d 412\n", "-,x,y,z"},
+        {200, -3, "%d 26000%02d 12000%02d 412\n", "-,x,y,z"},
+        {200, 3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "-,x,y,z"}, /* times */
+        {200, -3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
+        {200, 3, "-%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
+        {200, -3, "%d 5000%02d 53000%02d 41200\n", "x,y,z,intensity"},           /* millimetres */
+        {200, 3, "40%d12.5 3070%02d.25 49194%02d.5 120.5\n", "x,y,z,intensity"}, /* from the middle of the earth */
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -81,13 +103,27 @@ static void numbers_with_gaps_are_no_x(void **state)
         FILE *f = fopen(scratch_path(), "w");
         assert_non_null(f);
         for (unsigned k = 0; k < rows[i].lines; k++)
-            fprintf(f, "%d %d.25 %d.75 %s\n", 7000 + (int)k * rows[i].step, (int)(k * k % 50), (int)(k * 7 % 40),
-                    k == 5 ? rows[i].z : "1.5");
+            fprintf(f, rows[i].format, 7000 + (int)k * rows[i].step, (int)(k * k % 50), (int)(k * 7 % 40));
         fclose(f);
         load_path(scratch_path(), NULL, 100, &l);
-        assert_string_equal(l.guessed, rows[i].guessed);
+        if (strcmp(l.guessed, rows[i].guessed) != 0)
+            fail_msg("row %zu: \"%s\" instead of \"%s\"", i, l.guessed, rows[i].guessed);
         loaded_finish(&l);
     }
+}
+
+/* Several neighbours may look like a colour; opacity is none. */
+static void colors_are_near_each_other(void **state)
+{
+    static const struct guess guesses[] = {
+        {"1 2 3 90 80 85 255\n4 5 6 20 30 25 255\n", "x,y,z,red,green,blue,intensity", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 200 240 255 255\n4 5 6 190 255 255 255\n", "x,y,z,red,green,blue,intensity", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 0.5 0.4 0.45 1\n4 5 6 0.9 0.8 0.85 0\n", "x,y,z,red,green,blue,intensity", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 200 90 80 85\n4 5 6 100 20 30 25\n", "x,y,z,intensity,red,green,blue", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 200 5 90 80 85\n4 5 6 100 2 20 30 25\n", "x,y,z,intensity,-,red,green,blue", {1, 2, 3}, {4, 5, 6}},
+    };
+    (void)state;
+    CHECK(guesses);
 }
 
 static void a_first_column_of_names_is_skipped(void **state)
@@ -308,7 +344,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_first_column_that_counts_is_no_x),
-        cmocka_unit_test(numbers_with_gaps_are_no_x),
+        cmocka_unit_test(numbers_in_any_order_are_no_x),
+        cmocka_unit_test(colors_are_near_each_other),
         cmocka_unit_test(a_first_column_of_names_is_skipped),
         cmocka_unit_test(decimal_commas_are_read),
         cmocka_unit_test(decimal_commas_hold_for_all_lines),
