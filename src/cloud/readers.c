@@ -56,6 +56,8 @@ static bool is_pcd(const uint8_t *bytes, size_t available)
 
 static bool is_text(const uint8_t *bytes, size_t available)
 {
+    if (available > 0 && bytes[available - 1] == 0x1a) /* the end of file of old systems */
+        available--;
     for (size_t i = 0; i < available; i++)
         if ((bytes[i] < ' ' && !memchr("\t\n\f\r", bytes[i], 4)) || bytes[i] == 0x7f)
             return false;

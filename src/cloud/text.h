@@ -12,10 +12,11 @@ struct spl_layout {
     unsigned fields;
     unsigned first; /* recognised columns begin with x here: 1 where a point's number or name comes before */
     bool exact;     /* a line must have `fields` values, not more */
-    bool comma;     /* decimal commas */
+    char decimal;   /* of numbers as people write them: see spl_fields_written(); 0: as programs do */
+    char group;     /* likewise */
     bool surveyors; /* names: Y and X, the east and the north of German geodesy, are x and y here */
     bool doubtful;  /* names: they may be that, or not */
-    char separator; /* ' ', ',' or ';' */
+    char separator; /* ' ', ',', ';', '|' or '\t' */
     uint64_t texts; /* 1 << field of those that hold text, which are skipped */
 };
 
@@ -28,7 +29,8 @@ static inline struct spl_fields spl_layout_fields(const struct spl_layout *layou
 static inline enum spl_field spl_layout_number(const struct spl_layout *layout, struct spl_fields *fields,
                                                double *value)
 {
-    return layout->comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
+    return layout->decimal ? spl_fields_written(fields, layout->decimal, layout->group, value)
+                           : spl_fields_number(fields, value);
 }
 
 bool spl_layout_has(const struct spl_layout *layout, int column);
@@ -50,21 +52,24 @@ bool spl_text_names_degrees(const char *line, size_t length);
 int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
                            struct spl_error *err);
 
-/* Do the numbers of a text have decimal commas? All that is a number must be one so, over all lines that are added, and
- * one must have a comma. Zero-initialised. */
-struct spl_text_commas {
+/* Are the numbers of a text written as a layout says? All that looks like a number must be one so, over all lines that
+ * are added, and one must be none as programs write it. Zero-initialised. */
+struct spl_text_written {
     unsigned lines;
     size_t fields;
     bool found, bad;
 };
 
-/* `layout` has the separator and decimal commas that are tried; `named`: and columns. False: no more lines are asked
- * for, since this one is none or has another number of columns. */
-bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
-                         size_t length);
+/* `layout` has what is tried: separator, decimal and group; `named`: and columns. False: no more lines are asked for,
+ * since this one is none or has another number of columns. */
+bool spl_text_written_add(struct spl_text_written *written, const struct spl_layout *layout, bool named,
+                          const char *line, size_t length);
 
-/* A text before three numbers. */
-bool spl_text_names_point(const char *line, size_t length, char separator, bool comma);
+/* Two tabs or more lie in a line, and something between any of them. */
+bool spl_text_is_tabbed(const char *line, size_t length);
+
+/* A text before three numbers, of the layout's kind. */
+bool spl_text_names_point(const struct spl_layout *layout, const char *line, size_t length);
 
 /* Whole numbers that may be what is before and behind decimal commas, where commas separate columns too. */
 struct spl_text_pairs {
@@ -78,6 +83,7 @@ struct spl_text_pairs {
 /* Which columns hold numbers, and which text. Zero-initialised. */
 struct spl_text_kinds {
     unsigned lines, fields; /* fields: of the last line */
+    unsigned most;          /* fields of any line */
     unsigned leading;       /* numbers before the first text, which the first column may be */
     bool ragged, uneven;    /* lines have not all as many fields; not all as many leading numbers */
     unsigned numbers[SPL_TEXT_FIELDS], texts[SPL_TEXT_FIELDS];
@@ -107,6 +113,9 @@ struct spl_text_look {
 
 /* False when the line has other than layout->fields values. */
 bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length);
+
+/* Does the first column count by one? */
+bool spl_text_look_counts(const struct spl_text_look *look);
 
 /* layout->first, and the column from which on commas are both decimal ones and separators, else -1. */
 unsigned spl_text_look_first(const struct spl_text_look *look);

@@ -10,16 +10,29 @@
 #include "cloud/fields.h"
 #include "cloud/text.h"
 
+bool spl_text_is_tabbed(const char *line, size_t length)
+{
+    unsigned tabs = 0;
+    bool empty = true;
+    for (size_t i = 0; i < length; i++) {
+        if (line[i] == '\t' && empty)
+            return false;
+        tabs += line[i] == '\t';
+        empty = line[i] == '\t' || (empty && line[i] == ' ');
+    }
+    return tabs > 1;
+}
+
 char spl_text_separator(const char *line, size_t length)
 {
     char found = ' ';
     bool quoted = false;
     for (size_t i = 0; i < length && found != ';'; i++) {
         quoted ^= line[i] == '"';
-        if (!quoted && (line[i] == ';' || line[i] == ','))
+        if (!quoted && (line[i] == ';' || (line[i] == '|' && found != ';') || (line[i] == ',' && found == ' ')))
             found = line[i];
     }
-    return found;
+    return found == ' ' && spl_text_is_tabbed(line, length) ? '\t' : found;
 }
 
 bool spl_layout_has(const struct spl_layout *layout, int column)

@@ -39,22 +39,16 @@ static bool take_whole(struct spl_fields *fields, struct whole *whole)
     return true;
 }
 
-static enum spl_field take_number(bool comma, struct spl_fields *fields, double *value)
+bool spl_text_names_point(const struct spl_layout *layout, const char *line, size_t length)
 {
-    return comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
-}
-
-bool spl_text_names_point(const char *line, size_t length, char separator, bool comma)
-{
-    struct spl_fields fields = spl_fields_begin(line, length, separator);
+    struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
     double v;
     size_t length_of;
-    struct spl_fields first = fields;
-    if (take_number(comma, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
+    if (spl_layout_number(layout, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
         length_of == 0)
         return false;
     for (int i = 0; i < 3; i++)
-        if (take_number(comma, &fields, &v) != SPL_FIELD_OK)
+        if (spl_layout_number(layout, &fields, &v) != SPL_FIELD_OK)
             return false;
     return true;
 }
@@ -87,33 +81,45 @@ bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *l
     kinds->ragged |= kinds->lines && i != kinds->fields;
     kinds->uneven |= kinds->lines && leading != kinds->leading;
     kinds->fields = i;
+    kinds->most = i > kinds->most ? i : kinds->most;
     kinds->leading = leading;
     return ++kinds->lines < SPL_TEXT_SAMPLE;
 }
 
-bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
-                         size_t length)
+/* Of nothing but digits and what lies between them. */
+static bool looks_like_number(const char *text, size_t length)
+{
+    bool digit = false;
+    for (size_t i = 0; i < length; i++) {
+        if (!strchr("0123456789+-.,'eE ", text[i]) && !(text[i] & 0x80))
+            return false;
+        digit |= text[i] >= '0' && text[i] <= '9';
+    }
+    return digit && strchr("0123456789+-.", *text);
+}
+
+bool spl_text_written_add(struct spl_text_written *written, const struct spl_layout *layout, bool named,
+                          const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
-    size_t count = spl_fields_count(line, length, layout->separator), ignored;
-    bool names = !named && count > 3 && spl_text_names_point(line, length, layout->separator, true);
-    bool same = named || commas->lines == 0 || count == commas->fields; /* names: the last may be empty */
-    commas->fields = count;
+    size_t count = spl_fields_count(line, length, layout->separator), size;
+    bool same = named || written->lines == 0 || count == written->fields; /* names: the last may be empty */
+    written->fields = count;
     if (!same || count < 3)
         return false;
-    commas->lines++;
-    for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !commas->bad; i++) {
-        struct spl_fields field = fields;
+    written->lines++;
+    for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {
+        struct spl_fields field = fields, plain = fields;
         double v;
-        spl_fields_text(&fields, &ignored);
-        if (named ? i >= layout->fields || layout->column[i] < 0 : names && i == 0)
+        spl_fields_text(&fields, &size);
+        if (named && (i >= layout->fields || layout->column[i] < 0))
             continue;
-        bool empty = field.separator == ';' && ignored == 0;
-        commas->bad = !empty && spl_layout_number(layout, &field, &v) != SPL_FIELD_OK;
-        for (size_t k = 0; k < ignored; k++)
-            commas->found |= fields.start[k] == ',';
+        bool good = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
+        written->found |= good && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
+        written->bad |=
+            !good && (named ? !spl_text_is_missing(fields.start, size) : looks_like_number(fields.start, size));
     }
-    return !commas->bad;
+    return !written->bad;
 }
 
 static void look_at_pairs(struct spl_text_look *look, unsigned at, const struct whole *all, unsigned count)
@@ -143,7 +149,7 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
     size_t found = spl_fields_count(line, length, layout->separator);
     if (layout->exact ? found != layout->fields : found < layout->fields)
         return false;
-    bool names = spl_text_names_point(line, length, layout->separator, layout->comma);
+    bool names = spl_text_names_point(layout, line, length);
     while (count < layout->fields && take_whole(&fields, &all[count])) {
         whole &= all[count].is || (names && count == 0);
         count++;
@@ -175,7 +181,7 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
     return true;
 }
 
-static bool counts(const struct spl_text_look *look)
+bool spl_text_look_counts(const struct spl_text_look *look)
 {
     return !look->bare && !look->unsorted && look->lines >= COUNTED_LINES;
 }
@@ -189,7 +195,7 @@ static bool is_numbered(const struct spl_text_look *look)
         return fine[2] && !look->bare && look->lines >= COUNTED_LINES;
     if (fine[1]) /* z, behind x and y of whole numbers */
         return false;
-    return counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
+    return spl_text_look_counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
 }
 
 unsigned spl_text_look_first(const struct spl_text_look *look)
@@ -204,7 +210,7 @@ int spl_text_look_doubled(const struct spl_text_look *look, char separator)
         const struct spl_text_pairs *pairs = &look->pairs[at];
         bool several = (pairs->zeros & (pairs->zeros - 1)) != 0;
         bool even = !pairs->uneven && pairs->digits > 1;
-        bool behind = at == 0 || !look->unnamed || counts(look);
+        bool behind = at == 0 || !look->unnamed || spl_text_look_counts(look);
         if (!pairs->bad && behind && (several || (even && pairs->zeros) || pairs->parted))
             return at;
     }
