@@ -86,7 +86,7 @@ static bool is_skipped(const char *name, size_t length)
 int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
                            struct spl_error *err)
 {
-    struct spl_fields fields = spl_fields_begin(columns, strlen(columns), ',');
+    struct spl_fields fields = spl_fields_begin(columns, strlen(columns), strchr(columns, ',') ? ',' : ' ');
     enum spl_field got;
     size_t length;
     *layout = (struct spl_layout){0};

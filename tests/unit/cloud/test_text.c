@@ -52,6 +52,9 @@ static void named_columns(void **state)
     assert_int_equal(l.first.classification[0], 6);
     assert_int_equal(l.attributes, SPL_CLOUD_CLASS);
     loaded_finish(&l);
+    load_text("9 8 7 6 1 2 3\n9 8 7 7 4 5 6\n", "text - -  class x y z", &l);
+    assert_point(&l, 1, 4, 5, 6);
+    loaded_finish(&l);
     load_text("easting northing height whatever\n1 2 3 4\n", "x,y,z", &l); /* columns past the option's are skipped */
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
