@@ -199,9 +199,12 @@ static bool rewrite(const char *p, const char *end, char decimal, char group, ch
             fraction = true;
         } else if (*p == '.' || *p == ',')
             return false;
+        static const char minus[] = "\xe2\x88\x92";
+        bool long_minus = (size_t)(end - p) >= sizeof minus - 1 && !memcmp(p, minus, sizeof minus - 1);
+        bool exponent = (*p | 32) == 'd' && n && (is_digit(out[n - 1]) || out[n - 1] == '.'); /* as Fortran writes it */
         digits += !fraction && is_digit(*p);
-        out[n++] = *p == decimal ? '.' : *p;
-        p++;
+        out[n++] = *p == decimal ? '.' : long_minus ? '-' : exponent ? 'e' : *p;
+        p += long_minus ? sizeof minus - 1 : 1;
     }
     out[n] = 0;
     return p == end && (!parted || fraction || digits == 3);

@@ -32,7 +32,7 @@ enum spl_field spl_fields_number(struct spl_fields *fields, double *value);
 
 /* The same of a number as people write it: with `decimal`, '.' or ',', which as a comma lies between digits; digits in
  * threes, which `group` parts (0: nothing), or an apostrophe, a blank of any width where those separate no fields; in
- * quotes too. */
+ * quotes, with a typographer's minus or a Fortran's exponent too. */
 enum spl_field spl_fields_written(struct spl_fields *fields, char decimal, char group, double *value);
 
 /* Takes the next field whatever it is; its text is [fields->start, fields->start + *length), quotes taken off;

@@ -85,12 +85,16 @@ struct spl_text_kinds {
     unsigned lines, fields; /* fields: of the last line */
     unsigned most;          /* fields of any line */
     unsigned leading;       /* numbers before the first text, which the first column may be */
+    bool fraction;          /* the first column is not of whole numbers alone */
     bool ragged, uneven;    /* lines have not all as many fields; not all as many leading numbers */
     unsigned numbers[SPL_TEXT_FIELDS], texts[SPL_TEXT_FIELDS];
 };
 
 /* False when enough lines were added. */
 bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length);
+
+/* Where three columns of numbers begin, behind texts and a whole number that may be before those; else 0. */
+unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields);
 
 /* Does a field say that it has no value: "", "-", "NULL", "n/a", …? */
 bool spl_text_is_missing(const char *text, size_t length);

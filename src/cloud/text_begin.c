@@ -220,7 +220,8 @@ static int recognise(struct spl_cloud *cloud, struct spl_error *err)
     int doubled = spl_text_look_doubled(&look, text->layout.separator);
     if (doubled >= 0)
         return refuse_doubled(cloud, doubled, err);
-    text->layout.first = spl_text_look_first(&look);
+    unsigned behind = spl_text_kinds_first(&kinds, text->layout.fields);
+    text->layout.first = behind ? behind : spl_text_look_first(&look);
     begin_again(cloud);
     while ((code = next_sample(cloud, &line, &length, err)) > 0)
         if (!spl_text_sample_add(&sample, &text->layout, line, length) || sample.lines == SPL_TEXT_SAMPLE)

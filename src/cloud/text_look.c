@@ -75,6 +75,7 @@ bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *l
             break;
         bool text = !number && !spl_text_is_missing(fields.start, size);
         kinds->numbers[i] += number;
+        kinds->fraction |= i == 0 && number && v != floor(v);
         kinds->texts[i] += text;
         leading += leading == i && (!text || i == 0);
     }
@@ -91,11 +92,25 @@ static bool looks_like_number(const char *text, size_t length)
 {
     bool digit = false;
     for (size_t i = 0; i < length; i++) {
-        if (!strchr("0123456789+-.,'eE ", text[i]) && !(text[i] & 0x80))
+        if (!strchr("0123456789+-.,'eEdD ", text[i]) && !(text[i] & 0x80))
             return false;
         digit |= text[i] >= '0' && text[i] <= '9';
     }
     return digit && strchr("0123456789+-.", *text);
+}
+
+unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields)
+{
+    unsigned run = 0;
+    for (unsigned i = 0; i < fields; i++) {
+        bool text = kinds->texts[i] > kinds->numbers[i];
+        run = text ? 0 : run + 1;
+        if (run == 3)
+            return i - 2;
+        if (!text && (i > 0 || kinds->fraction) && (i + 1 == fields || kinds->texts[i + 1] > kinds->numbers[i + 1]))
+            return 0; /* a number before a text, which may be x */
+    }
+    return 0;
 }
 
 bool spl_text_written_add(struct spl_text_written *written, const struct spl_layout *layout, bool named,
@@ -105,7 +120,7 @@ bool spl_text_written_add(struct spl_text_written *written, const struct spl_lay
     size_t count = spl_fields_count(line, length, layout->separator), size;
     bool same = named || written->lines == 0 || count == written->fields; /* names: the last may be empty */
     written->fields = count;
-    if (!same || count < 3)
+    if (!same || count < 3 || (!named && count > SPL_TEXT_FIELDS))
         return false;
     written->lines++;
     for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {

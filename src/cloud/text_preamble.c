@@ -113,6 +113,30 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
             : "");
 }
 
+/* A line of units below headings: "m;m;m;0-255", "[m] [m] [m]". */
+static bool is_units(const struct spl_layout *layout, const char *line, size_t length)
+{
+    struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
+    unsigned found = 0;
+    for (unsigned i = 0; i < layout->fields; i++) {
+        size_t size;
+        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
+            break;
+        const char *unit = fields.start;
+        if (size > 2 && strchr("[(", unit[0]) && strchr("])", unit[size - 1])) {
+            unit++;
+            size -= 2;
+        }
+        static const char *const units[] = {"m",     "mm",    "cm",     "km",     "ft",  "us-ft",
+                                            "meter", "metre", "meters", "metres", "feet"};
+        for (size_t k = 0;
+             k < sizeof units / sizeof *units && layout->column[i] >= SPL_COLUMN_X && layout->column[i] <= SPL_COLUMN_Z;
+             k++)
+            found += strlen(units[k]) == size && !strncasecmp(units[k], unit, size);
+    }
+    return found == 3;
+}
+
 int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **line, size_t *length,
                            struct spl_error *err)
 {
@@ -151,13 +175,15 @@ int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **li
             }
             continue;
         }
-        if (!header && !text->counted && spl_text_is_count(*line, *length, &text->count)) {
+        if (!text->counted && spl_text_is_count(*line, *length, &text->count)) {
             text->counted = true;
             code = spl_text_check_count(source, text->count, err);
             if (code < 0)
                 return code;
             continue;
         }
+        if (header && is_units(layout, *line, *length))
+            continue;
         if (header || is_data(*named ? layout : NULL, *line, *length)) { /* only one line has names */
             if (*named || !first.code)
                 return SPL_OK;

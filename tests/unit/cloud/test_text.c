@@ -372,6 +372,8 @@ static void the_option_is_checked(void **state)
     refused(&b, "x,y,z,-,class", SPL_E_INPUT, "class", "column 5");
 }
 
+#define BYTES(text) text, sizeof(text) - 1
+
 /* By name, with the way out; a mesh's faces and normals would else be points. */
 static void what_is_no_scan_is_named(void **state)
 {
@@ -380,8 +382,8 @@ static void what_is_no_scan_is_named(void **state)
         size_t length;
         const char *message;
     } files[] = {
-        {"\x1f\x8b\x08\0\0", 5, "is packed with gzip: unpack it first"},
-        {"PK\3\4\0\0", 6, "is a ZIP file"},
+        {BYTES("\x1f\x8b\x08\0\0"), "is packed with gzip: unpack it first"},
+        {BYTES("PK\3\4\0\0"), "is a ZIP file"},
         {"\xff\xfe"
          "1\0 \0"
          "2\0",
@@ -389,16 +391,16 @@ static void what_is_no_scan_is_named(void **state)
         {"1\0 \0"
          "2\0 \0",
          8, "may be text in UTF-16"},
-        {"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1 2 3\n", 42, "is a model of Wavefront's (OBJ)"},
-        {"# by hand\r\n\r\nmtllib a.mtl\r\nv 0 0 0\r\n", 39, "is a model of Wavefront's (OBJ)"},
-        {"ncols 3\nnrows 1\nxllcorner 0\n1 2 3\n", 36, "is a raster of heights (Esri's grid)"},
-        {"NCOLS 3\nNROWS 1\n1 2 3\n", 23, "is a raster of heights (Esri's grid)"},
-        {"# vtk DataFile Version 3.0\nx y z\n1 2 3\n", 39, "is a VTK file"},
-        {"OFF\n3 0 0\n1 2 3\n", 16, "is a mesh (OFF)"},
-        {"{\"type\":1}", 10, "is JSON"},
-        {"<!DOCTYPE HTML>404", 18, "is a web page"},
-        {"II*\0abc", 7, "is a TIFF"},
-        {"II*abc", 6, "no column has this name"},
+        {BYTES("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1 2 3\n"), "is a model of Wavefront's (OBJ)"},
+        {BYTES("# by hand\r\n\r\nmtllib a.mtl\r\nv 0 0 0\r\n"), "is a model of Wavefront's (OBJ)"},
+        {BYTES("ncols 3\nnrows 1\nxllcorner 0\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
+        {BYTES("NCOLS 3\nNROWS 1\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
+        {BYTES("# vtk DataFile Version 3.0\nx y z\n1 2 3\n"), "is a VTK file"},
+        {BYTES("OFF\n3 0 0\n1 2 3\n"), "is a mesh (OFF)"},
+        {BYTES("{\"type\":1}"), "is JSON"},
+        {BYTES("<!DOCTYPE HTML>404"), "is a web page"},
+        {BYTES("II*\0abc"), "is a TIFF"},
+        {BYTES("II*abc"), "no column has this name"},
     };
     static struct bytes b;
     struct loaded l;

@@ -135,11 +135,15 @@ static void a_first_column_of_names_is_skipped(void **state)
         {"# by hand\nBaum\t1\t2\t3\nHaus\t4\t5\t6\n", "-,x,y,z", {1, 2, 3}, {4, 5, 6}},
         {"P1\t1,5\t2,5\t3,5\nP2\t4,5\t5\t6\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
         {"P1;1,5;2,5;3,5\nP2;4,5;5;6\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
+        {"2020-01-01 12:30:05 1 2.5 3\n2020-01-01 12:30:06 4 5 6.5\n", "-,-,x,y,z", {1, 2.5, 3}, {4, 5, 6.5}},
+        {"7,Oak,1.5,2,3,0.4\n9,Elm,4,5,6,0.3\n", "-,-,x,y,z,intensity", {1.5, 2, 3}, {4, 5, 6}},
     };
     (void)state;
     CHECK(guesses);
     refused_text("P1,1,2,3\n2,4,5,6\n", SPL_E_INPUT, "x",
                  "\"P1\" in column 1 is not a number; where it names points, --columns -,x,y,z");
+    refused_text("1 2 Oak 3 9 0 255\n4 5 Elm 6 9 9 9\n", SPL_E_INPUT, "z", "\"Oak\" in column 3 is not a number");
+    refused_text("1.5 Oak 2 3 4\n4 Elm 6 9 9\n", SPL_E_INPUT, "y", "\"Oak\" in column 2 is not a number");
     refused_text("P1,1,2\n", SPL_E_INPUT, "x", "there are \"P1,1,2\"");
     refused_text("P1,1,b,3\n", SPL_E_INPUT, "x", "no column has this name");
 }
@@ -206,6 +210,12 @@ static void numbers_are_read_as_people_write_them(void **state)
         {"\"1,234.5\",\"2\",\"3\"\n1,2,3\n", "x,y,z", {1234.5, 2, 3}, {1, 2, 3}},
         {"\"1\" \"8.5\" \"1\" \"2\"\n2 7 1 2\n3 6 1 2\n", "-,x,y,z", {8.5, 1, 2}, {6, 1, 2}},
         {"1,5;2;3;TREE\n4;5;6;EDGE\n", "x,y,z,text", {1.5, 2, 3}, {4, 5, 6}},
+        {"\xe2\x88\x92"
+         "1.5 2 3\n1 2 3\n",
+         "x,y,z",
+         {-1.5, 2, 3},
+         {1, 2, 3}},
+        {"1.5D+02 2.D0 3d-1\n1 2 3\n", "x,y,z", {150, 2, 0.3}, {1, 2, 3}},
         {"x|y|z\n1|2|3\n4|5|6\n", "", {1, 2, 3}, {4, 5, 6}},
     };
     (void)state;
@@ -244,9 +254,16 @@ static void what_stands_before_the_numbers_is_passed_over(void **state)
         {"\"x\",\"y\",\"z\"\n\"a\",1,2,3\n\"b\",4,5,6\n", "", {1, 2, 3}, {4, 5, 6}}, /* R's names of rows */
         {"x y z\n1 1 2 3\n2 7 7 7\n3 4 5 6\n", "", {1, 2, 3}, {4, 5, 6}},
     };
+    static const struct guess below[] = {
+        {"X;Y;Z;R;G;B\nm;m;m;0-255;0-255;0-255\n1;2;3;9;8;255\n4;5;6;1;1;1\n", "", {1, 2, 3}, {4, 5, 6}},
+        {"id x y z\n- [m] [m] [m]\n7 1 2 3\n8 4 5 6\n", "", {1, 2, 3}, {4, 5, 6}},
+        {"x y z\n2\n1 2 3\n4 5 6\n", "", {1, 2, 3}, {4, 5, 6}},
+        {"//X Y Z\n2\n1 2 3\n4 5 6\n", "", {1, 2, 3}, {4, 5, 6}},
+    };
     struct loaded l;
     (void)state;
     CHECK(guesses);
+    CHECK(below);
     load_text("Scan of a hall\nOperator Smith\nP 1 2 3\n", "-,x,y,z", &l);
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
