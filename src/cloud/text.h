@@ -129,6 +129,7 @@ int spl_text_look_doubled(const struct spl_text_look *look, char separator);
  * nothing. */
 struct spl_text_sample {
     unsigned lines;
+    bool elsewhere;                 /* x has not seven digits, or y not six, somewhere */
     bool given[SPL_TEXT_FIELDS];    /* some value is a number */
     bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer */
     bool clear[SPL_TEXT_FIELDS];    /* some value is not what is opaque */

@@ -229,6 +229,7 @@ static int recognise(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     spl_layout_recognise(&text->layout, &sample);
+    cloud->info.north_first = sample.lines && !sample.elsewhere;
     tell_guess(cloud);
     return SPL_OK;
 }

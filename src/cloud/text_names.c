@@ -184,7 +184,10 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
         numbered |= !stage && IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && IS_ONE_OF(heights, name, length) && layout->column[i] == SPL_COLUMN_Z;
         bool either = stage == 2 && numbered && is(name, length, "z"); /* a German number, no German height */
-        stage = stage == 1 && is(name, length, "x") ? 2 : is(name, length, "y") ? 1 : 0;
+        int axis = is(name, length, "x")   ? SPL_COLUMN_X
+                   : is(name, length, "y") ? SPL_COLUMN_Y
+                                           : column_from_synonym(name, length, false, PASS_AXES);
+        stage = stage == 1 && axis == SPL_COLUMN_X ? 2 : axis == SPL_COLUMN_Y ? 1 : 0;
         layout->doubtful |= either || (height && !numbered);
         if (height && numbered) {
             layout->surveyors = true;

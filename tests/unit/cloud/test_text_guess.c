@@ -416,12 +416,11 @@ static void many_headings_are_cut(void **state)
 
 static void surveyors_y_is_the_east(void **state)
 {
-    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n", "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
+    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n",           "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
                                         "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n",
-
-                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n"};
+                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n",         "Nr;Y-Wert;X-Wert;H\xc3\xb6he\n7;1;2;3\n"};
     static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n",
-                                           "PtNr Y X Z\nP1 1 2 3\n"};
+                                           "PtNr Y X Z\nP1 1 2 3\n", "Y-Koordinate;X-Koordinate;H\n1;2;3\n"};
     struct loaded l;
     (void)state;
     for (size_t i = 0; i < sizeof meant / sizeof *meant; i++) {

@@ -205,6 +205,12 @@ static void test_guesses_are_noted(void **state)
          "a.txt: columns are -,x,y,z by their values, of which the first numbers or names the points; --columns says "
          "otherwise\n"},
         {"", "%d.5 %d 4 0 0 1\n", "a.txt: columns are x,y,z,nx,ny,nz by their values; --columns says otherwise\n"},
+        {"", "53000%02d.5 5000%02d.25 3\n",
+         "a.txt: x has seven digits and y six, as where the north comes before the east: then y and x change places in "
+         "--columns\n"},
+        {"", "5000%02d.5 53000%02d.25 3\n", ""},
+        {"", "26000%02d.5 12000%02d.25 3\n", ""},
+        {"x y z\n", "53000%02d.5 5000%02d.25 3\n", ""},
         {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
         {"Nr Y X H\n", "P%d %d 4 3\n",
          "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
