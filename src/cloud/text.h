@@ -108,9 +108,12 @@ struct spl_text_look {
     bool unnamed;           /* it is no text everywhere */
     bool varies;            /* the one behind it does */
     bool fraction;          /* not all are whole numbers */
+    bool strewn[2]; /* the first two do not rise line by line, the first before the second, or the other way round */
+    bool coarse;    /* they are no small whole numbers, or too few follow */
+    bool inner[3];  /* of the three behind the first two, some are no whole numbers */
     bool near;              /* the three behind it are not a place on a map: two of six digits, and a height */
     bool fine[3];           /* of the three behind it, some are no whole numbers */
-    uint64_t last;
+    uint64_t last, second;
     double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */
 };
@@ -131,6 +134,7 @@ struct spl_text_sample {
     unsigned lines;
     bool elsewhere;                 /* x has not seven digits, or y not six, somewhere */
     bool given[SPL_TEXT_FIELDS];    /* some value is a number */
+    bool above[SPL_TEXT_FIELDS];    /* with the next: they are not the number of an echo and of how many there are */
     bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer */
     bool clear[SPL_TEXT_FIELDS];    /* some value is not what is opaque */
     double apart[SPL_TEXT_FIELDS];  /* how far its values are from those of the next column, in all */

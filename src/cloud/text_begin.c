@@ -165,6 +165,9 @@ static int check_names(struct spl_cloud *cloud, struct spl_error *err)
         return refuse_doubled(cloud, 0, err);
     if (code == SPL_OK && !kinds.ragged && kinds.fields == layout->fields + 1 && layout->fields < SPL_TEXT_FIELDS)
         code = find_row_names(cloud, err);
+    unsigned last = layout->fields - 1; /* words, with separators between them */
+    if (layout->column[last] < 0 && kinds.texts[last] > kinds.numbers[last])
+        layout->exact = false;
     for (unsigned i = 0; code == SPL_OK && i < layout->fields; i++) {
         int column = layout->column[i];
         bool may = column >= SPL_COLUMN_CLASS && column < SPL_COLUMN_KEPT && !(named >> column & 1);

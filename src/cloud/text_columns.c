@@ -137,6 +137,7 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
         sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
         sample->clear[i] |= v[i] != 255;
+        sample->above[i] |= i + 1 == layout->fields || !(v[i] >= 1 && v[i] <= v[i + 1] && v[i + 1] <= 15);
         if (i + 1 < layout->fields && isfinite(v[i + 1]))
             sample->apart[i] += fabs(v[i] - v[i + 1]);
     }
@@ -165,7 +166,8 @@ static bool is_color(const struct spl_text_sample *s, unsigned i)
         integers &= !s->fraction[k] && !s->wide[k];
         unit &= !s->bright[k];
     }
-    return integers || unit;
+    bool echoes = !s->above[i + 1] && s->above[i]; /* behind an intensity */
+    return (integers || unit) && !echoes;
 }
 
 static void set3(struct spl_layout *layout, unsigned at, int column)
@@ -222,6 +224,11 @@ void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sampl
     for (unsigned i = behind; i < layout->fields && i < behind + 4; i++)
         if (is_free(layout, sample, i)) {
             layout->column[i] = SPL_COLUMN_INTENSITY;
+            if (is_free(layout, sample, i + 1) && is_free(layout, sample, i + 2) && !sample->above[i + 1] &&
+                !sample->fraction[i + 1] && !sample->fraction[i + 2]) {
+                layout->column[i + 1] = SPL_COLUMN_RETURN;
+                layout->column[i + 2] = SPL_COLUMN_RETURNS;
+            }
             break;
         }
 }

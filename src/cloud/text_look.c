@@ -5,7 +5,8 @@
  * A first column of whole numbers that stands before three with fractions is none of the coordinates, which would be
  * written alike: x is whole only where y is, and z only where both are. Where that does not decide, one that counts by
  * one numbers the points; but it may also be x along a row of a grid of whole metres, and there y stays the same. And
- * two columns of six digits before one of four are a place on a map, whatever stands before them. */
+ * two columns of six digits before one of four are a place on a map, whatever stands before them. Two columns of small
+ * whole numbers that rise as in a grid are a station's rows and columns, where the three behind them have fractions. */
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -16,6 +17,7 @@
 /* Fewer count by chance; of nothing but whole numbers a diagonal does. */
 enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
 static const double map_least = 1e5, height_most = 1e4;
+static const uint64_t cells = 100000; /* of a side of a station's grid, at most */
 
 /* The next field as a whole number, with zeros in front and a sign if need be. */
 struct whole {
@@ -157,7 +159,7 @@ static void look_at_pairs(struct spl_text_look *look, unsigned at, const struct 
 bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
-    struct whole all[SPL_TEXT_FIELDS];
+    struct whole all[SPL_TEXT_FIELDS] = {0};
     double v = 0;
     unsigned count = 0;
     bool whole = true;
@@ -183,6 +185,15 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
                              n < fabs(of[1]));
     for (int i = 0; i < 3; i++)
         look->fine[i] |= place && !all[1 + i].is;
+    bool grid = numbers && count > 4 && all[0].is && !all[0].sign && all[1].is && !all[1].sign;
+    grid &= all[0].value < cells && all[1].value < cells;
+    look->coarse |= !grid;
+    for (int i = 0; i < 3; i++)
+        look->inner[i] |= !all[2 + i].is;
+    bool first_stays = all[0].value == look->last, second_stays = all[1].value == look->second;
+    look->strewn[0] |= look->lines && !(all[0].value > look->last || (first_stays && all[1].value > look->second));
+    look->strewn[1] |= look->lines && !(all[1].value > look->second || (second_stays && all[0].value > look->last));
+    look->second = count > 1 ? all[1].value : 0;
     look->first = n;
     look->y = of[0];
     look->last = count > 0 ? all[0].value : 0;
@@ -215,6 +226,10 @@ static bool is_numbered(const struct spl_text_look *look)
 
 unsigned spl_text_look_first(const struct spl_text_look *look)
 {
+    bool cell =
+        !look->coarse && look->inner[0] && look->inner[1] && look->inner[2] && (!look->strewn[0] || !look->strewn[1]);
+    if (cell && look->lines >= COUNTED_LINES)
+        return 2;
     return look->lines > 0 && (is_numbered(look) || !look->unnamed);
 }
 

@@ -206,6 +206,10 @@ bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *kee
     while (next_name(&fields, &name, &size)) {
         if (layout->fields == SPL_TEXT_FIELDS)
             return false;
+        if (size > 2 && memmem(name, size, "[]", 2)) { /* a list, as long as it may be: COLMAP's TRACK[] */
+            layout->exact = false;
+            break;
+        }
         uint32_t taken = spl_layout_taken(layout);
         int column = spl_keep_find_column(keep, taken, name, size);
         if (column < 0)

@@ -126,6 +126,57 @@ static void colors_are_near_each_other(void **state)
     CHECK(guesses);
 }
 
+/* As FARO's program writes them, before x y z; whole metres of a grid have no two fractions behind z. */
+static void rows_and_columns_of_a_station_are_no_place(void **state)
+{
+    static const struct guess guesses[] = {
+        {"0 0 1.5 2.5 3.5\n1 0 4.5 5.5 6.5\n3 0 1.5 1.5 1.5\n0 1 4 5.5 6\n", "-,-,x,y,z", {1.5, 2.5, 3.5}, {4, 5.5, 6}},
+        {"0 0 1.5 2.5 3\n1 0 4.5 5.5 6\n3 0 1.5 1.5 1\n0 1 4 5.5 6\n", "x,y,z,intensity,-", {0, 0, 1.5}, {0, 1, 4}},
+        {"0 0 1.5 2.5 3.5\n1 0 4.5 5.5 6.5\n3 0 0 0 0\n0 1 4.5 5.5 6.25\n",
+         "-,-,x,y,z",
+         {1.5, 2.5, 3.5},
+         {4.5, 5.5, 6.25}},
+        {"7 0 1.5 2.5 3.5 9 0 255\n7 1 4.5 5.5 6.5 1 1 1\n8 0 4.5 5.5 6.25 1 1 1\n",
+         "-,-,x,y,z,red,green,blue",
+         {1.5, 2.5, 3.5},
+         {4.5, 5.5, 6.25}},
+        {"1 9 1.5 2.5 3.5\n0 1 4.5 5.5 6.5\n7 7 4.5 5.5 6.25\n", "x,y,z,intensity,-", {1, 9, 1.5}, {7, 7, 4.5}},
+        {"100000 0 1.5 2.5 3.5\n100001 0 4.5 5.5 6.5\n100002 0 1.5 1.5 1.5\n",
+         "x,y,z,intensity,-",
+         {100000, 0, 1.5},
+         {100002, 0, 1.5}},
+        {"0 0 1.5 20\n1 0 4.5 30\n2 0 1.5 40\n", "x,y,z,intensity", {0, 0, 1.5}, {2, 0, 1.5}},
+    };
+    (void)state;
+    CHECK(guesses);
+}
+
+static void echoes_are_no_colors(void **state)
+{
+    static const struct guess guesses[] = {
+        {"1 2 3 200 1 1\n4 5 6 17 1 2\n", "x,y,z,intensity,return_number,number_of_returns", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 200 1 1\n4 5 6 17 3 2\n", "x,y,z,red,green,blue", {1, 2, 3}, {4, 5, 6}},
+        {"1 2 3 1 1 1\n4 5 6 1 2 3\n", "x,y,z,red,green,blue", {1, 2, 3}, {4, 5, 6}},
+    };
+    (void)state;
+    CHECK(guesses);
+}
+
+static void lines_may_end_in_lists(void **state)
+{
+    static const struct guess guesses[] = {
+        {"#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n1 1 2 3 9 8 7 0.5 1 2 3 4\n"
+         "7 4 5 6 9 8 7 0.5\n",
+         "",
+         {1, 2, 3},
+         {4, 5, 6}},
+        {"Nr,X,Y,Z,Text\n1,1,2,3,tree, oak\n2,4,5,6,edge\n", "", {1, 2, 3}, {4, 5, 6}},
+    };
+    (void)state;
+    CHECK(guesses);
+    refused_text("Nr,X,Y,Z,Size\n1,1,2,3,8,9\n", SPL_E_INPUT, "", "has more than the 5 columns");
+}
+
 static void a_first_column_of_names_is_skipped(void **state)
 {
     static const struct guess guesses[] = {
@@ -462,6 +513,9 @@ int main(void)
         cmocka_unit_test(a_first_column_that_counts_is_no_x),
         cmocka_unit_test(numbers_in_any_order_are_no_x),
         cmocka_unit_test(colors_are_near_each_other),
+        cmocka_unit_test(rows_and_columns_of_a_station_are_no_place),
+        cmocka_unit_test(echoes_are_no_colors),
+        cmocka_unit_test(lines_may_end_in_lists),
         cmocka_unit_test(a_first_column_of_names_is_skipped),
         cmocka_unit_test(decimal_commas_are_read),
         cmocka_unit_test(numbers_are_read_as_people_write_them),
