@@ -117,6 +117,7 @@ static const struct {
     {"ncols ", 6, "is a raster of heights (Esri's grid) and no scan; \"gdal_translate -of XYZ\" makes points of it"},
     {"DSAA", 4, "is a raster of heights (Surfer's grid) and no scan; \"gdal_translate -of XYZ\" makes points of it"},
     {"# vtk DataFile", 14, "is a VTK file: write it as PLY first"},
+    {"# timestamp tx ty tz", 20, "is a trajectory and no scan"},
     {"solid ", 6, "is a mesh (STL) and no scan"},
     {"OFF\n", 4, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
     {"OFF\r", 4, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
@@ -150,6 +151,8 @@ static const char *find_stranger(const uint8_t *bytes, size_t available)
         if (available >= strangers[i].length &&
             !strncasecmp((const char *)bytes, strangers[i].begins, strangers[i].length))
             return strangers[i].what;
+    if (available && bytes[0] == '#' && memmem(bytes, available < 400 ? available : 400, "CAMERA_ID", 9))
+        return "is COLMAP's list of cameras or images and no scan: --cameras takes its folder";
     if (available >= 4 && bytes[0] && !bytes[1] && bytes[2] && !bytes[3])
         return "may be text in UTF-16, and is none known here: write it as UTF-8 first (iconv -f UTF-16 -t UTF-8)";
     return is_obj(bytes, available)

@@ -9,23 +9,44 @@
 
 enum { PROSE_LINES = 30 }; /* before the headings or numbers */
 
+/* How numbers may be written in a line. */
+enum { WAYS = 4 };
+static void list_ways(const char *line, size_t length, struct spl_layout ways[WAYS])
+{
+    char separator = spl_text_separator(line, length);
+    ways[0] = (struct spl_layout){.separator = separator};
+    ways[1] = (struct spl_layout){.separator = separator == ',' ? ' ' : separator, .decimal = ','};
+    ways[2] = (struct spl_layout){.separator = separator, .decimal = '.', .group = ','};
+    ways[3] = (struct spl_layout){.separator = separator, .decimal = ',', .group = '.'};
+}
+
+/* Three numbers follow each other, at the line's begin or behind a text. */
+static bool has_point(const char *line, size_t length)
+{
+    struct spl_layout ways[WAYS];
+    bool has = false;
+    list_ways(line, length, ways);
+    for (int k = 0; k < WAYS; k++) {
+        struct spl_text_kinds kinds = {0};
+        spl_text_kinds_add(&kinds, &ways[k], line, length);
+        has |= kinds.leading >= 3 && kinds.numbers[1] && kinds.numbers[2];
+    }
+    return has;
+}
+
 /* A line of numbers and not of names; "1,5;2,5" is one too, and one of quoted numbers. Where columns are known, x, y
  * and z say it: others may hold names. `layout` may be NULL: then it is the first field, or three behind it. */
 static bool is_data(const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
-    const struct spl_layout ways[] = {
-        {.separator = fields.separator},
-        {.separator = fields.separator == ',' ? ' ' : fields.separator, .decimal = ','},
-        {.separator = fields.separator, .decimal = '.', .group = ','},
-        {.separator = fields.separator, .decimal = ',', .group = '.'},
-    };
+    struct spl_layout ways[WAYS];
+    list_ways(line, length, ways);
     for (unsigned i = 0; i < (layout ? layout->fields : 1); i++) {
         struct spl_fields field = fields;
         bool counts = !layout || (layout->column[i] >= SPL_COLUMN_X && layout->column[i] <= SPL_COLUMN_Z);
         double number;
         size_t text;
-        for (size_t k = 0; k < sizeof ways / sizeof *ways; k++) {
+        for (size_t k = 0; k < WAYS; k++) {
             struct spl_fields tried = fields;
             if (counts && spl_layout_number(&ways[k], &tried, &number) == SPL_FIELD_OK)
                 return true;
@@ -36,7 +57,7 @@ static bool is_data(const struct spl_layout *layout, const char *line, size_t le
         if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
             return false;
     }
-    for (size_t k = 0; !layout && k < sizeof ways / sizeof *ways; k++)
+    for (size_t k = 0; !layout && k < WAYS; k++)
         if (spl_text_names_point(&ways[k], line, length))
             return true;
     return false;
@@ -188,9 +209,10 @@ int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **li
             if (*named || !first.code)
                 return SPL_OK;
             *layout = (struct spl_layout){0};
+            if (!has_point(*line, *length)) /* prose that goes on */
+                return spl_fail_field(err, first.code, first.field, "%s", first.message);
             return words == spl_fields_count(*line, *length, spl_text_separator(*line, *length))
-                       ? spl_fail_field(err, last.code, last.field, "%s",
-                                        last.message) /* unknown headings, of which each has its column */
+                       ? spl_fail_field(err, last.code, last.field, "%s", last.message) /* unknown headings */
                        : SPL_OK;
         }
         if (option && ++prose <= PROSE_LINES)

@@ -319,6 +319,8 @@ static void what_stands_before_the_numbers_is_passed_over(void **state)
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
     refused_text("Scan of a hall\nleft back up\n1 2 3\n", SPL_E_INPUT, "x", "line 2: x: no column has this name");
+    refused_text("Some prose\n15 valid files, 3 invalid ones\n", SPL_E_INPUT, "x",
+                 "line 1: x: no column has this name");
     refused_text("Scan of a hall\nby Smith\n", SPL_E_INPUT, "x", "line 1: x: no column has this name");
     refused_text("x y z\n7 1 2 3\n9 4 5 6\n8 4 5 6\n", SPL_E_INPUT, "", "line 2: has more than the 3 columns");
     refused_text("x,y,z\n8,3550,-0,0003,2,2079\n", SPL_E_INPUT, "", "line 2: commas seem to separate columns and");
