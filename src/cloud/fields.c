@@ -184,7 +184,12 @@ static bool rewrite(const char *p, const char *end, char decimal, char group, ch
     unsigned digits = 0; /* since the last mark */
     bool parted = false, fraction = false;
     while (p < end && n < 63) {
-        if (!fraction && (mark = find_mark(p, end, group))) {
+        if (is_digit(*p)) { /* nearly always */
+            digits += !fraction;
+            out[n++] = *p++;
+            continue;
+        }
+        if (*p != decimal && !fraction && (mark = find_mark(p, end, group))) {
             if (digits == 0 || digits > 3 || (parted && digits != 3))
                 return false;
             parted = true;
@@ -202,7 +207,6 @@ static bool rewrite(const char *p, const char *end, char decimal, char group, ch
         static const char minus[] = "\xe2\x88\x92";
         bool long_minus = (size_t)(end - p) >= sizeof minus - 1 && !memcmp(p, minus, sizeof minus - 1);
         bool exponent = (*p | 32) == 'd' && n && (is_digit(out[n - 1]) || out[n - 1] == '.'); /* as Fortran writes it */
-        digits += !fraction && is_digit(*p);
         out[n++] = *p == decimal ? '.' : long_minus ? '-' : exponent ? 'e' : *p;
         p += long_minus ? sizeof minus - 1 : 1;
     }
