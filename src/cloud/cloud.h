@@ -96,6 +96,7 @@ struct spl_cloud_info {
      * first numbers or names the points. */
     char guessed[192];
     char unused[200]; /* headings of a text whose columns fill nothing, as "Code, Dist"; "" = none */
+    bool north_first; /* a text whose columns nothing names has an x of seven digits, and a y of six: it may be north */
     bool surveyors;   /* a text's headings Y and X were taken for east and north, x and y here */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */

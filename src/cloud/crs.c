@@ -17,7 +17,7 @@ static void settle(struct spl_cloud_coordinates *crs)
 {
     bool angles;
     double unit = spl_crs_get_unit(crs->epsg, &angles);
-    if (!angles && unit == 0)
+    if ((!angles && unit == 0) || spl_crs_get_kind(crs->epsg) == SPL_CRS_HEIGHTS)
         crs->epsg = 0;
     else if (crs->unit_m == 0 && !crs->angles) {
         crs->unit_m = unit;
@@ -27,7 +27,8 @@ static void settle(struct spl_cloud_coordinates *crs)
     unit = spl_crs_get_unit(crs->height_epsg, &angles);
     if (crs->height_unit_m == 0)
         crs->height_unit_m = unit;
-    if (unit == 0 || !spl_unit_is_same(unit, crs->height_unit_m))
+    if (unit == 0 || !spl_unit_is_same(unit, crs->height_unit_m) ||
+        spl_crs_get_kind(crs->height_epsg) != SPL_CRS_HEIGHTS)
         crs->height_epsg = 0;
 }
 
@@ -61,38 +62,54 @@ void spl_crs_finish(struct spl_cloud_coordinates *crs)
     *crs = (struct spl_cloud_coordinates){0};
 }
 
-/* "EPSG:N", behind which `text` then stands. */
-static bool take_number(const char **text, uint32_t *number)
+/* "EPSG:N", of heights "N" too, behind which `text` then stands. */
+static bool take_number(const char **text, bool bare, uint32_t *number)
 {
     uint64_t value;
-    const char *digits = *text + 5, *end;
-    if (strncasecmp(*text, "EPSG:", 5) != 0 || !(end = spl_integer_parse(digits, digits + strlen(digits), &value)) ||
-        value > UINT32_MAX)
+    bool named = strncasecmp(*text, "EPSG:", 5) == 0;
+    const char *digits = named ? *text + 5 : *text, *end;
+    if (!(named || bare) || !(end = spl_integer_parse(digits, digits + strlen(digits), &value)) || value > UINT32_MAX)
         return false;
     *text = end;
     *number = (uint32_t)value;
     return true;
 }
 
+/* What is wrong with a number where a system of places (`k` = 0) or of heights stands; NULL: nothing. */
+static const char *find_fault(uint32_t number, int k)
+{
+    bool angles;
+    if (spl_crs_get_unit(number, &angles) == 0 && (k || !angles))
+        return k ? "is no coordinate system of heights" : "is no coordinate system";
+    enum spl_crs_kind kind = spl_crs_get_kind(number);
+    if (k)
+        return kind == SPL_CRS_HEIGHTS ? NULL : "is no coordinate system of heights";
+    return kind == SPL_CRS_HEIGHTS ? "is one of heights alone: name that of x and y before it, such as "
+                                     "EPSG:25832+EPSG:7837"
+           : kind == SPL_CRS_GEOCENTRIC
+               ? "counts from the middle of the earth, and z is not up there: project the scans first, such as with "
+                 "\"pdal translate IN OUT.las reprojection --filters.reprojection.out_srs=EPSG:…\""
+               : NULL;
+}
+
 static int read_numbers(const char *text, struct spl_cloud_coordinates *crs, struct spl_error *err)
 {
     struct spl_cloud_coordinates said = {0};
-    const char *at = text;
-    bool angles, good = take_number(&at, &said.epsg);
-    if (good && *at == '+') {
+    const char *at = text, *fault;
+    bool good = take_number(&at, false, &said.epsg), both = good && *at == '+';
+    if (both) {
         at++;
-        good = take_number(&at, &said.height_epsg);
+        good = take_number(&at, true, &said.height_epsg);
     }
     if (!good || *at)
         return spl_fail_field(err, SPL_E_USAGE, "crs",
                               "--crs takes EPSG and a number, such as EPSG:25832, two of them where heights have their "
                               "own, such as EPSG:25832+EPSG:7837, a file that holds WKT, or none, not '%.60s'",
                               text);
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k <= both; k++) {
         uint32_t number = k ? said.height_epsg : said.epsg;
-        if (number && spl_crs_get_unit(number, &angles) == 0 && (k || !angles))
-            return spl_fail_field(err, SPL_E_USAGE, "crs", "--crs %.60s: EPSG:%u is no coordinate system%s", text,
-                                  number, k ? " of heights" : "");
+        if ((fault = find_fault(number, k)))
+            return spl_fail_field(err, SPL_E_USAGE, "crs", "--crs %.60s: EPSG:%u %s", text, number, fault);
     }
     spl_crs_replace(crs, &said);
     return SPL_OK;

@@ -20,13 +20,17 @@ struct spl_crs_keys {
 /* The same of GeoTIFF keys; what is odd among them counts as not said. */
 void spl_crs_read_keys(const struct spl_crs_keys *keys, struct spl_cloud_coordinates *crs);
 
-/* The same of what a user says: "EPSG:25832", "EPSG:2994+EPSG:6360", or the name of a file that holds WKT. Errors are
- * SPL_E_USAGE and name `--crs`. */
+/* The same of what a user says: "EPSG:25832", "EPSG:2994+EPSG:6360" or "EPSG:2994+6360", or the name of a file that
+ * holds WKT. Errors are SPL_E_USAGE and name `--crs`. */
 int spl_crs_read_option(const char *text, struct spl_cloud_coordinates *crs, struct spl_error *err);
 
 /* Metres a unit of the system's coordinates: from EPSG's register, which is complete up to its release of 2022; 0 and
  * *angles for longitudes and latitudes; 0 for what cannot be a number of a system. */
 double spl_crs_get_unit(uint32_t epsg, bool *angles);
+
+/* What a number of the register is a system of. */
+enum spl_crs_kind { SPL_CRS_PLACES, SPL_CRS_HEIGHTS /* alone */, SPL_CRS_GEOCENTRIC /* z is not up */ };
+enum spl_crs_kind spl_crs_get_kind(uint32_t epsg);
 
 /* Metres of EPSG's unit of length with this number; 0: none. */
 double spl_crs_get_length(uint32_t unit);

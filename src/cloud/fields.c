@@ -128,9 +128,10 @@ const char *spl_integer_parse(const char *p, const char *end, uint64_t *value)
     return p > start ? p : NULL;
 }
 
-static inline const char *skip_blanks(const char *p, const char *end)
+/* A tab is none where tabs separate. */
+static inline const char *skip_blanks(const char *p, const char *end, char separator)
 {
-    while (p < end && is_blank(*p))
+    while (p < end && is_blank(*p) && (*p != '\t' || separator != '\t'))
         p++;
     return p;
 }
@@ -143,7 +144,7 @@ static bool at_field_end(const struct spl_fields *fields, const char *p)
 /* With p past a field's text: goes over blanks and one separator. False when something else follows. */
 static bool finish_field(struct spl_fields *fields, const char *p)
 {
-    p = skip_blanks(p, fields->end);
+    p = skip_blanks(p, fields->end, fields->separator);
     if (fields->separator != ' ') {
         if (p < fields->end && *p != fields->separator)
             return false;
@@ -155,34 +156,85 @@ static bool finish_field(struct spl_fields *fields, const char *p)
 
 enum spl_field spl_fields_number(struct spl_fields *fields, double *value)
 {
-    fields->start = skip_blanks(fields->p, fields->end);
+    fields->start = skip_blanks(fields->p, fields->end, fields->separator);
     if (fields->start == fields->end)
         return SPL_FIELD_END;
     const char *p = spl_number_parse(fields->start, fields->end, value);
     return p && at_field_end(fields, p) && finish_field(fields, p) ? SPL_FIELD_OK : SPL_FIELD_BAD;
 }
 
-enum spl_field spl_fields_comma_number(struct spl_fields *fields, double *value)
+/* Bytes of what parts digits into threes at `p`. */
+static size_t find_mark(const char *p, const char *end, char group)
 {
-    char text[64];
-    size_t n = 0;
-    const char *p = fields->start = skip_blanks(fields->p, fields->end);
-    if (p == fields->end)
-        return SPL_FIELD_END;
-    for (; !at_field_end(fields, p); p++) {
-        bool parts = p > fields->start && is_digit(p[-1]) && p + 1 < fields->end && is_digit(p[1]);
-        if (n == sizeof text - 1 || *p == '.' || (*p == ',' && !parts))
-            return SPL_FIELD_BAD;
-        text[n++] = *p == ',' ? '.' : *p;
+    static const char *const marks[] = {"'", "\xe2\x80\x99", " ", "\xc2\xa0", "\xe2\x80\xaf", "\xe2\x80\x89", "\xa0"};
+    if (group && *p == group)
+        return 1;
+    for (size_t i = 0; i < sizeof marks / sizeof *marks; i++) {
+        size_t length = strlen(marks[i]);
+        if ((size_t)(end - p) >= length && memcmp(p, marks[i], length) == 0)
+            return length;
     }
-    text[n] = 0;
-    return spl_number_parse(text, text + n, value) == text + n && finish_field(fields, p) ? SPL_FIELD_OK
-                                                                                          : SPL_FIELD_BAD;
+    return 0;
+}
+
+/* As programs write it, into `out` of 64 bytes. */
+static bool rewrite(const char *p, const char *end, char decimal, char group, char *out)
+{
+    size_t n = 0, mark;
+    unsigned digits = 0; /* since the last mark */
+    bool parted = false, fraction = false;
+    while (p < end && n < 63) {
+        if (is_digit(*p)) { /* nearly always */
+            digits += !fraction;
+            out[n++] = *p++;
+            continue;
+        }
+        if (*p != decimal && !fraction && (mark = find_mark(p, end, group))) {
+            if (digits == 0 || digits > 3 || (parted && digits != 3))
+                return false;
+            parted = true;
+            digits = 0;
+            p += mark;
+            continue;
+        }
+        if (*p == decimal) {
+            bool between = digits && p + 1 < end && is_digit(p[1]);
+            if (fraction || (parted && digits != 3) || (decimal == ',' && !between))
+                return false;
+            fraction = true;
+        } else if (*p == '.' || *p == ',')
+            return false;
+        static const char minus[] = "\xe2\x88\x92";
+        bool long_minus = (size_t)(end - p) >= sizeof minus - 1 && !memcmp(p, minus, sizeof minus - 1);
+        bool exponent = (*p | 32) == 'd' && n && (is_digit(out[n - 1]) || out[n - 1] == '.'); /* as Fortran writes it */
+        out[n++] = *p == decimal ? '.' : long_minus ? '-' : exponent ? 'e' : *p;
+        p += long_minus ? sizeof minus - 1 : 1;
+    }
+    out[n] = 0;
+    return p == end && (!parted || fraction || digits == 3);
+}
+
+enum spl_field spl_fields_written(struct spl_fields *fields, char decimal, char group, double *value)
+{
+    struct spl_fields next = *fields;
+    char text[64];
+    size_t length;
+    enum spl_field got = spl_fields_text(&next, &length);
+    fields->start = next.start;
+    if (got != SPL_FIELD_OK)
+        return got;
+    if (!rewrite(next.start, next.start + length, decimal, group, text))
+        return SPL_FIELD_BAD;
+    const char *end = text + strlen(text);
+    if (spl_number_parse(text, end, value) != end)
+        return SPL_FIELD_BAD;
+    *fields = next;
+    return SPL_FIELD_OK;
 }
 
 enum spl_field spl_fields_text(struct spl_fields *fields, size_t *length)
 {
-    const char *p = fields->start = skip_blanks(fields->p, fields->end);
+    const char *p = fields->start = skip_blanks(fields->p, fields->end, fields->separator);
     if (p == fields->end)
         return SPL_FIELD_END;
     if (*p == '"') {
@@ -215,7 +267,7 @@ size_t spl_fields_count(const char *line, size_t length, char separator)
 
 bool spl_fields_blank(const char *line, size_t length)
 {
-    return skip_blanks(line, line + length) == line + length;
+    return skip_blanks(line, line + length, ' ') == line + length;
 }
 
 const char *spl_fields_show(const struct spl_fields *fields, char text[32])

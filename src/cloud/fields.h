@@ -17,7 +17,7 @@ const char *spl_integer_parse(const char *p, const char *end, uint64_t *value);
 struct spl_fields {
     const char *p, *end; /* what is left of the line */
     const char *start;   /* of the field that was taken last */
-    char separator;      /* ' ' = runs of blanks and tabs, else ',' or ';' (with blanks around it) */
+    char separator;      /* ' ' = runs of blanks and tabs, else ',', ';', '|' or '\t' (with blanks around it) */
 };
 
 enum spl_field { SPL_FIELD_END, SPL_FIELD_OK, SPL_FIELD_BAD };
@@ -30,9 +30,10 @@ static inline struct spl_fields spl_fields_begin(const char *line, size_t length
 /* Takes the next field as a number; a separator at the end of the line opens no field. */
 enum spl_field spl_fields_number(struct spl_fields *fields, double *value);
 
-/* The same of a number with a comma, between digits, where others have a point, which it must not have. The separator
- * is no comma. */
-enum spl_field spl_fields_comma_number(struct spl_fields *fields, double *value);
+/* The same of a number as people write it: with `decimal`, '.' or ',', which as a comma lies between digits; digits in
+ * threes, which `group` parts (0: nothing), or an apostrophe, a blank of any width where those separate no fields; in
+ * quotes, with a typographer's minus or a Fortran's exponent too. */
+enum spl_field spl_fields_written(struct spl_fields *fields, char decimal, char group, double *value);
 
 /* Takes the next field whatever it is; its text is [fields->start, fields->start + *length), quotes taken off;
  * "" within quotes is a quotation mark, and stays as it is written. */

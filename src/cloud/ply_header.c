@@ -133,6 +133,25 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     return SPL_OK;
 }
 
+static bool has_vertex_property(const struct spl_ply_header *header, const char *name)
+{
+    const struct spl_ply_element *element = &header->elements[header->vertex];
+    for (unsigned i = 0; i < element->properties; i++)
+        if (!strcmp(header->properties[element->first + i].name, name))
+            return true;
+    return false;
+}
+
+/* The centres of 3D Gaussians look like points, but what is seen lies between them, and their normals mean nothing. */
+static bool is_gaussians(const struct spl_ply_header *header)
+{
+    static const char *const names[] = {"f_dc_0", "opacity", "scale_0", "rot_0"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (!has_vertex_property(header, names[i]))
+            return false;
+    return true;
+}
+
 /* Sets source->newline by the ending of the first line. */
 static int find_newline(struct spl_source *source, struct spl_error *err)
 {
@@ -194,5 +213,9 @@ int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header,
     if (!header->vertex_line)
         return spl_source_fail_line(source, source->line, "element vertex", err,
                                     "is missing from the header: there are no points to read");
+    if (is_gaussians(header))
+        return spl_source_fail_line(source, header->vertex_line, "f_dc_0", err,
+                                    "is a model of 3D Gaussians (f_dc, opacity, scale, rot), and no scan: pack takes "
+                                    "the points that it was made of, such as a scan or COLMAP's");
     return SPL_OK;
 }

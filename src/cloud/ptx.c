@@ -107,6 +107,11 @@ static int take_header(struct spl_cloud *cloud, struct spl_error *err)
         if (code <= 0)
             return code;
     } while (spl_fields_blank(line, length));
+    if (ptx->cells && spl_fields_count(line, length, ' ') > 2)
+        return spl_source_fail_line(source, source->line, "columns", err,
+                                    "the next station's number of columns is due here, and there are %zu numbers: the "
+                                    "station before has more cells than its columns x rows, %llu",
+                                    spl_fields_count(line, length, ' '), (unsigned long long)ptx->cells);
     spl_source_seek(source, start);
     source->line--;
     code = take_size(source, "columns", &columns, err);

@@ -56,6 +56,8 @@ static bool is_pcd(const uint8_t *bytes, size_t available)
 
 static bool is_text(const uint8_t *bytes, size_t available)
 {
+    if (available > 0 && bytes[available - 1] == 0x1a) /* the end of file of old systems */
+        available--;
     for (size_t i = 0; i < available; i++)
         if ((bytes[i] < ' ' && !memchr("\t\n\f\r", bytes[i], 4)) || bytes[i] == 0x7f)
             return false;
@@ -86,6 +88,77 @@ static const struct {
     {&spl_ply_reader, is_ply}, {&spl_las_reader, is_las}, {&spl_e57_reader, is_e57},
     {&spl_pcd_reader, is_pcd}, {&spl_ptx_reader, is_ptx}, {&spl_text_reader, is_text},
 };
+
+/* What is often met instead of a scan, by its first bytes, in whatever case; some would else be read as text. */
+static const struct {
+    const char *begins;
+    size_t length;
+    const char *what;
+} strangers[] = {
+    {"\x1f\x8b", 2, "is packed with gzip: unpack it first (gunzip)"},
+    {"PK\3\4", 4, "is a ZIP file: unpack it first (unzip)"},
+    {"BZh", 3, "is packed with bzip2: unpack it first (bunzip2)"},
+    {"\xfd\x37zXZ", 5, "is packed with xz: unpack it first (unxz)"},
+    {"\x28\xb5\x2f\xfd", 4, "is packed with Zstandard: unpack it first (unzstd)"},
+    {"7z\xbc\xaf", 4, "is a 7z file: unpack it first (7z x)"},
+    {"Rar!", 4, "is a RAR file: unpack it first"},
+    {"\xff\xfe", 2, "is text in UTF-16: write it as UTF-8 first (iconv -f UTF-16 -t UTF-8)"},
+    {"\xfe\xff", 2, "is text in UTF-16: write it as UTF-8 first (iconv -f UTF-16 -t UTF-8)"},
+    {"version https://git-lfs", 23, "is a pointer of Git LFS, not the file itself: \"git lfs pull\" fetches that"},
+    {"<!doctype html", 14, "is a web page and no scan: what it was loaded from may have answered with an error"},
+    {"<html", 5, "is a web page and no scan: what it was loaded from may have answered with an error"},
+    {"<?xml", 5, "is XML and no scan"},
+    {"{", 1, "is JSON and no scan"},
+    {"%PDF", 4, "is a PDF and no scan"},
+    {"\x89PNG", 4, "is a picture and no scan"},
+    {"\xff\xd8\xff", 3, "is a picture and no scan"},
+    {"II*", 4, "is a TIFF and no scan; of a raster of heights \"gdal_translate -of XYZ\" makes points"},
+    {"MM\0*", 4, "is a TIFF and no scan; of a raster of heights \"gdal_translate -of XYZ\" makes points"},
+    {"ncols ", 6, "is a raster of heights (Esri's grid) and no scan; \"gdal_translate -of XYZ\" makes points of it"},
+    {"DSAA", 4, "is a raster of heights (Surfer's grid) and no scan; \"gdal_translate -of XYZ\" makes points of it"},
+    {"# vtk DataFile", 14, "is a VTK file: write it as PLY first"},
+    {"# timestamp tx ty tz", 20, "is a trajectory and no scan"},
+    {"solid ", 6, "is a mesh (STL) and no scan"},
+    {"OFF\n", 4, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
+    {"OFF\r", 4, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
+    {"COFF\n", 5, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
+    {"COFF\r", 5, "is a mesh (OFF) and no scan: write its vertices as PLY first"},
+    {"glTF", 4, "is a model (glTF) and no scan"},
+    {"\x89HDF", 4, "is an HDF5 file: write its points as PLY or LAS first"},
+    {"\x93NUMPY", 6, "is an array of NumPy: write it as text (numpy.savetxt), PLY or LAS first"},
+    {"SQLite format 3", 15, "is a database (SQLite) and no scan"},
+};
+
+/* Its first line, comments aside, is one that only Wavefront's models have: their faces are no points. */
+static bool is_obj(const uint8_t *bytes, size_t available)
+{
+    static const char *const words[] = {"mtllib ", "usemtl ", "o ", "g ", "v ", "vn ", "vt "};
+    const uint8_t *end = bytes + available, *line = bytes;
+    while (line < end && memchr("#\r\n", *line, 3)) {
+        const uint8_t *newline = memchr(line, '\n', (size_t)(end - line));
+        line = newline ? newline + 1 : end;
+    }
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (begins_with(line, (size_t)(end - line), words[i]))
+            return true;
+    return false;
+}
+
+/* NULL: none that is known. */
+static const char *find_stranger(const uint8_t *bytes, size_t available)
+{
+    for (size_t i = 0; i < sizeof strangers / sizeof *strangers; i++)
+        if (available >= strangers[i].length &&
+            !strncasecmp((const char *)bytes, strangers[i].begins, strangers[i].length))
+            return strangers[i].what;
+    if (available && bytes[0] == '#' && memmem(bytes, available < 400 ? available : 400, "CAMERA_ID", 9))
+        return "is COLMAP's list of cameras or images and no scan: --cameras takes its folder";
+    if (available >= 4 && bytes[0] && !bytes[1] && bytes[2] && !bytes[3])
+        return "may be text in UTF-16, and is none known here: write it as UTF-8 first (iconv -f UTF-16 -t UTF-8)";
+    return is_obj(bytes, available)
+               ? "is a model of Wavefront's (OBJ) and no scan: write its vertices as PLY or as text first"
+               : NULL;
+}
 
 /* What scans are called. Of formats that one reader has, `formats` has those that the ending is right for. */
 static const struct ending {
@@ -158,6 +231,9 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
         return spl_source_fail(source, SPL_E_INPUT, "", err,
                                "is a drawing that \"splatd pack --export-primitives\" wrote, and no scan; pack takes "
                                "the scans that it was made of");
+    const char *stranger = find_stranger(bytes, available);
+    if (stranger)
+        return spl_source_fail(source, SPL_E_INPUT, "", err, "%s", stranger);
     while (found < sizeof readers / sizeof *readers && !readers[found].is(bytes, available))
         found++;
     if (found == sizeof readers / sizeof *readers)

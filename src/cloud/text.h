@@ -5,17 +5,19 @@
 #include "cloud/fields.h"
 #include "cloud/reader.h"
 
-enum { SPL_TEXT_FIELDS = 64 };
+enum { SPL_TEXT_FIELDS = 64, SPL_TEXT_SAMPLE = 1000 /* lines that decide */ };
 
 struct spl_layout {
     int8_t column[SPL_TEXT_FIELDS]; /* enum spl_column of each field */
     unsigned fields;
     unsigned first; /* recognised columns begin with x here: 1 where a point's number or name comes before */
     bool exact;     /* a line must have `fields` values, not more */
-    bool comma;     /* decimal commas */
+    char decimal;   /* of numbers as people write them: see spl_fields_written(); 0: as programs do */
+    char group;     /* likewise */
     bool surveyors; /* names: Y and X, the east and the north of German geodesy, are x and y here */
     bool doubtful;  /* names: they may be that, or not */
-    char separator; /* ' ', ',' or ';' */
+    char separator; /* ' ', ',', ';', '|' or '\t' */
+    uint64_t texts; /* 1 << field of those that hold text, which are skipped */
 };
 
 static inline struct spl_fields spl_layout_fields(const struct spl_layout *layout, const char *line, size_t length)
@@ -27,7 +29,8 @@ static inline struct spl_fields spl_layout_fields(const struct spl_layout *layou
 static inline enum spl_field spl_layout_number(const struct spl_layout *layout, struct spl_fields *fields,
                                                double *value)
 {
-    return layout->comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
+    return layout->decimal ? spl_fields_written(fields, layout->decimal, layout->group, value)
+                           : spl_fields_number(fields, value);
 }
 
 bool spl_layout_has(const struct spl_layout *layout, int column);
@@ -49,21 +52,24 @@ bool spl_text_names_degrees(const char *line, size_t length);
 int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
                            struct spl_error *err);
 
-/* Do the numbers of a text have decimal commas? All that is a number must be one so, over all lines that are added, and
- * one must have a comma. Zero-initialised. */
-struct spl_text_commas {
+/* Are the numbers of a text written as a layout says? All that looks like a number must be one so, over all lines that
+ * are added, and one must be none as programs write it. Zero-initialised. */
+struct spl_text_written {
     unsigned lines;
     size_t fields;
     bool found, bad;
 };
 
-/* `layout` has the separator and decimal commas that are tried; `named`: and columns. False: no more lines are asked
- * for, since this one is none or has another number of columns. */
-bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
-                         size_t length);
+/* `layout` has what is tried: separator, decimal and group; `named`: and columns. False: no more lines are asked for,
+ * since this one is none or has another number of columns. */
+bool spl_text_written_add(struct spl_text_written *written, const struct spl_layout *layout, bool named,
+                          const char *line, size_t length);
 
-/* A text before three numbers. */
-bool spl_text_names_point(const char *line, size_t length, char separator, bool comma);
+/* Two tabs or more lie in a line, and something between any of them. */
+bool spl_text_is_tabbed(const char *line, size_t length);
+
+/* A text before three numbers, of the layout's kind. */
+bool spl_text_names_point(const struct spl_layout *layout, const char *line, size_t length);
 
 /* Whole numbers that may be what is before and behind decimal commas, where commas separate columns too. */
 struct spl_text_pairs {
@@ -74,31 +80,64 @@ struct spl_text_pairs {
     unsigned zeros;  /* 1 << field: some of them begins with 0 */
 };
 
+/* Which columns hold numbers, and which text. Zero-initialised. */
+struct spl_text_kinds {
+    unsigned lines, fields; /* fields: of the last line */
+    unsigned most;          /* fields of any line */
+    unsigned leading;       /* numbers before the first text, which the first column may be */
+    bool fraction;          /* the first column is not of whole numbers alone */
+    bool ragged, uneven;    /* lines have not all as many fields; not all as many leading numbers */
+    unsigned numbers[SPL_TEXT_FIELDS], texts[SPL_TEXT_FIELDS];
+};
+
+/* False when enough lines were added. */
+bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length);
+
+/* Where three columns of numbers begin, behind texts and a whole number that may be before those; else 0. */
+unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields);
+
+/* Does a field say that it has no value: "", "-", "NULL", "n/a", …? */
+bool spl_text_is_missing(const char *text, size_t length);
+
 /* What the first columns of lines without names look like. Zero-initialised. */
 struct spl_text_look {
-    unsigned lines;
-    bool unnumbered; /* the first column does not rise, or too few numbers come behind */
-    bool gaps;       /* it rises by more than one somewhere */
-    bool coarse;     /* one of the next three is a whole number */
-    bool unnamed;    /* it is no text everywhere */
-    bool varies;     /* the one behind it does */
-    bool fraction;   /* not all are whole numbers */
-    uint64_t last;
-    double y;
+    unsigned lines, places; /* places: lines with three finite numbers behind the first column */
+    bool bare;              /* the first column is no whole number, or too few numbers come behind */
+    bool unsorted;          /* it does not count by one */
+    bool falling;           /* it falls somewhere */
+    bool unnamed;           /* it is no text everywhere */
+    bool varies;            /* the one behind it does */
+    bool fraction;          /* not all are whole numbers */
+    bool strewn[2]; /* the first two do not rise line by line, the first before the second, or the other way round */
+    bool coarse;    /* they are no small whole numbers, or too few follow */
+    bool inner[3];  /* of the three behind the first two, some are no whole numbers */
+    bool near;              /* the three behind it are not a place on a map: two of six digits, and a height */
+    bool fine[3];           /* of the three behind it, some are no whole numbers */
+    uint64_t last, second;
+    double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */
 };
 
 /* False when the line has other than layout->fields values. */
 bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length);
 
+/* Does the first column count by one? */
+bool spl_text_look_counts(const struct spl_text_look *look);
+
 /* layout->first, and the column from which on commas are both decimal ones and separators, else -1. */
 unsigned spl_text_look_first(const struct spl_text_look *look);
 int spl_text_look_doubled(const struct spl_text_look *look, char separator);
 
-/* What the first lines look like, from which nameless columns are recognised. Zero-initialised. */
+/* What the first lines look like, from which nameless columns are recognised. Zero-initialised. What is missing says
+ * nothing. */
 struct spl_text_sample {
     unsigned lines;
-    bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer, or no number */
+    bool elsewhere;                 /* x has not seven digits, or y not six, somewhere */
+    bool given[SPL_TEXT_FIELDS];    /* some value is a number */
+    bool above[SPL_TEXT_FIELDS];    /* with the next: they are not the number of an echo and of how many there are */
+    bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer */
+    bool clear[SPL_TEXT_FIELDS];    /* some value is not what is opaque */
+    double apart[SPL_TEXT_FIELDS];  /* how far its values are from those of the next column, in all */
     bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
     bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
     bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */

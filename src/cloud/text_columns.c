@@ -5,9 +5,23 @@
  * Pure functions. */
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
+
+bool spl_text_is_tabbed(const char *line, size_t length)
+{
+    unsigned tabs = 0;
+    bool empty = true;
+    for (size_t i = 0; i < length; i++) {
+        if (line[i] == '\t' && empty)
+            return false;
+        tabs += line[i] == '\t';
+        empty = line[i] == '\t' || (empty && line[i] == ' ');
+    }
+    return tabs > 1;
+}
 
 char spl_text_separator(const char *line, size_t length)
 {
@@ -15,10 +29,10 @@ char spl_text_separator(const char *line, size_t length)
     bool quoted = false;
     for (size_t i = 0; i < length && found != ';'; i++) {
         quoted ^= line[i] == '"';
-        if (!quoted && (line[i] == ';' || line[i] == ','))
+        if (!quoted && (line[i] == ';' || (line[i] == '|' && found != ';') || (line[i] == ',' && found == ' ')))
             found = line[i];
     }
-    return found;
+    return found == ' ' && spl_text_is_tabbed(line, length) ? '\t' : found;
 }
 
 bool spl_layout_has(const struct spl_layout *layout, int column)
@@ -63,10 +77,16 @@ static int check_threes(const struct spl_layout *layout, struct spl_error *err)
     return SPL_OK;
 }
 
+/* As a guess is written, too. */
+static bool is_skipped(const char *name, size_t length)
+{
+    return (length == 1 && *name == '-') || (length == 4 && strncasecmp(name, "text", 4) == 0);
+}
+
 int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *keep, const char *columns,
                            struct spl_error *err)
 {
-    struct spl_fields fields = spl_fields_begin(columns, strlen(columns), ',');
+    struct spl_fields fields = spl_fields_begin(columns, strlen(columns), strchr(columns, ',') ? ',' : ' ');
     enum spl_field got;
     size_t length;
     *layout = (struct spl_layout){0};
@@ -75,7 +95,7 @@ int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *kee
         int column = spl_keep_find_column(keep, spl_layout_taken(layout), fields.start, length);
         if (layout->fields == SPL_TEXT_FIELDS)
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: more than %d names", SPL_TEXT_FIELDS);
-        if (known == SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP && !(length == 1 && *fields.start == '-'))
+        if (known == SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP && !is_skipped(fields.start, length))
             return spl_fail_field(err, SPL_E_USAGE, "columns",
                                   "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class "
                                   "return_number number_of_returns, nor named by --keep; - skips a column",
@@ -105,17 +125,25 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         if (spl_layout_number(layout, &field, &v[i]) != SPL_FIELD_OK)
             v[i] = NAN;
     }
-    bool whole = spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
+    bool whole = !layout->exact || spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
     if (!isfinite(v[at]) || !isfinite(v[at + 1]) || !isfinite(v[at + 2])) /* no point, so the rest of it says nothing */
         return whole;
+    sample->elsewhere |= !(v[at] >= 1e6 && v[at] < 1e7 && v[at + 1] >= 1e5 && v[at + 1] < 1e6);
     for (unsigned i = 0; i < layout->fields; i++) {
+        if (!isfinite(v[i]))
+            continue;
+        sample->given[i] = true;
         sample->fraction[i] |= v[i] != floor(v[i]);
         sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
         sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
+        sample->clear[i] |= v[i] != 255;
+        sample->above[i] |= i + 1 == layout->fields || !(v[i] >= 1 && v[i] <= v[i + 1] && v[i + 1] <= 15);
+        if (i + 1 < layout->fields && isfinite(v[i + 1]))
+            sample->apart[i] += fabs(v[i] - v[i + 1]);
     }
     for (unsigned i = 0; i + 2 < layout->fields; i++) {
         double norm = sqrt(v[i] * v[i] + v[i + 1] * v[i + 1] + v[i + 2] * v[i + 2]);
-        sample->crooked[i] |= !(norm == 0 || fabs(norm - 1) < 0.02);
+        sample->crooked[i] |= norm != 0 && fabs(norm - 1) >= 0.02; /* NaN: some of them are missing */
         sample->zero[i] |= norm == 0;
     }
     sample->lines++;
@@ -138,7 +166,8 @@ static bool is_color(const struct spl_text_sample *s, unsigned i)
         integers &= !s->fraction[k] && !s->wide[k];
         unit &= !s->bright[k];
     }
-    return integers || unit;
+    bool echoes = !s->above[i + 1] && s->above[i]; /* behind an intensity */
+    return (integers || unit) && !echoes;
 }
 
 static void set3(struct spl_layout *layout, unsigned at, int column)
@@ -147,10 +176,36 @@ static void set3(struct spl_layout *layout, unsigned at, int column)
         layout->column[at + (unsigned)k] = (int8_t)(column + k);
 }
 
-static bool free3(const struct spl_layout *layout, unsigned at)
+static bool is_free(const struct spl_layout *layout, const struct spl_text_sample *sample, unsigned at)
 {
-    return at + 2 < layout->fields && layout->column[at] < 0 && layout->column[at + 1] < 0 &&
-           layout->column[at + 2] < 0;
+    return at < layout->fields && layout->column[at] < 0 && sample->given[at] && !(layout->texts >> at & 1);
+}
+
+static bool free3(const struct spl_layout *layout, const struct spl_text_sample *sample, unsigned at)
+{
+    return is_free(layout, sample, at) && is_free(layout, sample, at + 1) && is_free(layout, sample, at + 2);
+}
+
+/* Where a colour is, or 0. Several places may look like one, as of class, intensity, red, green and blue, or with an
+ * opacity behind: red, green and blue are near each other, and blue is not 255 everywhere. */
+static unsigned find_color(const struct spl_layout *layout, const struct spl_text_sample *s)
+{
+    /* with seven columns or more, "x y z intensity r g b" (PTS) before "x y z r g b intensity" */
+    static const uint8_t order[] = {4, 3, 5, 6, 7, 8, 9, 10};
+    unsigned best = 0;
+    double apart = 0;
+    for (unsigned k = layout->fields - layout->first < 7; k < sizeof order; k++) {
+        unsigned at = layout->first + order[k];
+        if (!free3(layout, s, at) || !is_color(s, at))
+            continue;
+        double own = s->apart[at] + s->apart[at + 1];
+        bool opacity = best == at + 1 && !s->clear[best + 2];
+        if (!best || opacity || 1.5 * own < apart) {
+            best = at;
+            apart = own;
+        }
+    }
+    return best;
 }
 
 void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sample *sample)
@@ -159,20 +214,21 @@ void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sampl
     const unsigned first = layout->first, behind = first + 3;
     set3(layout, first, SPL_COLUMN_X);
     for (unsigned i = behind; i + 2 < layout->fields; i++)
-        if (is_normal(sample, i, i + 3 == layout->fields)) {
+        if (free3(layout, sample, i) && is_normal(sample, i, i + 3 == layout->fields)) {
             set3(layout, i, SPL_COLUMN_NX);
             break;
         }
-    /* with seven columns or more, "x y z intensity r g b" (PTS) before "x y z r g b intensity" */
-    static const uint8_t order[] = {4, 3, 5, 6, 7, 8, 9, 10};
-    for (unsigned k = layout->fields - first < 7; k < sizeof order; k++)
-        if (free3(layout, first + order[k]) && is_color(sample, first + order[k])) {
-            set3(layout, first + order[k], SPL_COLUMN_RED);
-            break;
-        }
+    unsigned color = find_color(layout, sample);
+    if (color)
+        set3(layout, color, SPL_COLUMN_RED);
     for (unsigned i = behind; i < layout->fields && i < behind + 4; i++)
-        if (layout->column[i] < 0) {
+        if (is_free(layout, sample, i)) {
             layout->column[i] = SPL_COLUMN_INTENSITY;
+            if (is_free(layout, sample, i + 1) && is_free(layout, sample, i + 2) && !sample->above[i + 1] &&
+                !sample->fraction[i + 1] && !sample->fraction[i + 2]) {
+                layout->column[i + 1] = SPL_COLUMN_RETURN;
+                layout->column[i + 2] = SPL_COLUMN_RETURNS;
+            }
             break;
         }
 }

@@ -2,15 +2,22 @@
  * numbers decimal commas? And are commas both those and what separates columns, so that nobody can tell them apart?
  * Pure functions.
  *
- * A first column that counts by one may also be x along a row of a grid of whole metres: there y stays the same. One
- * that rises by other steps numbers points that are left of more, where no coordinate behind it is a whole number. */
+ * A first column of whole numbers that stands before three with fractions is none of the coordinates, which would be
+ * written alike: x is whole only where y is, and z only where both are. Where that does not decide, one that counts by
+ * one numbers the points; but it may also be x along a row of a grid of whole metres, and there y stays the same. And
+ * two columns of six digits before one of four are a place on a map, whatever stands before them. Two columns of small
+ * whole numbers that rise as in a grid are a station's rows and columns, where the three behind them have fractions. */
 #include <math.h>
+#include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/text.h"
 
-/* Fewer count by chance; of nothing but whole numbers a diagonal does, and with gaps points in the order of x. */
-enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100, COUNTED_GAP_LINES = 20 };
+/* Fewer count by chance; of nothing but whole numbers a diagonal does. */
+enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
+static const double map_least = 1e5, height_most = 1e4;
+static const uint64_t cells = 100000; /* of a side of a station's grid, at most */
 
 /* The next field as a whole number, with zeros in front and a sign if need be. */
 struct whole {
@@ -34,49 +41,102 @@ static bool take_whole(struct spl_fields *fields, struct whole *whole)
     return true;
 }
 
-static enum spl_field take_number(bool comma, struct spl_fields *fields, double *value)
+bool spl_text_names_point(const struct spl_layout *layout, const char *line, size_t length)
 {
-    return comma ? spl_fields_comma_number(fields, value) : spl_fields_number(fields, value);
-}
-
-bool spl_text_names_point(const char *line, size_t length, char separator, bool comma)
-{
-    struct spl_fields fields = spl_fields_begin(line, length, separator);
+    struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
     double v;
     size_t length_of;
-    struct spl_fields first = fields;
-    if (take_number(comma, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
+    if (spl_layout_number(layout, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
         length_of == 0)
         return false;
     for (int i = 0; i < 3; i++)
-        if (take_number(comma, &fields, &v) != SPL_FIELD_OK)
+        if (spl_layout_number(layout, &fields, &v) != SPL_FIELD_OK)
             return false;
     return true;
 }
 
-bool spl_text_commas_add(struct spl_text_commas *commas, const struct spl_layout *layout, bool named, const char *line,
-                         size_t length)
+bool spl_text_is_missing(const char *text, size_t length)
+{
+    static const char *const words[] = {"", "-", "--", "NULL", "NA", "N/A", "#N/A", "none", "nil"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strlen(words[i]) == length && !strncasecmp(words[i], text, length))
+            return true;
+    return false;
+}
+
+bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
-    size_t count = spl_fields_count(line, length, layout->separator), ignored;
-    bool names = !named && count > 3 && spl_text_names_point(line, length, layout->separator, true);
-    bool same = named || commas->lines == 0 || count == commas->fields; /* names: the last may be empty */
-    commas->fields = count;
-    if (!same || count < 3)
-        return false;
-    commas->lines++;
-    for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !commas->bad; i++) {
+    unsigned leading = 0, i = 0;
+    for (; i < SPL_TEXT_FIELDS; i++) {
         struct spl_fields field = fields;
+        size_t size;
         double v;
-        spl_fields_text(&fields, &ignored);
-        if (named ? i >= layout->fields || layout->column[i] < 0 : names && i == 0)
-            continue;
-        bool empty = field.separator == ';' && ignored == 0;
-        commas->bad = !empty && spl_layout_number(layout, &field, &v) != SPL_FIELD_OK;
-        for (size_t k = 0; k < ignored; k++)
-            commas->found |= fields.start[k] == ',';
+        bool number = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
+        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
+            break;
+        bool text = !number && !spl_text_is_missing(fields.start, size);
+        kinds->numbers[i] += number;
+        kinds->fraction |= i == 0 && number && v != floor(v);
+        kinds->texts[i] += text;
+        leading += leading == i && (!text || i == 0);
     }
-    return !commas->bad;
+    kinds->ragged |= kinds->lines && i != kinds->fields;
+    kinds->uneven |= kinds->lines && leading != kinds->leading;
+    kinds->fields = i;
+    kinds->most = i > kinds->most ? i : kinds->most;
+    kinds->leading = leading;
+    return ++kinds->lines < SPL_TEXT_SAMPLE;
+}
+
+/* Of nothing but digits and what lies between them. */
+static bool looks_like_number(const char *text, size_t length)
+{
+    bool digit = false;
+    for (size_t i = 0; i < length; i++) {
+        if (!strchr("0123456789+-.,'eEdD ", text[i]) && !(text[i] & 0x80))
+            return false;
+        digit |= text[i] >= '0' && text[i] <= '9';
+    }
+    return digit && strchr("0123456789+-.", *text);
+}
+
+unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields)
+{
+    unsigned run = 0;
+    for (unsigned i = 0; i < fields; i++) {
+        bool text = kinds->texts[i] > kinds->numbers[i];
+        run = text ? 0 : run + 1;
+        if (run == 3)
+            return i - 2;
+        if (!text && (i > 0 || kinds->fraction) && (i + 1 == fields || kinds->texts[i + 1] > kinds->numbers[i + 1]))
+            return 0; /* a number before a text, which may be x */
+    }
+    return 0;
+}
+
+bool spl_text_written_add(struct spl_text_written *written, const struct spl_layout *layout, bool named,
+                          const char *line, size_t length)
+{
+    struct spl_fields fields = spl_layout_fields(layout, line, length);
+    size_t count = spl_fields_count(line, length, layout->separator), size;
+    bool same = named || written->lines == 0 || count == written->fields; /* names: the last may be empty */
+    written->fields = count;
+    if (!same || count < 3 || (!named && count > SPL_TEXT_FIELDS))
+        return false;
+    written->lines++;
+    for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {
+        struct spl_fields field = fields, plain = fields;
+        double v;
+        spl_fields_text(&fields, &size);
+        if (named && (i >= layout->fields || layout->column[i] < 0))
+            continue;
+        bool good = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
+        written->found |= good && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
+        written->bad |=
+            !good && (named ? !spl_text_is_missing(fields.start, size) : looks_like_number(fields.start, size));
+    }
+    return !written->bad;
 }
 
 static void look_at_pairs(struct spl_text_look *look, unsigned at, const struct whole *all, unsigned count)
@@ -99,30 +159,44 @@ static void look_at_pairs(struct spl_text_look *look, unsigned at, const struct 
 bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
-    struct whole all[SPL_TEXT_FIELDS];
-    double v = 0, y = 0;
+    struct whole all[SPL_TEXT_FIELDS] = {0};
+    double v = 0;
     unsigned count = 0;
     bool whole = true;
-    if (spl_fields_count(line, length, layout->separator) != layout->fields)
+    size_t found = spl_fields_count(line, length, layout->separator);
+    if (layout->exact ? found != layout->fields : found < layout->fields)
         return false;
-    bool names = spl_text_names_point(line, length, layout->separator, layout->comma);
+    bool names = spl_text_names_point(layout, line, length);
     while (count < layout->fields && take_whole(&fields, &all[count])) {
         whole &= all[count].is || (names && count == 0);
         count++;
     }
-    bool numbers = count > 3 && all[0].is && !all[0].sign &&
-                   spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
-    for (int i = 0; i < 3 && numbers; i++) {
-        numbers = spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
-        y = i ? y : v;
-        look->coarse |= all[1 + i].is;
-    }
-    numbers &= !look->lines || all[0].value > look->last;
-    look->gaps |= numbers && look->lines && all[0].value != look->last + 1;
-    look->varies |= numbers && look->lines && y != look->y;
-    look->y = numbers ? y : look->y;
+    bool numbers = count > 3 && spl_layout_number(layout, &first, &v) == SPL_FIELD_OK;
+    double n = v, of[3] = {0};
+    for (int i = 0; i < 3 && numbers; i++)
+        numbers = spl_layout_number(layout, &first, &of[i]) == SPL_FIELD_OK;
+    look->bare |= !numbers || !all[0].is || all[0].sign;
+    look->unsorted |= look->bare || (look->lines && all[0].value != look->last + 1);
+    look->falling |= !numbers || !(n >= 0) || (look->lines && n < look->first);
+    look->varies |= numbers && look->lines && of[0] != look->y;
+    bool place = numbers && isfinite(of[0]) && isfinite(of[1]) && isfinite(of[2]);
+    look->places += place;
+    look->near |= place && !(fabs(of[0]) >= map_least && fabs(of[1]) >= map_least && fabs(of[2]) < height_most &&
+                             n < fabs(of[1]));
+    for (int i = 0; i < 3; i++)
+        look->fine[i] |= place && !all[1 + i].is;
+    bool grid = numbers && count > 4 && all[0].is && !all[0].sign && all[1].is && !all[1].sign;
+    grid &= all[0].value < cells && all[1].value < cells;
+    look->coarse |= !grid;
+    for (int i = 0; i < 3; i++)
+        look->inner[i] |= !all[2 + i].is;
+    bool first_stays = all[0].value == look->last, second_stays = all[1].value == look->second;
+    look->strewn[0] |= look->lines && !(all[0].value > look->last || (first_stays && all[1].value > look->second));
+    look->strewn[1] |= look->lines && !(all[1].value > look->second || (second_stays && all[0].value > look->last));
+    look->second = count > 1 ? all[1].value : 0;
+    look->first = n;
+    look->y = of[0];
     look->last = count > 0 ? all[0].value : 0;
-    look->unnumbered |= !numbers;
     look->unnamed |= !names;
     look->fraction |= !whole;
     for (unsigned at = 0; at < 2 && !look->fraction; at++) {
@@ -133,16 +207,30 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
     return true;
 }
 
-static bool counts(const struct spl_text_look *look)
+bool spl_text_look_counts(const struct spl_text_look *look)
 {
-    return !look->unnumbered && look->lines >= (look->gaps ? COUNTED_GAP_LINES : COUNTED_LINES) &&
-           !(look->gaps && look->coarse);
+    return !look->bare && !look->unsorted && look->lines >= COUNTED_LINES;
+}
+
+static bool is_numbered(const struct spl_text_look *look)
+{
+    const bool *fine = look->fine;
+    if (look->places && !look->near && !(look->bare && look->falling))
+        return true;
+    if (fine[0] && fine[1])
+        return fine[2] && !look->bare && look->lines >= COUNTED_LINES;
+    if (fine[1]) /* z, behind x and y of whole numbers */
+        return false;
+    return spl_text_look_counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
 }
 
 unsigned spl_text_look_first(const struct spl_text_look *look)
 {
-    bool numbered = counts(look) && look->varies && (look->fraction || look->lines >= COUNTED_WHOLE_LINES);
-    return look->lines > 0 && (numbered || !look->unnamed);
+    bool cell =
+        !look->coarse && look->inner[0] && look->inner[1] && look->inner[2] && (!look->strewn[0] || !look->strewn[1]);
+    if (cell && look->lines >= COUNTED_LINES)
+        return 2;
+    return look->lines > 0 && (is_numbered(look) || !look->unnamed);
 }
 
 /* Whole numbers have no zeros in front, decimals have, every tenth. */
@@ -152,7 +240,7 @@ int spl_text_look_doubled(const struct spl_text_look *look, char separator)
         const struct spl_text_pairs *pairs = &look->pairs[at];
         bool several = (pairs->zeros & (pairs->zeros - 1)) != 0;
         bool even = !pairs->uneven && pairs->digits > 1;
-        bool behind = at == 0 || !look->unnamed || counts(look);
+        bool behind = at == 0 || !look->unnamed || spl_text_look_counts(look);
         if (!pairs->bad && behind && (several || (even && pairs->zeros) || pairs->parted))
             return at;
     }

@@ -44,75 +44,88 @@ static size_t without_unit(const char *name, size_t length)
     return bare ? bare : length;
 }
 
-/* Only where no column has the name itself. Letters beyond ASCII are in UTF-8 and Latin-1, and in both cases, since
- * strncasecmp() makes none of them small. */
-static int column_from_synonym(const char *name, size_t length, bool letters)
+/* What other languages, surveyors and programs call columns: small letters, without what only parts words. Letters
+ * beyond ASCII are in UTF-8 and Latin-1, and in both cases, since nothing makes them small here. */
+static int column_from_word(const char *word)
 {
     static const struct {
-        const char *name;
+        const char *words; /* with a blank on each side */
         int column;
-    } synonyms[] = {{"easting", SPL_COLUMN_X},
-                    {"northing", SPL_COLUMN_Y},
-                    {"east", SPL_COLUMN_X},
-                    {"north", SPL_COLUMN_Y},
-                    {"up", SPL_COLUMN_Z},
-                    {"height", SPL_COLUMN_Z},
-                    {"elevation", SPL_COLUMN_Z},
-                    {"elev", SPL_COLUMN_Z},
-                    {"h", SPL_COLUMN_Z},
-                    {"rechtswert", SPL_COLUMN_X},
-                    {"hochwert", SPL_COLUMN_Y},
-                    {"ostwert", SPL_COLUMN_X},
-                    {"nordwert", SPL_COLUMN_Y},
-                    {"ost", SPL_COLUMN_X},
-                    {"nord", SPL_COLUMN_Y},
-                    {"hoehe", SPL_COLUMN_Z},
-                    {"h\xc3\xb6he", SPL_COLUMN_Z},
-                    {"h\xc3\x96he", SPL_COLUMN_Z},
-                    {"h\xf6he", SPL_COLUMN_Z},
-                    {"h\xd6he", SPL_COLUMN_Z},
-                    {"x_", SPL_COLUMN_X},
-                    {"y_", SPL_COLUMN_Y},
-                    {"z_", SPL_COLUMN_Z},
-                    {"x-coordinate", SPL_COLUMN_X},
-                    {"y-coordinate", SPL_COLUMN_Y},
-                    {"z-coordinate", SPL_COLUMN_Z},
-                    {"x_coord", SPL_COLUMN_X},
-                    {"y_coord", SPL_COLUMN_Y},
-                    {"z_coord", SPL_COLUMN_Z},
-                    {"coord_x", SPL_COLUMN_X},
-                    {"coord_y", SPL_COLUMN_Y},
-                    {"coord_z", SPL_COLUMN_Z},
-                    {"rot", SPL_COLUMN_RED},
-                    {"gr\xc3\xbcn", SPL_COLUMN_GREEN},
-                    {"gr\xc3\x9cn", SPL_COLUMN_GREEN},
-                    {"gr\xfcn", SPL_COLUMN_GREEN},
-                    {"gr\xdcn", SPL_COLUMN_GREEN},
-                    {"gruen", SPL_COLUMN_GREEN},
-                    {"blau", SPL_COLUMN_BLUE},
-                    {"rouge", SPL_COLUMN_RED},
-                    {"vert", SPL_COLUMN_GREEN},
-                    {"bleu", SPL_COLUMN_BLUE},
-                    {"intensit\xc3\xa4t", SPL_COLUMN_INTENSITY},
-                    {"intensit\xc3\x84t", SPL_COLUMN_INTENSITY},
-                    {"intensit\xe4t", SPL_COLUMN_INTENSITY},
-                    {"intensit\xc4t", SPL_COLUMN_INTENSITY},
-                    {"intensitaet", SPL_COLUMN_INTENSITY},
-                    {"intensit\xc3\xa9", SPL_COLUMN_INTENSITY},
-                    {"intensit\xc3\x89", SPL_COLUMN_INTENSITY},
-                    {"intensit\xe9", SPL_COLUMN_INTENSITY},
-                    {"intensit\xc9", SPL_COLUMN_INTENSITY},
-                    {"reflectivity", SPL_COLUMN_INTENSITY},
-                    {"klasse", SPL_COLUMN_CLASS},
-                    {"classe", SPL_COLUMN_CLASS}};
-    if (letters && is(name, length, "e"))
-        return SPL_COLUMN_X;
-    if (letters && is(name, length, "n"))
-        return SPL_COLUMN_Y;
+    } synonyms[] = {
+        {" x easting east rechtswert ostwert ost est este \xc3\xb6st \xc3\x96st \xf6st \xd6st oost utme points0 ",
+         SPL_COLUMN_X},
+        {" y northing north hochwert nordwert nord norte norr noord utmn points1 ", SPL_COLUMN_Y},
+        {" z up height elevation elev h hoehe h\xc3\xb6he h\xc3\x96he h\xf6he h\xd6he altitude altitud alt cota quota "
+         "h\xc3\xb6jd h\xf6jd hojd hoogte points2 ",
+         SPL_COLUMN_Z},
+        {" red r rot rouge rosso rojo vermelho rood ", SPL_COLUMN_RED},
+        {" green g gr\xc3\xbcn gr\xc3\x9cn gr\xfcn gr\xdcn gruen vert verde groen ", SPL_COLUMN_GREEN},
+        {" blue b blau bleu blu azul blauw ", SPL_COLUMN_BLUE},
+        {" int intensit\xc3\xa4t intensit\xc3\x84t intensit\xe4t intensit\xc4t intensitaet intensit\xc3\xa9 "
+         "intensit\xc3\x89 intensit\xe9 intensit\xc9 intensidad intensidade intensit\xc3\xa0 intensiteit reflectivity ",
+         SPL_COLUMN_INTENSITY},
+        {" klasse classe clase ", SPL_COLUMN_CLASS},
+    };
+    char between[48];
+    snprintf(between, sizeof between, " %s ", word);
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
-        if (is(name, length, synonyms[i].name))
+        if (strstr(synonyms[i].words, between))
             return synonyms[i].column;
     return SPL_COLUMN_SKIP;
+}
+
+static int column_from_rest(const char *word, bool axes)
+{
+    return !axes || (word[0] && !word[1] && strchr("xyz", word[0])) ? column_from_word(word) : SPL_COLUMN_SKIP;
+}
+
+/* The column that a word means without what says that it is one: "posx", "xcoordinate", "eastingm". `axes`: if it is x,
+ * y or z. */
+static int column_from_part(const char *word, bool axes)
+{
+    static const struct {
+        const char *text;
+        bool before, behind;
+    } affixes[] = {{"coordinates", true, true}, {"coordinate", true, true},   {"coord", true, true},
+                   {"koordinate", true, true},  {"coordinaat", true, true},   {"co\xc3\xb6rdinaat", true, true},
+                   {"position", true, true},    {"pos", true, true},          {"point", true, false},
+                   {"wert", false, true},       {"value", false, true},       {"color", true, true},
+                   {"colour", true, true},      {"ellipsoidal", true, false}, {"orthometric", true, false},
+                   {"m", false, true},          {"ft", false, true}};
+    size_t length = strlen(word);
+    int column = SPL_COLUMN_SKIP;
+    for (size_t i = 0; i < sizeof affixes / sizeof *affixes && column < 0; i++) {
+        size_t size = strlen(affixes[i].text);
+        char rest[40];
+        if (size >= length)
+            continue;
+        if (affixes[i].before && !memcmp(word, affixes[i].text, size))
+            column = column_from_rest(word + size, axes);
+        snprintf(rest, sizeof rest, "%.*s", (int)(length - size), word);
+        if (column < 0 && affixes[i].behind && !memcmp(word + length - size, affixes[i].text, size))
+            column = column_from_rest(rest, axes);
+    }
+    return column;
+}
+
+/* Only where no column has the name itself: what surely is an axis before other words, and parts of those last. */
+enum pass { PASS_AXES, PASS_WORDS, PASS_PARTS, PASSES };
+
+static int column_from_synonym(const char *name, size_t length, bool letters, enum pass pass)
+{
+    char word[40];
+    size_t n = 0;
+    if (letters && pass == PASS_WORDS && is(name, length, "e"))
+        return SPL_COLUMN_X;
+    if (letters && pass == PASS_WORDS && is(name, length, "n"))
+        return SPL_COLUMN_Y;
+    for (size_t i = 0; i < length && n + 1 < sizeof word; i++)
+        if (!strchr(" _-.:", name[i]))
+            word[n++] = (char)(name[i] >= 'A' && name[i] <= 'Z' ? name[i] + 32 : name[i]);
+    word[n] = 0;
+    if (n == 0 || n + 1 == sizeof word)
+        return SPL_COLUMN_SKIP;
+    return pass == PASS_WORDS ? column_from_word(word) : column_from_part(word, pass == PASS_AXES);
 }
 
 bool spl_text_names_degrees(const char *line, size_t length)
@@ -143,12 +156,15 @@ static bool has_letters(struct spl_fields fields)
 static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
 {
     bool letters = has_letters(fields);
-    const char *name;
-    size_t length;
-    for (unsigned i = 0; i < layout->fields && next_name(&fields, &name, &length); i++) {
-        int column = column_from_synonym(name, without_unit(name, length), letters);
-        if (column >= 0 && layout->column[i] < 0 && !spl_layout_has(layout, column))
-            layout->column[i] = (int8_t)column;
+    for (int pass = 0; pass < PASSES; pass++) {
+        struct spl_fields again = fields;
+        const char *name;
+        size_t length;
+        for (unsigned i = 0; i < layout->fields && next_name(&again, &name, &length); i++) {
+            int column = column_from_synonym(name, without_unit(name, length), letters, (enum pass)pass);
+            if (column >= 0 && layout->column[i] < 0 && !spl_layout_has(layout, column))
+                layout->column[i] = (int8_t)column;
+        }
     }
 }
 
@@ -168,7 +184,10 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
         numbered |= !stage && IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && IS_ONE_OF(heights, name, length) && layout->column[i] == SPL_COLUMN_Z;
         bool either = stage == 2 && numbered && is(name, length, "z"); /* a German number, no German height */
-        stage = stage == 1 && is(name, length, "x") ? 2 : is(name, length, "y") ? 1 : 0;
+        int axis = is(name, length, "x")   ? SPL_COLUMN_X
+                   : is(name, length, "y") ? SPL_COLUMN_Y
+                                           : column_from_synonym(name, length, false, PASS_AXES);
+        stage = stage == 1 && axis == SPL_COLUMN_X ? 2 : axis == SPL_COLUMN_Y ? 1 : 0;
         layout->doubtful |= either || (height && !numbered);
         if (height && numbered) {
             layout->surveyors = true;
@@ -187,6 +206,10 @@ bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *kee
     while (next_name(&fields, &name, &size)) {
         if (layout->fields == SPL_TEXT_FIELDS)
             return false;
+        if (size > 2 && memmem(name, size, "[]", 2)) { /* a list, as long as it may be: COLMAP's TRACK[] */
+            layout->exact = false;
+            break;
+        }
         uint32_t taken = spl_layout_taken(layout);
         int column = spl_keep_find_column(keep, taken, name, size);
         if (column < 0)

@@ -279,6 +279,9 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
     if (info->guessed[0])
         printf("  columns       %s by the values%s\n", info->guessed,
                info->guessed[0] == '-' ? ": the first numbers or names the points" : "");
+    if (info->north_first)
+        printf("  columns       x has seven digits and y six, as where the north comes before the east: then y and x "
+               "change places in --columns\n");
     if (info->surveyors)
         printf("  columns       Y is the east and X the north, as surveyors have it: x and y here\n");
     if (info->unused[0])

@@ -228,6 +228,11 @@ static int find(struct finding *f, struct spl_system *system, struct spl_error *
     if (rc)
         return rc;
     crs = of ? &of->coordinates : crs;
+    if (of && spl_crs_get_kind(crs->epsg) == SPL_CRS_GEOCENTRIC)
+        say(f,
+            "the coordinates of %.60s count from the middle of the earth (%s), and z is not up there: project the "
+            "scans first, or say with --up X,Y,Z what is up",
+            of->name, name_system(crs, a));
     if (f->has_crs && f->given.angles && !f->has_unit)
         return spl_fail_field(err, SPL_E_USAGE, "crs",
                               "--crs %.60s: longitudes and latitudes are no lengths: project the scans first",

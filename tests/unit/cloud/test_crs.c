@@ -238,7 +238,16 @@ static void what_users_say(void **state)
     } rows[] = {
         {"EPSG:25832", "EPSG:25832 | m | unknown", NULL},
         {"epsg:2994+EPSG:6360", "EPSG:2994+EPSG:6360 | ft | us-ft", NULL},
+        {"EPSG:25832+5783", "EPSG:25832+EPSG:5783 | m | m", NULL},
+        {"EPSG:7415", "EPSG:7415 | m | unknown", NULL},
         {"EPSG:4326", "EPSG:4326 | angles | unknown", NULL},
+        {"EPSG:0", NULL, "EPSG:0 is no coordinate system"},
+        {"EPSG:25832+EPSG:0", NULL, "EPSG:0 is no coordinate system of heights"},
+        {"EPSG:25832+25833", NULL, "EPSG:25833 is no coordinate system of heights"},
+        {"EPSG:25832+EPSG:4978", NULL, "EPSG:4978 is no coordinate system of heights"},
+        {"EPSG:5773", NULL, "EPSG:5773 is one of heights alone: name that of x and y before it"},
+        {"EPSG:5783+EPSG:25832", NULL, "EPSG:5783 is one of heights alone"},
+        {"EPSG:4978", NULL, "EPSG:4978 counts from the middle of the earth, and z is not up there"},
         {"EPSG:", NULL, "takes EPSG and a number"},
         {"EPSG:25832x", NULL, "takes EPSG and a number"},
         {"EPSG:-25832", NULL, "takes EPSG and a number"},
@@ -297,6 +306,23 @@ static void numbers_say_units(void **state)
     }
 }
 
+static void numbers_are_of_a_kind(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t epsg;
+        enum spl_crs_kind kind;
+    } rows[] = {
+        {25832, SPL_CRS_PLACES},    {4326, SPL_CRS_PLACES},     {4979, SPL_CRS_PLACES},    {7415, SPL_CRS_PLACES},
+        {5555, SPL_CRS_PLACES},     {5698, SPL_CRS_PLACES},     {5514, SPL_CRS_PLACES},    {3857, SPL_CRS_PLACES},
+        {5773, SPL_CRS_HEIGHTS},    {3855, SPL_CRS_HEIGHTS},    {5783, SPL_CRS_HEIGHTS},   {7837, SPL_CRS_HEIGHTS},
+        {5703, SPL_CRS_HEIGHTS},    {6360, SPL_CRS_HEIGHTS},    {5941, SPL_CRS_HEIGHTS},   {8228, SPL_CRS_HEIGHTS},
+        {4978, SPL_CRS_GEOCENTRIC}, {4936, SPL_CRS_GEOCENTRIC}, {4328, SPL_CRS_GEOCENTRIC}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (spl_crs_get_kind(rows[i].epsg) != rows[i].kind)
+            fail_msg("EPSG:%u: %d", rows[i].epsg, spl_crs_get_kind(rows[i].epsg));
+}
+
 /* Before the points or behind them, and which of two that contradict each other counts. */
 static void files_say_it(void **state)
 {
@@ -347,9 +373,10 @@ static void files_say_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wkt_is_read),      cmocka_unit_test(odd_wkt_is_refused_where_it_is_odd),
-        cmocka_unit_test(keys_are_read),    cmocka_unit_test(what_users_say),
-        cmocka_unit_test(numbers_say_units), cmocka_unit_test(files_say_it),
+        cmocka_unit_test(wkt_is_read),       cmocka_unit_test(odd_wkt_is_refused_where_it_is_odd),
+        cmocka_unit_test(keys_are_read),     cmocka_unit_test(what_users_say),
+        cmocka_unit_test(numbers_say_units), cmocka_unit_test(numbers_are_of_a_kind),
+        cmocka_unit_test(files_say_it),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
 }

@@ -55,7 +55,7 @@ static void scans(void **state)
         {PLY("element vertex 1\n" XYZ "property list uchar int i\n") "1 2 3 " LEAST "\n", "i", LEAST},
         {HALF "\n1 2 3\n", "count", HALF},
         {"18446744073709551615\n1 2 3\n", "count", "18446744073709551615"},
-        {"1 2 3\nnone 2 3\n", "x", "none"},
+        {"1 2 3\nnought 2 3\n", "x", "nought"},
         {"4294967296\n4294967296\n" STATION, "columns", "4.29497e+09"},
         {HALF "\n4\n" STATION "1 2 3\n", "columns", "4.61169e+18"},
         {"4294967295\n4294967295\n" STATION "1 2 3\n", "columns, rows", "4294967295 x 4294967295"},

@@ -362,9 +362,29 @@ static void the_wrong_byte_order_is_told(void **state)
     }
 }
 
+/* Centres of Gaussians are no points of a scan; an opacity alone makes none. */
+static void gaussians_are_no_scan(void **state)
+{
+    static const char header[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                 "property float z\nproperty float f_dc_0\nproperty float opacity\n"
+                                 "property float scale_0\nproperty float %s\nend_header\n1 2 3 4 5 6 7\n";
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    put_text(&b, header, "rot_0");
+    refused(&b, NULL, SPL_E_INPUT, "f_dc_0", "line 3: f_dc_0: is a model of 3D Gaussians");
+    b.length = 0;
+    put_text(&b, header, "rotation");
+    write_scratch(b.data, b.length);
+    load_path(scratch_path(), NULL, 7, &l);
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(gaussians_are_no_scan),
         cmocka_unit_test(every_type_and_byte_order),
         cmocka_unit_test(doubles_are_exact),
         cmocka_unit_test(other_elements_and_lists_are_skipped),

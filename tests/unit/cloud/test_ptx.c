@@ -109,6 +109,9 @@ static void broken_files_are_refused(void **state)
     refused_text("4000000000\n4000000000\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0\n",
                  SPL_E_INPUT, "columns, rows", "4000000000 x 4000000000");
     refused_text("99999999999\n1\n", SPL_E_INPUT, "columns", "not a count");
+    refused_text("1\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0\n1 2 3 0\n",
+                 SPL_E_INPUT, "columns",
+                 "line 12: columns: the next station's number of columns is due here, and there are 4 numbers");
     refused_text(HEADER "1 2\n", SPL_E_INPUT, "columns, rows", "truncated");
     refused_text(HEADER "1.25 2.25\n", SPL_E_INPUT, "", "2 values");
     refused_text(HEADER "1 2 3 4 5\n", SPL_E_INPUT, "", "line 11");

@@ -52,6 +52,9 @@ static void named_columns(void **state)
     assert_int_equal(l.first.classification[0], 6);
     assert_int_equal(l.attributes, SPL_CLOUD_CLASS);
     loaded_finish(&l);
+    load_text("9 8 7 6 1 2 3\n9 8 7 7 4 5 6\n", "text - -  class x y z", &l);
+    assert_point(&l, 1, 4, 5, 6);
+    loaded_finish(&l);
     load_text("easting northing height whatever\n1 2 3 4\n", "x,y,z", &l); /* columns past the option's are skipped */
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);
@@ -186,6 +189,66 @@ static void a_column_that_is_skipped_may_hold_text(void **state)
     }
 }
 
+/* Behind the numbers too; one that is named is told, one that is to be kept refused. */
+static void columns_of_text_are_left_out(void **state)
+{
+    static const struct {
+        const char *text, *guessed, *unused;
+    } files[] = {
+        {"1 2 3 TREE\n4 5 6 EDGE\n", "x,y,z,text", ""},
+        {"1,2,3,\"Baum, gro\xc3\x9f\"\n4,5,6,\n", "x,y,z and text", ""},
+        {"1,2,3,\"Baum, gro\xc3\x9f\"\n4,5,6,EDGE\n", "x,y,z,text", ""},
+        {"1 2 3 9 0 0 TREE 12:30:05\n4 5 6 255 0 0 EDGE 12:30:06\n", "x,y,z,red,green,blue,text,text", ""},
+        {"1;2;3;TREE;9;0;0\n4;5;6;EDGE;255;0;0\n", "x,y,z,text,red,green,blue", ""},
+        {"7 1 2.5 3 TREE\n8 4 5.5 6 EDGE\n", "x,y,z,intensity,text", "?"},
+        {"P1 1 2 3 TREE\nP2 4 5 6 EDGE\n", "-,x,y,z,text", ""},
+        {"1 2 3\n4 5 6 EDGE\n", "x,y,z and text", ""},
+        {"1 2 3 a big tree\n4 5 6 EDGE\n", "x,y,z and text", ""},
+        {"1,2,3,\n4,5,6,EDGE\n", "x,y,z and text", ""},
+        {"x,y,z,label,code\n1,2,3,tree,A\n4,5,6,edge,B\n", "", "code, class (text)"},
+        {"x,y,z,class\n1,2,3,tree\n4,5,6,\n", "", "class (text)"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        struct loaded l;
+        load_text(files[i].text, NULL, &l);
+        if (l.points != 2 || strcmp(l.guessed, files[i].guessed) != 0)
+            fail_msg("%zu: %llu points, \"%s\", %s", i, (unsigned long long)l.points, l.guessed, l.err.message);
+        if (*files[i].unused != '?') {
+            assert_string_equal(l.unused, files[i].unused);
+            assert_point(&l, 0, 1, 2, 3);
+            assert_point(&l, 1, 4, 5, 6);
+        }
+        loaded_finish(&l);
+    }
+    refused_text("1 2 3 9\n4 5 6 EDGE\n", SPL_E_INPUT, "intensity",
+                 "\"EDGE\" in column 4 is not a number; where the column holds text, '-' in its place of --columns");
+    refused_text("1 2 3 EDGE\n4 5 6 7 8\n", SPL_E_INPUT, "intensity", "\"EDGE\" in column 4 is not a number");
+    refused_text("x y z class\n4 5 6 7\n1 2 3 tree\n", SPL_E_INPUT, "class", "\"tree\" in column 4 is not a number");
+}
+
+/* Cells that say that there is nothing: points without a place are none, colours black. */
+static void missing_values_are_known(void **state)
+{
+    struct loaded l;
+    (void)state;
+    static const char *const texts[] = {"x,y,z,r,g,b,i\n1,2,3,9,8,7,5\n,,,1,1,1,1\n4,5,6,,,,\n",
+                                        "x;y;z;r;g;b;i\n1;2;3;9;8;7;5\nNULL;null;N/A;1;1;1;1\n4;5;6;NA;na;-;none\n",
+                                        "1,2,3,9,8,7,500\n,,,1,1,1,1\n4,5,6,,,,\n",
+                                        "1 2 3 9 8 7 500\nNA NA NA 1 1 1 1\n4 5 6 - - - -\n"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        load_text(texts[i], NULL, &l);
+        if (l.points != 2)
+            fail_msg("%zu: %llu points, \"%s\", %s", i, (unsigned long long)l.points, l.guessed, l.err.message);
+        assert_int_equal(l.skipped, 1);
+        assert_point(&l, 1, 4, 5, 6);
+        assert_color(&l, 0, 9, 8, 7);
+        assert_color(&l, 1, 0, 0, 0);
+        loaded_finish(&l);
+    }
+    refused_text("1,2,3\n4,5\n", SPL_E_INPUT, "z", "line 2: z: column 3 of 3 is missing");
+}
+
 static void words_where_numbers_are_due_are_named(void **state)
 {
     static struct bytes b;
@@ -269,8 +332,8 @@ static void broken_text_is_refused(void **state)
     refused_text("1 2 3\n4 5 six\n", SPL_E_INPUT, "z", "\"six\"");
     refused_text("1,5;2,5;3.5\n", SPL_E_INPUT, "x", "\"1,5\"");
     refused_text("X,Y,Z\n1,2,3,4\n", SPL_E_INPUT, "", "line 2");
-    refused_text("1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
-    refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "intensity", "column 7");
+    refused_text("1 2 3 4\n1 2 3 0x10\n", SPL_E_INPUT, "intensity", "\"0x10\"");
+    refused_text("1 2 3 4 5 6 7\n1 2 3 4 5 6 x\n", SPL_E_INPUT, "blue", "column 7");
     b.length = 0;
     put(&b, "1 2 3\n4 5 6\n7 8\0009\n", 18); /* a zero byte makes it no text */
     refused(&b, NULL, SPL_E_INPUT, "", "no point cloud known");
@@ -307,6 +370,52 @@ static void the_option_is_checked(void **state)
     refused(&b, "x,y,z,r,g,b,g", SPL_E_USAGE, "columns", "green is named twice");
     refused(&b, "x,y,z,x", SPL_E_USAGE, "columns", "twice");
     refused(&b, "x,y,z,-,class", SPL_E_INPUT, "class", "column 5");
+}
+
+#define BYTES(text) text, sizeof(text) - 1
+
+/* By name, with the way out; a mesh's faces and normals would else be points. */
+static void what_is_no_scan_is_named(void **state)
+{
+    static const struct {
+        const char *bytes;
+        size_t length;
+        const char *message;
+    } files[] = {
+        {BYTES("\x1f\x8b\x08\0\0"), "is packed with gzip: unpack it first"},
+        {BYTES("PK\3\4\0\0"), "is a ZIP file"},
+        {"\xff\xfe"
+         "1\0 \0"
+         "2\0",
+         8, "is text in UTF-16: write it as UTF-8 first"},
+        {"1\0 \0"
+         "2\0 \0",
+         8, "may be text in UTF-16"},
+        {BYTES("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1 2 3\n"), "is a model of Wavefront's (OBJ)"},
+        {BYTES("# by hand\r\n\r\nmtllib a.mtl\r\nv 0 0 0\r\n"), "is a model of Wavefront's (OBJ)"},
+        {BYTES("ncols 3\nnrows 1\nxllcorner 0\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
+        {BYTES("NCOLS 3\nNROWS 1\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
+        {BYTES("# vtk DataFile Version 3.0\nx y z\n1 2 3\n"), "is a VTK file"},
+        {BYTES("# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL\n1 PINHOLE 30 20 9 9 15 10\n"),
+         "is COLMAP's list of"},
+        {BYTES("# timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "is a trajectory"},
+        {BYTES("OFF\n3 0 0\n1 2 3\n"), "is a mesh (OFF)"},
+        {BYTES("{\"type\":1}"), "is JSON"},
+        {BYTES("<!DOCTYPE HTML>404"), "is a web page"},
+        {BYTES("II*\0abc"), "is a TIFF"},
+        {BYTES("II*abc"), "no column has this name"},
+    };
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        b.length = 0;
+        put(&b, files[i].bytes, files[i].length);
+        refused(&b, NULL, SPL_E_INPUT, i + 1 < sizeof files / sizeof *files ? "" : "x", files[i].message);
+    }
+    load_text("offset x y z\n9 1 2 3\n", NULL, &l); /* a heading, not a mesh */
+    assert_point(&l, 0, 1, 2, 3);
+    loaded_finish(&l);
 }
 
 static void other_files_are_refused(void **state)
@@ -349,12 +458,15 @@ int main(void)
         cmocka_unit_test(a_header_without_names_asks_for_columns),
         cmocka_unit_test(surveyors_names_are_coordinates),
         cmocka_unit_test(a_column_that_is_skipped_may_hold_text),
+        cmocka_unit_test(columns_of_text_are_left_out),
+        cmocka_unit_test(missing_values_are_known),
         cmocka_unit_test(words_where_numbers_are_due_are_named),
         cmocka_unit_test(decimal_commas_are_named),
         cmocka_unit_test(samples_are_checked_against_the_rest),
         cmocka_unit_test(broken_text_is_refused),
         cmocka_unit_test(the_option_is_checked),
         cmocka_unit_test(other_files_are_refused),
+        cmocka_unit_test(what_is_no_scan_is_named),
         cmocka_unit_test(lines_have_a_limit),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
