@@ -27,8 +27,8 @@ struct spl_view {
     enum spl_method method;
     uint32_t layers;            /* bit per enum spl_layer, at least one */
     double lod;                 /* wanted spacing of splats, samples; 1 = one splat a sample, 0 = every leaf splat */
-    double supersample;         /* samples per pixel side: 1, 2 or 4; 1/2 or 1/4 = rendered at that share of the size
-                                   and enlarged */
+    double supersample;         /* samples per pixel side: 1, 2 or 4; 1/4, 1/2, 5/4 or 3/2 = rendered at so many times
+                                   the size and resampled */
     uint8_t background[4];      /* RGBA; alpha 0 = transparent where nothing is */
     struct spl_disc_params disc; /* of methods that draw discs, as SPL_METHOD_PARAMS says */
     struct spl_fill_params fill; /* of those that fill */

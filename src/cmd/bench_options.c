@@ -10,6 +10,7 @@
 #include "cmd/table.h"
 #include "dataset/dataset.h"
 #include "geom/size.h"
+#include "render/view.h"
 #include "shared.h"
 
 enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
@@ -55,8 +56,8 @@ static int take_supersample(struct spl_cmd_bench_arguments *a, const char *text,
 {
     double side = 0;
     int status = spl_cmd_parse_real("--supersample", text, 0.25, 4, &side, err);
-    if (!status && side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
-        status = spl_fail(err, SPL_E_USAGE, "--supersample takes 0.25, 0.5, 1, 2 or 4, not '%s'", text);
+    if (!status && !spl_supersample_is_known(side))
+        status = spl_fail(err, SPL_E_USAGE, "--supersample takes " SPL_SUPERSAMPLES ", not '%s'", text);
     a->supersamples[a->supersample_count++] = side;
     return status;
 }
@@ -224,7 +225,7 @@ static const struct spl_cmd_option options[] = {
      "writes them",
      .otherwise = "the dataset's own render with every splat and 4x4 samples a pixel", .take = take_reference},
     {"photographs", NULL, "the views' photographs are the reference", .take = take_reference},
-    {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,2,4", .otherwise = "0.25,0.5,1,2",
+    {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,1.25,1.5,2,4", .otherwise = "0.25,0.5,1,2",
      .take = take_supersamples},
     {"atoms", "LIST", "of a splat's texture at most, where the dataset has textures", .otherwise = "0,2,8",
      .take = take_atom_counts},

@@ -59,7 +59,7 @@ void spl_cmd_print_methods(FILE *out, size_t column);
 #define SPL_CMD_DRAWING_ROWS                                                                                           \
     {"lod", "L", "wanted spacing of splats in pixels; 0 = every splat", .otherwise = "1",                              \
      SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
-        {"supersample", "N", "samples per pixel side: 1, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
+        {"supersample", "N", "samples per pixel side: 1, 1.25, 1.5, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
          .otherwise = "1", SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                           \
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent",                              \
          .otherwise = "black, of a GeoTIFF transparent", .take = spl_cmd_take_background},                             \

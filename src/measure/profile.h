@@ -29,7 +29,7 @@ enum spl_setting_maps {
 struct spl_setting {
     enum spl_method method;
     double lod;         /* pixels, as spl_view.lod */
-    double supersample; /* samples per pixel side; below 1: rendered at that share of the size and enlarged */
+    double supersample; /* samples per pixel side, of SPL_SUPERSAMPLES */
     uint32_t atoms; /* as spl_view.atoms; SPL_TEXTURE_ATOMS where the dataset or the method has no textures, or where
                        maps are drawn in their place */
     enum spl_setting_maps maps;

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "render/view.h"
 #include "shared.h"
 
 #define FORMAT "splatd-profile"
@@ -50,10 +51,9 @@ static int check_point(const struct spl_profile_point *point, const char *name, 
     const struct spl_setting *s = &point->setting;
     if (!(s->lod >= 0 && s->lod <= 64))
         return spl_fail_field(err, SPL_E_INPUT, "lod", "%s: point %zu: lod %g is outside 0 to 64", name, index, s->lod);
-    if (s->supersample != 0.25 && s->supersample != 0.5 && s->supersample != 1 && s->supersample != 2 &&
-        s->supersample != 4)
+    if (!spl_supersample_is_known(s->supersample))
         return spl_fail_field(err, SPL_E_INPUT, "supersample",
-                              "%s: point %zu: supersample %g is none of 0.25, 0.5, 1, 2, 4", name, index,
+                              "%s: point %zu: supersample %g is none of " SPL_SUPERSAMPLES, name, index,
                               s->supersample);
     if (s->atoms > SPL_TEXTURE_ATOMS)
         return spl_fail_field(err, SPL_E_INPUT, "atoms", "%s: point %zu: atoms %u is above %d", name, index, s->atoms,

@@ -10,7 +10,7 @@
 #include "base/parallel.h"
 #include "geom/ray_list.h"
 #include "geom/size.h"
-#include "image/enlarge.h"
+#include "image/resample.h"
 #include "image/rows.h"
 #include "render/readback.h"
 #include "render/view.h"

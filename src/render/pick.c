@@ -55,7 +55,7 @@ int spl_pick_view(const struct spl_view *view, double x, double y, struct spl_vi
     out->shade.kinds = SPL_SHADE_NONE;
     out->color = (struct spl_color_params){0};
     out->disc.atoms = 0; // its colour is the splat's
-    out->supersample = fmax(view->supersample, 1); // less is the same at a share of the size
+    out->supersample = spl_view_is_resampled(view) ? 1 : view->supersample; // the same at another size
     if (!camera.width) {
         spl_camera_set_fov(&out->camera, 1, 1, 1, NULL);
         out->camera.near = nowhere;

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "render/view.h"
 
 /* Pieces a renderer: with fewer one waits longer for the last, with more each lists anew what lies at borders. */
 enum { pieces_each = 4, least_side = 64, widest_border = 4 /* as many times what is drawn around is a piece */ };
@@ -36,7 +37,7 @@ struct spl_spread {
 
 bool spl_spread_can(const struct spl_view *view)
 {
-    return view->supersample >= 1 && !view->rays && !spl_camera_is_bent(&view->camera);
+    return !spl_view_is_resampled(view) && !view->rays && !spl_camera_is_bent(&view->camera);
 }
 
 int spl_spread_create(const struct spl_view *view, unsigned renderers, struct spl_spread **out, struct spl_error *err)

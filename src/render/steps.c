@@ -14,7 +14,7 @@
 #include "base/memory.h"
 #include "base/sized.h"
 #include "geom/size.h"
-#include "image/enlarge.h"
+#include "image/resample.h"
 #include "render/advance.h"
 #include "render/around.h"
 #include "render/borrowed.h"
@@ -25,7 +25,7 @@
 #include "render/view.h"
 
 /* A step: 10 ms of a core or two. */
-enum { enlarged_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 };
+enum { resampled_pixels = 1 << 20, looked_up_pixels = 1 << 17, bent_back_pixels = 1 << 14 };
 
 /* Of a tile where maps are drawn: a software driver takes some microseconds a sample for them, and a tile has 10 s. */
 enum { mapped_samples = 1 << 19 };
@@ -34,36 +34,37 @@ struct spl_frame_steps {
     const struct spl_dataset *dataset;
     struct spl_view wanted, view; /* as asked for; as rendered, with at least one sample a pixel */
     struct spl_frame frame;       /* of `view` */
-    struct spl_frame enlarged;    /* of `wanted`, where it has less than a sample a pixel, or is looked up in faces */
-    struct spl_around *around;    // may be NULL: `view` is not one of several faces
+    struct spl_frame
+        resampled;             /* of `wanted`, where its pixels are no whole number of samples, or looked up in faces */
+    struct spl_around *around; // may be NULL: `view` is not one of several faces
     struct spl_frame_job job;
-    uint32_t x, y; /* corner of the tile; y = height: all are there */
-    struct spl_pieces pieces; /* of it that are to be drawn; none: it was not begun */
-    uint32_t row;  /* of `enlarged`, the next */
-    uint32_t borrowed; /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
+    uint32_t x, y;             /* corner of the tile; y = height: all are there */
+    struct spl_pieces pieces;  /* of it that are to be drawn; none: it was not begun */
+    uint32_t row;              /* of `resampled`, the next */
+    uint32_t borrowed;         /* layers of what is handed out whose pixels are the caller's: bit per enum spl_layer */
     struct spl_spread *spread; // may be NULL: these make all of it
     unsigned number;           /* among those that draw the spread */
     struct spl_spread_piece taken; /* of it, where `pieces` has some */
-    bool drew_last;            /* of its pieces */
-    bool prepared; /* its plan is made, for which it may have waited */
-    bool slow;     /* a piece of this tile gave way and was too large to be kept: others are cut before they do */
-    bool paused;   /* the last step gave way in the middle of a piece */
+    bool drew_last;                /* of its pieces */
+    bool prepared;                 /* its plan is made, for which it may have waited */
+    bool slow;   /* a piece of this tile gave way and was too large to be kept: others are cut before they do */
+    bool paused; /* the last step gave way in the middle of a piece */
 };
 
 /* Are its images made of others, that were drawn? */
-static bool is_enlarged(const struct spl_frame_steps *steps)
+static bool is_resampled(const struct spl_frame_steps *steps)
 {
-    return steps->wanted.supersample < 1 || steps->around;
+    return spl_view_is_resampled(&steps->wanted) || steps->around;
 }
 
 /* The frame that is handed out at the end. */
 static struct spl_frame *get_made(struct spl_frame_steps *steps)
 {
-    return is_enlarged(steps) ? &steps->enlarged : &steps->frame;
+    return is_resampled(steps) ? &steps->resampled : &steps->frame;
 }
 
-/* A share of the size, to be enlarged. */
-static void make_coarse(struct spl_view *view)
+/* Another size, to be resampled. */
+static void resize(struct spl_view *view)
 {
     double scale = view->supersample;
     view->supersample = 1;
@@ -130,13 +131,13 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     steps->wanted = *view;
     steps->wanted.method = spl_method_for(view->method, info);
     steps->view = steps->wanted;
-    if (view->supersample < 1)
-        make_coarse(&steps->view);
+    if (spl_view_is_resampled(view))
+        resize(&steps->view);
     if (spl_camera_is_bent(&view->camera))
         rc = spl_around_create(&steps->view, &steps->around, err);
     double advance = spl_camera_advance(&steps->view.camera, info);
-    steps->job = (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame,
-                                        .advance = advance};
+    steps->job =
+        (struct spl_frame_job){.renderer = renderer, .view = &steps->view, .frame = &steps->frame, .advance = advance};
     steps->job.cancelled = options ? spl_cancel_get_flag(options->cancel) : NULL;
     steps->job.hold.alone = options;
     steps->frame.stats.complete = true;
@@ -315,22 +316,22 @@ static int make_tile(struct spl_frame_steps *steps, struct spl_error *err)
     return SPL_OK;
 }
 
-static int enlarge(struct spl_frame_steps *steps, struct spl_error *err)
+static int resample(struct spl_frame_steps *steps, struct spl_error *err)
 {
     const struct spl_camera *camera = &steps->wanted.camera;
-    int rc = spl_frame_make_images(&steps->enlarged, &steps->wanted, err);
+    int rc = spl_frame_make_images(&steps->resampled, &steps->wanted, err);
     if (rc)
         return rc;
     const bool tangential = camera->lens.p[0] != 0 || camera->lens.p[1] != 0; // a ray takes rounds
-    uint32_t pixels = !steps->around ? enlarged_pixels : tangential ? bent_back_pixels : looked_up_pixels;
+    uint32_t pixels = !steps->around ? resampled_pixels : tangential ? bent_back_pixels : looked_up_pixels;
     uint32_t rows = pixels / camera->width + 1, left = camera->height - steps->row;
     uint32_t end = steps->row + (rows < left ? rows : left);
     if (steps->around)
-        spl_around_look_up(steps->around, &steps->wanted, steps->enlarged.images, steps->row, end);
+        spl_around_look_up(steps->around, &steps->wanted, steps->resampled.images, steps->row, end);
     for (int layer = 0; layer < SPL_LAYER_COUNT && !steps->around; layer++)
-        if (steps->enlarged.images[layer].pixels)
-            spl_image_enlarge(&steps->frame.images[layer], steps->wanted.supersample, &steps->enlarged.images[layer],
-                              steps->row, end);
+        if (steps->resampled.images[layer].pixels)
+            spl_image_resample(&steps->frame.images[layer], steps->wanted.supersample, &steps->resampled.images[layer],
+                               steps->row, end);
     steps->row = end;
     return SPL_OK;
 }
@@ -368,7 +369,7 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
         return rc;
     }
     clock = spl_now_ns();
-    rc = enlarge(steps, err);
+    rc = resample(steps, err);
     steps->frame.stats.readback_ms += spl_since_ms(&clock);
     return rc;
 }
@@ -400,9 +401,9 @@ uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
     uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
     const struct spl_piece tile = spl_tiling_get_tile(&steps->job.tiling, camera, steps->x, steps->y);
     uint64_t pieces = steps->pieces.count ? (uint64_t)tile.width * tile.height - steps->pieces.pixels : 0; /* drawn */
-    uint64_t enlarged = is_enlarged(steps) ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
-    enlarged += steps->around ? spl_around_get_samples_left(steps->around) : 0;
-    return (camera->width * rows - steps->x * drawn - pieces) * side * side + enlarged;
+    uint64_t resampled = is_resampled(steps) ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+    resampled += steps->around ? spl_around_get_samples_left(steps->around) : 0;
+    return (camera->width * rows - steps->x * drawn - pieces) * side * side + resampled;
 }
 
 void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
@@ -418,14 +419,14 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
         if (frame && steps->drew_last)
             spl_spread_hand_out(steps->spread, frame);
     } else if (frame && !spl_frame_get_samples_left(steps)) {
-        steps->enlarged.stats = steps->frame.stats;
+        steps->resampled.stats = steps->frame.stats;
         *frame = *made;
         *made = (struct spl_frame){0};
     }
     spl_hold_finish(&steps->job.hold);
     spl_soft_pause_drop(&steps->job.pause);
     spl_frame_finish(&steps->frame);
-    spl_frame_finish(&steps->enlarged);
+    spl_frame_finish(&steps->resampled);
     spl_around_destroy(steps->around);
     free(steps);
 }

@@ -43,11 +43,21 @@ static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
            spl_distortion_is_same(&a->lens, &b->lens);
 }
 
+bool spl_supersample_is_known(double side)
+{
+    return side == 0.25 || side == 0.5 || side == 1 || side == 1.25 || side == 1.5 || side == 2 || side == 4;
+}
+
+bool spl_view_is_resampled(const struct spl_view *view)
+{
+    return view->supersample != floor(view->supersample);
+}
+
 /* What samples are taken of. */
 static struct spl_camera coarsened(const struct spl_view *view)
 {
     struct spl_camera camera = view->camera;
-    if (view->supersample < 1)
+    if (spl_view_is_resampled(view))
         spl_camera_coarsen(&camera, view->supersample);
     return camera;
 }
@@ -95,12 +105,13 @@ static int count_face_pixels(const struct spl_view *view, uint64_t *pixels, stru
 
 uint64_t spl_view_get_samples(const struct spl_view *view)
 {
-    uint64_t side = view->supersample > 1 ? (uint64_t)view->supersample : 1;
+    double side = view->supersample > 1 ? view->supersample : 1;
     uint64_t pixels = (uint64_t)view->camera.width * view->camera.height;
     uint64_t faces;
     if (!spl_camera_is_bent(&view->camera) || count_face_pixels(view, &faces, NULL))
-        return pixels * side * side;
-    return pixels + faces * side * side;
+        return (uint64_t)((double)pixels * side * side);
+    side = spl_view_is_resampled(view) ? 1 : side; // they are of that size
+    return pixels + faces * (uint64_t)(side * side);
 }
 
 uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
@@ -108,6 +119,9 @@ uint64_t spl_view_get_frame_bytes(const struct spl_view *view)
     uint64_t pixel = 4 * (uint64_t)__builtin_popcount(view->layers) + (view->layers & 1u << SPL_LAYER_NORMAL ? 8 : 0);
     uint64_t faces;
     count_face_pixels(view, &faces, NULL);
+    const struct spl_camera drawn = coarsened(view);
+    if (spl_view_is_resampled(view) && !spl_camera_is_bent(&drawn))
+        faces += (uint64_t)drawn.width * drawn.height;
     const uint64_t list = view->rays ? view->rays->count * sizeof view->rays->directions[0] : 0;
     return list + pixel * ((uint64_t)view->camera.width * view->camera.height + faces);
 }
@@ -118,10 +132,9 @@ static int check_around(const struct spl_view *view, struct spl_error *err)
     const struct spl_camera *camera = &view->camera;
     uint64_t faces;
     if (view->layers >> SPL_LAYER_DEPTH & 1)
-        return spl_fail_field(err, SPL_E_INPUT, "layer",
-                              "an image of %s has no one axis that depth could be along; ask for layer range",
-                              camera->lens.kind == SPL_DISTORTION_RADIAL ? "a lens that bends"
-                                                                        : spl_projection_name(camera->projection));
+        return spl_fail_field(
+            err, SPL_E_INPUT, "layer", "an image of %s has no one axis that depth could be along; ask for layer range",
+            camera->lens.kind == SPL_DISTORTION_RADIAL ? "a lens that bends" : spl_projection_name(camera->projection));
     int rc = count_face_pixels(view, &faces, err);
     if (!rc && faces > PIXELS_MAX)
         rc = spl_fail_field(err, SPL_E_LIMIT, view->rays ? "resolution" : "width",
@@ -142,9 +155,9 @@ static int check_rays(const struct spl_view *view, struct spl_error *err)
     if (camera->width != 1 || camera->height != view->rays->count)
         return spl_fail_field(err, SPL_E_USAGE, "rays", "%u rays are an image of 1 x %u pixels, not %u x %u",
                               view->rays->count, view->rays->count, camera->width, camera->height);
-    if (view->supersample < 1)
+    if (spl_view_is_resampled(view))
         return spl_fail_field(err, SPL_E_INPUT, "supersample",
-                              "supersample %g enlarges images; rays take a coarser resolution", view->supersample);
+                              "supersample %g resamples images; rays take another resolution", view->supersample);
     return SPL_OK;
 }
 
@@ -168,9 +181,9 @@ static int check(const struct spl_view *view, struct spl_error *err)
                               view->layers);
     if (!(view->lod >= 0 && view->lod <= 64))
         return spl_fail_field(err, SPL_E_USAGE, "lod", "lod %g is not within 0 and 64", view->lod);
-    double side = view->supersample;
-    if (side != 0.25 && side != 0.5 && side != 1 && side != 2 && side != 4)
-        return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of 0.25, 0.5, 1, 2, 4", side);
+    if (!spl_supersample_is_known(view->supersample))
+        return spl_fail_field(err, SPL_E_USAGE, "supersample", "supersample %g is none of " SPL_SUPERSAMPLES,
+                              view->supersample);
     if (spl_camera_is_bent(&view->camera) && (rc = check_around(view, err)))
         return rc;
     for (int i = 0; i < SPL_PARAM_COUNT && !rc; i++)
@@ -189,7 +202,8 @@ static int refuse_normals(const struct spl_dataset_info *info, const char *field
             finds = spl_method_name(i);
     return spl_fail_field(err, SPL_E_INPUT, field,
                           "dataset '%s' has no normals, as it was packed with --points-only: ask for method %s, which "
-                          "takes them from depth, or pack it without", info->id, finds);
+                          "takes them from depth, or pack it without",
+                          info->id, finds);
 }
 
 int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)

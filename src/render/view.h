@@ -15,6 +15,12 @@ enum {
  * thread. */
 int spl_view_read(const struct spl_view *given, struct spl_view *view, struct spl_error *err);
 
+/* Samples per pixel side that a view may have. Those of a whole number are drawn as such; others are an image of so
+ * many times the size, drawn with one sample a pixel, then resampled. */
+#define SPL_SUPERSAMPLES "0.25, 0.5, 1, 1.25, 1.5, 2 and 4"
+bool spl_supersample_is_known(double side);
+bool spl_view_is_resampled(const struct spl_view *view);
+
 /* Do bent views take samples of the same lens, so that it is traced once? Poses may differ. */
 bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b);
 

@@ -1,6 +1,6 @@
-/* Bilinear enlargement by rows. Where the nearest pixel is empty, so is the result (but for colour and coverage, whose
- * alpha fades): a silhouette stays where the coarse image has it. */
-#include "image/enlarge.h"
+/* Four pixels become one, by rows. Where the nearest pixel is empty, so is the result (but for colour and coverage,
+ * whose alpha fades): a silhouette stays where the image has it. */
+#include "image/resample.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,8 +11,8 @@
 enum { strip = 256 }; /* columns, whose places are those of all rows */
 
 struct job {
-    const struct spl_image *small;
-    struct spl_image *large;
+    const struct spl_image *from;
+    struct spl_image *to;
     double scale;
     uint32_t first; /* row */
 };
@@ -35,6 +35,22 @@ static struct axis place(double at, uint32_t size)
     return (struct axis){.near = (uint32_t)fmin(fmax(nearest, 0), last),
                          .far = (uint32_t)fmin(fmax(far, 0), last),
                          .share = (float)fabs(off)};
+}
+
+/* Of [at, at + scale), 1 < scale <= 2, which ends in the pixel behind the one that it begins in. */
+static struct axis cover(double at, double scale, uint32_t size)
+{
+    double first = floor(at), share = (first + 1 - at) / scale, last = size - 1.0;
+    bool begins = share >= 0.5; /* in the pixel that it has more of */
+    return (struct axis){.near = (uint32_t)fmin(begins ? first : first + 1, last),
+                         .far = (uint32_t)fmin(begins ? first + 1 : first, last),
+                         .share = (float)(begins ? 1 - share : share)};
+}
+
+/* Of pixel `at` of the wanted image. */
+static struct axis find_axis(double at, double scale, uint32_t size)
+{
+    return scale < 1 ? place((at + 0.5) * scale, size) : cover(at * scale, scale, size);
 }
 
 static struct taps place_taps(const struct axis *x, const struct axis *y, uint32_t width)
@@ -119,22 +135,23 @@ static void sample(const struct spl_image *small, const struct taps *t, float to
     }
 }
 
-static void enlarge_rows(void *context, size_t begin, size_t end, unsigned worker)
+static void resample_rows(void *context, size_t begin, size_t end, unsigned worker)
 {
     (void)worker;
     const struct job *j = context;
-    const size_t pixel_bytes = spl_pixel_bytes(j->large->type);
+    const size_t pixel_bytes = spl_pixel_bytes(j->to->type);
+    const float tolerance = 0.01f / (float)fmin(j->scale, 1);
     struct axis columns[strip];
-    for (uint32_t first = 0; first < j->large->width; first += strip) {
-        const uint32_t count = j->large->width - first < strip ? j->large->width - first : strip;
+    for (uint32_t first = 0; first < j->to->width; first += strip) {
+        const uint32_t count = j->to->width - first < strip ? j->to->width - first : strip;
         for (uint32_t x = 0; x < count; x++)
-            columns[x] = place((first + x + 0.5) * j->scale, j->small->width);
+            columns[x] = find_axis(first + x, j->scale, j->from->width);
         for (size_t y = j->first + begin; y < j->first + end; y++) {
-            struct axis row = place(((double)y + 0.5) * j->scale, j->small->height);
-            char *to = (char *)spl_image_row(j->large, y) + first * pixel_bytes;
+            struct axis row = find_axis((double)y, j->scale, j->from->height);
+            char *to = (char *)spl_image_row(j->to, y) + first * pixel_bytes;
             for (uint32_t x = 0; x < count; x++, to += pixel_bytes) {
-                struct taps t = place_taps(&columns[x], &row, j->small->width);
-                sample(j->small, &t, 0.01f / (float)j->scale, to);
+                struct taps t = place_taps(&columns[x], &row, j->from->width);
+                sample(j->from, &t, tolerance, to);
             }
         }
     }
@@ -147,9 +164,8 @@ void spl_image_sample(const struct spl_image *small, double x, double y, float t
     sample(small, &t, tolerance, to);
 }
 
-void spl_image_enlarge(const struct spl_image *small, double scale, struct spl_image *large, uint32_t begin,
-                       uint32_t end)
+void spl_image_resample(const struct spl_image *from, double scale, struct spl_image *to, uint32_t begin, uint32_t end)
 {
-    struct job job = {.small = small, .large = large, .scale = scale, .first = begin};
-    spl_parallel_for(0, end - begin, 32, enlarge_rows, &job);
+    struct job job = {.from = from, .to = to, .scale = scale, .first = begin};
+    spl_parallel_for(0, end - begin, 32, resample_rows, &job);
 }
