@@ -1,7 +1,9 @@
 /* Reading of a collection what lies in its tiles: pages, tables and words, as of a dataset's own; see tiles.h. What is
  * wrong with a tile is wrong with the collection, and said by the tile's name. Any thread; blocks on disk, or on a
  * server. */
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "dataset/open.h"
 #include "dataset/tiles.h"
@@ -100,6 +102,36 @@ static void renumber(struct spl_tables *tables, const struct spl_tile *tile)
         tables->chunks[c].first_id += tile->first_id;
 }
 
+/* A tile is culled by its leaf, so it has to lie there: its cube as any child's, and its box, which may reach out by as
+ * much as walks grow a box. */
+static int check_root(const struct spl_dataset *dataset, const struct spl_tile *tile, const struct spl_tables *tables,
+                      struct spl_error *err)
+{
+    const struct spl_node *leaf = &dataset->whole.nodes[tile->node], *root = tables->nodes;
+    if (tables->page != tile->first_page)
+        return SPL_OK;
+    const char *what = spl_node_judge_child(leaf, root);
+    double farthest = 2 * (double)leaf->spacing + 1e-3 * (double)leaf->size, ranges[2][2] = {{0}};
+    int axis = -1;
+    for (int a = 0; a < 3; a++) {
+        const double low = root->origin[a] + root->box_min[a], high = root->origin[a] + root->box_max[a],
+                     from = leaf->origin[a] + leaf->box_min[a], to = leaf->origin[a] + leaf->box_max[a];
+        if ((axis >= 0 || !what) && fmax(from - low, high - to) <= farthest)
+            continue;
+        farthest = fmax(from - low, high - to);
+        axis = a;
+        memcpy(ranges, (double[2][2]){{low, high}, {from, to}}, sizeof ranges);
+    }
+    if (axis < 0)
+        return SPL_OK;
+    return spl_fail_field(err, SPL_E_CORRUPT, "tiles.node",
+                          "%s: its tile %s does not lie in node %u, which \"node\" of \"tiles\" says: its root's %c "
+                          "is from %.10g to %.10g, the node's from %.10g to %.10g, and the root %s; make the "
+                          "collection anew (splatd collect; of a job splatd pack --join)",
+                          spl_dataset_get_name(dataset), tile->file, tile->node, "xyz"[axis], ranges[0][0],
+                          ranges[0][1], ranges[1][0], ranges[1][1], what ? what : "reaches out of its parent's box");
+}
+
 int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err)
 {
     struct spl_tile *tile = spl_tiles_find(dataset, page);
@@ -110,7 +142,8 @@ int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void
         return rc;
     rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
     rc = end_reading(dataset, tile, rc, &why, err);
-    if (!rc)
-        renumber(block, tile);
-    return rc;
+    if (rc)
+        return rc;
+    renumber(block, tile);
+    return check_root(dataset, tile, block, err);
 }

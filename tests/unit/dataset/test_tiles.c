@@ -94,8 +94,9 @@ static json_t *describe(unsigned t)
     return json;
 }
 
-/* The coarse levels: splats over a cube of 64, of which each octant has some. */
-static void make_city(const char *name, const json_t *said)
+/* The coarse levels: splats over a cube of 64, of which each octant has some; those of the first are a layer as high as
+ * `layer`, if that is not 0. */
+static void make_layered_city(const char *name, const json_t *said, double layer)
 {
     struct make_splat splats[own_splats];
     json_t *meta = json_object();
@@ -104,11 +105,20 @@ static void make_city(const char *name, const json_t *said)
         splats[i] = (struct make_splat){.normal = {0, 0, 1}, .radius = 8, .color = {200}};
         for (int a = 0; a < 3; a++)
             splats[i].position[a] = 64.0 * (i >> 2 * a & 3) / 3;
+        if (layer > 0 && splats[i].position[0] < 32 && splats[i].position[1] < 32 && splats[i].position[2] < 32) {
+            splats[i].position[2] = layer;
+            splats[i].radius = 5;
+        }
     }
     make_dataset_meta = meta;
     make_dataset_file(path_of(name), splats, own_splats, 2);
     make_dataset_meta = NULL;
     json_decref(meta);
+}
+
+static void make_city(const char *name, const json_t *said)
+{
+    make_layered_city(name, said, 0);
 }
 
 /* "forged.spld", which says this of a tile; `value` NULL: nothing. */
@@ -421,6 +431,30 @@ static void test_tiles_that_do_not_fit(void **state)
     }
 }
 
+/* Checksums hold, but tiles hang below each other's leaves: what they have would be looked for where it is not. */
+static void test_tiles_that_lie_elsewhere(void **state)
+{
+    (void)state;
+    json_t *forged = json_deep_copy(tiles);
+    json_object_set_new(json_array_get(forged, 0), "node", json_integer(4));
+    json_object_set_new(json_array_get(forged, 3), "node", json_integer(1));
+    make_city("forged.spld", forged);
+    struct spl_dataset *city = open_city("forged.spld");
+    refuse_page(city, "does not lie in node 4, which \"node\" of \"tiles\" says: its root's y is from 3.9");
+    json_decref(forged);
+    spl_dataset_close(city);
+    make_layered_city("forged.spld", tiles, 29); // in the leaf's cube, and not in its box
+    city = open_city("forged.spld");
+    refuse_page(city, "does not lie in node 1, which \"node\" of \"tiles\" says: its root's z is from 3.9");
+    spl_dataset_close(city);
+    make_layered_city("forged.spld", tiles, 8);
+    city = open_city("forged.spld");
+    struct spl_tables *read;
+    assert_non_null(spl_dataset_borrow_tables(city, 1, &read, NULL));
+    free(read);
+    spl_dataset_close(city);
+}
+
 /* A tile that is a collection itself is refused, whatever else it has. */
 static void test_tiles_that_hold_more(void **state)
 {
@@ -532,6 +566,7 @@ int main(void)
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_tiles_that_lie_elsewhere),
         cmocka_unit_test(test_tiles_that_hold_more),
         cmocka_unit_test(test_a_tile_of_too_many_sections),
         cmocka_unit_test(test_what_stays_of_a_tile),
