@@ -26,14 +26,16 @@ struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page
 
 /* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
  * been put back meanwhile. A server that does not answer has not changed it. */
-static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, int rc, const struct spl_error *why,
-                       struct spl_error *err)
+static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, uint64_t what, int rc,
+                       const struct spl_error *why, struct spl_error *err)
 {
+    struct spl_error told = {0};
     const bool spoilt = rc && rc != SPL_E_TIMEOUT && rc != SPL_E_CANCELLED && rc != SPL_E_NOMEM;
     if (rc)
-        rc = spl_tiles_fail(dataset, tile, why, err);
+        rc = spl_tiles_fail(dataset, tile, why, &told);
     spl_tiles_give_back(dataset, tile, spoilt);
-    return rc;
+    spl_tiles_note(dataset, tile, what, rc, &told);
+    return rc ? spl_fail(err, rc, "%s", told.message) : SPL_OK;
 }
 
 int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err)
@@ -49,7 +51,7 @@ int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *
     rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
     if (!rc && !sound) // nobody looked when it was opened, so it need not have been in use
         rc = spl_fail(&why, SPL_E_CORRUPT, "page %u fails its checksum%s", index, own->remote ? ", fetched twice" : "");
-    return end_reading(dataset, tile, rc, &why, err);
+    return end_reading(dataset, tile, spl_tile_page(page, false), rc, &why, err);
 }
 
 uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page)
@@ -82,7 +84,7 @@ int spl_dataset_read_words(const struct spl_dataset *dataset, uint32_t page, uin
         return rc;
     const struct spl_section *section = own->pages[tile ? page - tile->first_page : page];
     rc = spl_dataset_read(own, section->offset + word * sizeof *out, out, count * sizeof *out, tile ? &why : err);
-    return tile ? end_reading(dataset, tile, rc, &why, err) : rc;
+    return tile ? end_reading(dataset, tile, SPL_TILE_WORDS, rc, &why, err) : rc;
 }
 
 /* Numbers of a tile's own become those of the collection. */
@@ -141,9 +143,11 @@ int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void
     if (rc)
         return rc;
     rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
-    rc = end_reading(dataset, tile, rc, &why, err);
     if (rc)
-        return rc;
+        return end_reading(dataset, tile, spl_tile_page(page, true), rc, &why, err);
+    spl_tiles_give_back(dataset, tile, false);
     renumber(block, tile);
-    return check_root(dataset, tile, block, err);
+    rc = check_root(dataset, tile, block, &why);
+    spl_tiles_note(dataset, tile, spl_tile_page(page, true), rc, &why);
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }

@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "render/slot.h"
 
 static const uint64_t patience_ns = 10 * SPL_NS_PER_S;
 enum { fruitless_max = 8 };
@@ -100,11 +101,13 @@ int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_datas
     return SPL_SLOT_PENDING;
 }
 
-/* Has every slot come? 1 = yes, or one was driven out; 0 = no. */
+/* Has every slot come, or will never? 1 = yes, or one was driven out; 0 = no. */
 static int follow(struct spl_hold *hold, struct spl_error *err)
 {
     for (; hold->come < hold->count; hold->come++) {
         const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
+        if (page->failed && spl_slot_may_miss(hold->dataset, hold->slots[hold->come], page->read->err.code))
+            continue;
         if (page->failed)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
         if (!spl_resident_has_room(page))

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 #include <xxhash.h>
 
+#include "base/clock.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "dataset/open.h"
@@ -313,6 +314,73 @@ static void test_a_tile_that_is_damaged(void **state)
     spl_dataset_close(city);
 }
 
+/* What the third tile is said to be, if anything is; no other has a fault. */
+static bool is_faulty(const struct spl_dataset *city, const char *said)
+{
+    struct spl_faulty_tile faulty[2] = {{0}};
+    const uint32_t count = spl_dataset_list_faulty(city, faulty, 2);
+    assert_true(count <= 1 && spl_dataset_list_faulty(city, NULL, 0) == count);
+    if (count && (strcmp(faulty[0].file, "tile-2.spld") || !strstr(faulty[0].reason, said)))
+        fail_msg("%s: %s", faulty[0].file, faulty[0].reason);
+    for (uint32_t part = 0; part <= tile_count; part++)
+        assert_true(part == 3 || !spl_dataset_is_without(city, part));
+    assert_true(count || !spl_dataset_is_without(city, 3));
+    return count;
+}
+
+static int read_tables(const struct spl_dataset *city, uint32_t page)
+{
+    char *block = malloc(spl_dataset_get_tables_bytes(city, page));
+    int rc = spl_dataset_read_tables(city, page, block, NULL);
+    free(block);
+    return rc;
+}
+
+/* A fault is remembered, and tried again later and later, until what was found wrong is found right. */
+static void test_faults_of_tiles(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    uint32_t page = city->tiles->list[2].first_page, word;
+    assert_false(is_faulty(city, ""));
+    unlink(path_of("tile-2.spld"));
+    assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+    assert_true(is_faulty(city, "there is no such file") && spl_dataset_is_without(city, 3));
+    assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+    assert_true(city->tiles->list[2].pause_ns == 2 * SPL_NS_PER_S); // told by several at once
+    for (unsigned i = 2; i < 10; i++) {
+        const uint64_t all_ns = SPL_NS_PER_S << i, most_ns = 60 * SPL_NS_PER_S;
+        atomic_store(&city->tiles->list[2].without_until_ns, 1); // by now
+        assert_true(!spl_dataset_is_without(city, 3) && is_faulty(city, "there is no such file"));
+        assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+        assert_true(city->tiles->list[2].pause_ns == (all_ns < most_ns ? all_ns : most_ns));
+    }
+    make_tile(2, 2);
+    assert_int_equal(read_tables(city, page), SPL_OK);
+    assert_false(is_faulty(city, ""));
+
+    struct spoil file = spoil_load(path_of("tile-2.spld"));
+    ((uint8_t *)spoil_at(&file, SPL_SECTION_PAGE))[40] ^= 1;
+    spoil_store(&file, path_of("tile-2.spld"), false);
+    free(file.bytes);
+    char *bytes = malloc(spl_dataset_get_page_bytes(city, page));
+    assert_int_equal(spl_dataset_read_page(city, page, bytes, NULL), SPL_E_CORRUPT);
+    assert_int_equal(read_tables(city, page), SPL_OK); // these hold
+    assert_int_equal(spl_dataset_read_words(city, page, 0, &word, 1, NULL), SPL_OK);
+    assert_true(is_faulty(city, "page 0 fails its checksum") && spl_dataset_is_without(city, 3));
+    unlink(path_of("tile-2.spld"));
+    make_tile(2, 2);
+    assert_int_equal(spl_dataset_read_page(city, page, bytes, NULL), SPL_OK);
+    assert_false(is_faulty(city, ""));
+    free(bytes);
+
+    const struct spl_error why = {.code = SPL_E_CORRUPT, .message = "node 5 lies elsewhere"};
+    spl_dataset_spoil_tile(city, page, &why);
+    assert_true(is_faulty(city, "its tile tile-2.spld cannot be read: node 5 lies elsewhere") &&
+                spl_dataset_is_without(city, 3));
+    spl_dataset_close(city);
+}
+
 static void test_only_beside_a_file(void **state)
 {
     (void)state;
@@ -562,6 +630,7 @@ int main(void)
         cmocka_unit_test(test_one_dataset),
         cmocka_unit_test(test_a_tile_that_is_another),
         cmocka_unit_test(test_a_tile_that_is_damaged),
+        cmocka_unit_test(test_faults_of_tiles),
         cmocka_unit_test(test_only_beside_a_file),
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
