@@ -21,6 +21,10 @@ struct spl_source_far {
     uint64_t (*get_moved_ns)(void *context);
     /* Has it been found to be another file than was opened, so that only what was read before can be read? */
     bool (*has_changed)(void *context);
+    /* What is read of it was `good`, or not: then its state is kept by its version, so that it is opened the next time
+     * without a request, or is kept no longer. was_remembered(): it was opened so. NULL of what is no tile. */
+    void (*remember)(void *context, bool good);
+    bool (*was_remembered)(void *context);
 };
 
 struct spl_dataset_source {

@@ -24,6 +24,19 @@ struct spl_tile *spl_tiles_find(const struct spl_dataset *dataset, uint32_t page
     return &tiles->list[low];
 }
 
+/* A tile that was read by a state that nobody asked for, and that is another file there by now: it may hold the same,
+ * uploaded once more, and is opened anew. True once. */
+static bool is_outdated(const struct spl_dataset *dataset, struct spl_tile *tile, const struct spl_dataset *own, int rc,
+                        bool *again)
+{
+    const struct spl_dataset_source *source = &own->source;
+    if (!rc || *again || !own->remote || !source->far->was_remembered(source->context) ||
+        !source->far->has_changed(source->context))
+        return false;
+    spl_tiles_give_back(dataset, tile, true);
+    return *again = true;
+}
+
 /* Gives a tile back that was read with `rc`. One that did not hold is opened anew by who reads it next: it may have
  * been put back meanwhile. A server that does not answer has not changed it. */
 static int end_reading(const struct spl_dataset *dataset, struct spl_tile *tile, uint64_t what, int rc,
@@ -42,13 +55,16 @@ int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *
 {
     struct spl_tile *tile = spl_tiles_find(dataset, page);
     const struct spl_dataset *own;
-    struct spl_error why = {0};
-    bool sound;
-    int rc = spl_tiles_borrow(dataset, tile, &own, err);
-    if (rc)
-        return rc;
+    struct spl_error why;
+    bool sound, again = false;
     const uint32_t index = page - tile->first_page;
-    rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
+    int rc;
+    do {
+        if ((rc = spl_tiles_borrow(dataset, tile, &own, err)))
+            return rc;
+        why = (struct spl_error){0};
+        rc = spl_dataset_read_section(own, own->pages[index], out, &sound, &why);
+    } while (is_outdated(dataset, tile, own, rc, &again));
     if (!rc && !sound) // nobody looked when it was opened, so it need not have been in use
         rc = spl_fail(&why, SPL_E_CORRUPT, "page %u fails its checksum%s", index, own->remote ? ", fetched twice" : "");
     return end_reading(dataset, tile, spl_tile_page(page, false), rc, &why, err);
@@ -138,11 +154,15 @@ int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void
 {
     struct spl_tile *tile = spl_tiles_find(dataset, page);
     const struct spl_dataset *own;
-    struct spl_error why = {0};
-    int rc = spl_tiles_borrow(dataset, tile, &own, err);
-    if (rc)
-        return rc;
-    rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() has seen to that */
+    struct spl_error why;
+    bool again = false;
+    int rc;
+    do {
+        if ((rc = spl_tiles_borrow(dataset, tile, &own, err)))
+            return rc;
+        why = (struct spl_error){0};
+        rc = spl_dataset_read_tables(own, page - tile->first_page, block, &why); /* as large: judge() saw to that */
+    } while (is_outdated(dataset, tile, own, rc, &again));
     if (rc)
         return end_reading(dataset, tile, spl_tile_page(page, true), rc, &why, err);
     spl_tiles_give_back(dataset, tile, false);

@@ -17,6 +17,7 @@ static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
 enum {
     remote_reads = 4, /* of a dataset from afar at once */
+    tile_reads = 32,  /* of a collection from afar: mostly of one small tile each, a round trip */
     failures_max = 16, // that are remembered where nobody waits: each takes a read's place
     uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
 };
@@ -133,8 +134,8 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
                                .bytes = spl_slot_get_bytes(dataset, slot),
                                .owner = page,
                                .get_moved_ns = remote ? spl_slot_get_moved_ns : NULL,
-                               .at_once = remote ? remote_reads : 1,
                                .part = spl_slot_get_part(dataset, slot)};
+    what.at_once = !remote ? 1 : what.part ? tile_reads : remote_reads;
     if (page->read)
         spl_io_raise(residency->io, page->read, rank);
     else

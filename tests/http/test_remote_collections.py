@@ -86,6 +86,16 @@ TRUTH, PICKS, IDS = on_disk()
 assert {p["tile"] for p in PICKS} == {f"tile-{k}.spld" for k in range(TILES)}
 
 
+def other_tile():
+    """Another dataset of the tile's name."""
+    with tempfile.TemporaryDirectory() as folder:
+        splatd("pack", write_tile(pathlib.Path(folder, "a.ply"), SIDE, 0, 77), "-o", pathlib.Path(folder, "tile-1.spld"))
+        return pathlib.Path(folder, "tile-1.spld").read_bytes()
+
+
+OTHER = other_tile()
+
+
 def counts(server):
     return [len(server.files[f"/{name}.spld"].requests) for name in NAMES[1:]]
 
@@ -114,9 +124,69 @@ def test_tiles_come_when_they_are_seen():
         with Daemon(REAL, "--page-cache", pages, datasets=[server.url("city.spld")]) as d:
             opened(d)
             assert good(d, ALL) == TRUTH[3]
-            # whether it is still the same, in a few bytes
-            assert d.status()["counters"]["remote_bytes"] == 4096 * (TILES + 1), d.status()["counters"]
-            assert [b - a for a, b in zip(before, counts(server))] == [1, 1, 1] and d.status()["counters"]["page_cache_hits"] >= 1
+            # whether the collection is still the same, in a few bytes; which says what its tiles are
+            assert d.status()["counters"]["remote_bytes"] == 4096, d.status()["counters"]
+            assert before == counts(server) and d.status()["counters"]["page_cache_hits"] >= 1
+
+
+def forget(pages, blocks):
+    """Drops these blocks of all files from a page cache."""
+    dropped = [path for path in pathlib.Path(pages).rglob("*") if path.is_file() and path.name in {f"{block:010x}" for block in blocks}]
+    assert dropped
+    for path in dropped:
+        path.unlink()
+
+
+def test_what_the_page_cache_has_of_tiles():
+    """It is theirs by the version that the collection names, whatever their server calls it."""
+    with Server(files()) as server, tempfile.TemporaryDirectory() as pages:
+        def daemon():
+            return Daemon(REAL, "--page-cache", pages, "--watch", "0", datasets=[server.url("city.spld")])
+        with daemon() as d:
+            opened(d)
+            server.files["/tile-1.spld"] = File(OTHER)  # nothing of it stays
+            expect_coarse(d, "another", "is another one now")
+            server.files["/tile-1.spld"] = File(DATA["tile-1"])
+        with daemon() as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3] and good(d, IN[1]) == TRUTH[1]
+        forget(pages, [1])  # of tile-1, which alone has two
+        server.files["/tile-1.spld"] = File(DATA["tile-1"], etag='"2"')  # uploaded once more
+        with daemon() as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3] and good(d, IN[1]) == TRUTH[1] and not reason(d)
+        forget(pages, [0])
+        server.files["/tile-1.spld"] = File(DATA["tile-1"], etag='"3"')
+        with daemon() as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3] and not reason(d)
+        del server.files["/tile-1.spld"]
+        with daemon() as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3] and good(d, IN[1]) == TRUTH[1]  # all of it is here
+        forget(pages, [1])
+        server.files["/tile-1.spld"] = File(OTHER, etag='"4"')
+        with daemon() as d:
+            opened(d)
+            assert good(d, IN[0]) == TRUTH[0]
+            expect_coarse(d, "another that was kept", "is another one now")
+
+
+def test_many_small_tiles():
+    """One request each, however many there are, and many at a time."""
+    side, n = 4, 72
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        for k in range(n):
+            splatd("pack", write_tile(folder / f"{k}.ply", SIDE * (k % 9), SIDE * (k // 9), k, side), "-o", folder / f"t-{k}.spld")
+        splatd("collect", folder, "-o", folder / "city.spld")
+        data = {f"/{path.name}": File(path.read_bytes(), delay_s=0.05) for path in folder.glob("*.spld")}
+        with Server(data) as server:
+            with Daemon(REAL, datasets=[server.url("city.spld")]) as d:
+                opened(d)
+                good(d, f"eye={4.5 * SIDE},{4 * SIDE},{9 * SIDE}&target={4.5 * SIDE},{4.01 * SIDE},0&lod=0")
+                assert [len(file.requests) for path, file in data.items() if path != "/city.spld"] == [1] * n
+                assert 16 < len(server.connections) <= 33, len(server.connections)
 
 
 def test_views_at_once():
@@ -157,16 +227,6 @@ def test_credentials_and_names_go_along():
                 said.append(done.stdout)
             pictures.append(out.read_bytes())
         assert said[:2] == said[2:] and pictures[0] == pictures[1], said
-
-
-def other_tile():
-    """Another dataset of the tile's name."""
-    with tempfile.TemporaryDirectory() as folder:
-        splatd("pack", write_tile(pathlib.Path(folder, "a.ply"), SIDE, 0, 77), "-o", pathlib.Path(folder, "tile-1.spld"))
-        return pathlib.Path(folder, "tile-1.spld").read_bytes()
-
-
-OTHER = other_tile()
 
 
 class Later(File):
