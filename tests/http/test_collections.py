@@ -50,6 +50,9 @@ def test_a_collection_is_one_dataset():
             about = d.ask("/v1/datasets/city").json()
             whole = d.ask("/v1/datasets/whole").json()
             assert about["tiles"] == 4 and whole["tiles"] is None
+            tiles = sum(path.stat().st_size for path in folder.glob("city/tile-*"))
+            assert about["bytes"] == (folder / "city/city.spld").stat().st_size and "tile_bytes" not in whole
+            assert about["tile_bytes"] == tiles == next(x["tile_bytes"] for x in d.ask("/v1/datasets").json()["datasets"] if x["id"] == "city")
             assert about["leaf_splats"] == whole["leaf_splats"] == 4 * int(SIDE / STEP)**2
             assert all(abs(a - b) < 0.1 for end in ("min", "max") for a, b in zip(about["bounds"][end], whole["bounds"][end]))
             for place in WHOLE, NEAR:

@@ -195,8 +195,10 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "bytes", count(info->file_bytes));
     set(json, "resident_bytes", count(spl_catalog_entry_get_resident_bytes(entry)));
     set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
-    if (info->tiles)
+    if (info->tiles) {
+        set(json, "tile_bytes", count(info->tile_bytes));
         set(json, "faulty_tiles", describe_faulty(entry));
+    }
     if (!full)
         return json;
     struct spl_profile profile;

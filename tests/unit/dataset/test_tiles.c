@@ -234,16 +234,21 @@ static void test_one_dataset(void **state)
     const struct spl_dataset_info *info = spl_dataset_get_info(city);
     const struct spl_tables *own = spl_dataset_get_tables(city, 0);
     uint32_t page = 1;
-    uint64_t node = own->node_count, id = 0, points = 0, linear = 0;
+    uint64_t node = own->node_count, id = 0, points = 0, linear = 0, bytes = 0;
     for (uint32_t c = 0; c < own->chunk_count; c++)
         id += own->chunks[c].count;
     assert_int_equal(info->tiles, tile_count);
     assert_false(spl_dataset_keeps_all(city));
     assert_null(spl_dataset_find_tile(city, 0));
     for (unsigned t = 0; t < tile_count; t++) {
+        struct spl_dataset *tile = open_tile(t);
+        for (uint32_t i = 0; i < tile->found[SPL_KIND_PAGES].count; i++)
+            bytes += tile->found[SPL_KIND_PAGES].at[i]->bytes + tile->found[SPL_KIND_HEADS].at[i]->bytes;
+        spl_dataset_close(tile);
         points += splats_of[t];
         check_tile(city, t, &page, &node, &id);
     }
+    assert_true(info->tile_bytes == bytes && info->page_bytes < bytes);
     assert_int_equal(info->pages, page);
     assert_true(info->nodes == node && info->ids == id && info->points == points && info->leaf_splats == points);
     assert_int_equal(info->levels, 4);
@@ -459,6 +464,8 @@ static void test_forged(void **state)
                 {"pages", "[]", "tiles[3].pages"},               {"pages", "[[1,1,1]]", "tiles[3].pages"},
                 {"pages", "[[0,1,1,64]]", "tiles[3].pages"},     {"pages", "[[1,1,1,63]]", "tiles[3].pages"},
                 {"pages", "[[1,1,1,4294967296]]", "tiles[3].pages"},
+                {"bytes", "4095", "tiles[3].bytes"},             {"bytes", "1e5", "tiles[3].bytes"},
+                {"bytes", "2305843009213693951", "tiles[3].bytes"},
                 {"pages", "7", "tiles[3].pages"},                {"splat_radius", "0", "tiles[3].splat_radius"},
                 {"splat_radius", "\"1\"", "tiles[3].splat_radius"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -196,6 +196,7 @@ static void check_entry(const json_t *entry, const struct spl_dataset *tile)
     assert_int_equal(number_of(entry, "panel_points"), i->panel_points);
     assert_int_equal(number_of(entry, "meshes"), i->meshes);
     assert_int_equal(number_of(entry, "mesh_points"), i->mesh_points);
+    assert_int_equal(number_of(entry, "bytes"), i->file_bytes);
     for (size_t a = 0; a < 3; a++) {
         const json_t *bounds = json_object_get(entry, "bounds");
         assert_true(json_number_value(json_array_get(json_object_get(bounds, "min"), a)) == i->bounds_min[a]);
