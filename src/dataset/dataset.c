@@ -83,7 +83,7 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
     struct spl_dataset_source source;
     struct spl_error why = {0};
     const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled, how->moved_ns,
-                                          how->expected ? &how->expected->version : NULL};
+                                          how->expected ? &how->expected->version : NULL, how->landed};
     int rc = spl_remote_open(url, &remote, &source, &why);
     if (rc)
         return spl_fail(err, rc, "%s", why.message);

@@ -51,6 +51,7 @@ struct spl_dataset_opening {
     enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
     struct spl_expected *expected; // may be NULL; of a tile
+    const char *landed;         // may be NULL; of a tile: as of struct spl_remote_how
     _Atomic uint64_t *moved_ns; // may be NULL; what from a server comes is noted there too; borrowed until close
 };
 

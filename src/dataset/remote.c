@@ -301,13 +301,23 @@ static bool was_remembered(void *context)
     return ((struct remote *)context)->remembered;
 }
 
+static void get_landed(void *context, char out[SPL_SOURCE_ORIGIN_MAX])
+{
+    const struct spl_remote_link *link = &((struct remote *)context)->origin.link;
+    _Static_assert((int)SPL_SOURCE_ORIGIN_MAX == (int)SPL_REMOTE_ORIGIN_MAX, "the same");
+    *out = '\0';
+    if (link->get_landed)
+        link->get_landed(link->context, out);
+}
+
 static const struct spl_source_far far = {.fetch = fetch,
                                           .expect = expect,
                                           .forget = forget,
                                           .get_moved_ns = get_moved_ns,
                                           .has_changed = has_changed,
                                           .remember = remember,
-                                          .was_remembered = was_remembered};
+                                          .was_remembered = was_remembered,
+                                          .get_landed = get_landed};
 
 /* The state that the page cache has by the file's version. */
 static bool recall(struct remote *remote)
@@ -433,7 +443,7 @@ int spl_remote_open(const char *url, const struct spl_remote_how *how, struct sp
     int rc = spl_remote_url_parse(url, &account, &parsed, err);
     if (rc)
         return rc;
-    if (!(rc = spl_remote_link_open(&parsed, &account, &link, err)) &&
+    if (!(rc = spl_remote_link_open(&parsed, &account, how->landed, &link, err)) &&
         (rc = spl_remote_open_link(&link, parsed.shown, how, out, err)))
         link.close(link.context);
     spl_remote_url_finish(&parsed);

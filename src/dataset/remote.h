@@ -15,6 +15,7 @@ struct spl_remote_how {
     const atomic_bool *cancelled; // may be NULL; borrowed until close
     _Atomic uint64_t *moved_ns;   // may be NULL; gets when something last came, too; borrowed until close
     const uint64_t *version;      // may be NULL; what its reader holds it to: what is kept of it is kept by that
+    const char *landed;           // may be NULL; of a tile: the origin to which its server may send it on, "" = none
 };
 
 /* Asks for the beginning of the file at `url` (remote_url.h), which says how long it is and which state of it is there:

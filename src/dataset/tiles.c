@@ -109,10 +109,14 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
 {
     struct spl_tiles *tiles = dataset->tiles;
     struct spl_expected expected = {.version = tile->version, .pages = tile->page_count};
+    char landed[SPL_SOURCE_ORIGIN_MAX] = "";
+    if (dataset->remote && dataset->source.far->get_landed)
+        dataset->source.far->get_landed(dataset->source.context, landed);
     const struct spl_dataset_opening how = {.cancelled = dataset->cancelled,
                                             .page_cache = tiles->page_cache,
                                             .remote_deadline_ms = tiles->remote_deadline_ms,
                                             .expected = &expected,
+                                            .landed = landed,
                                             .moved_ns = &tile->moved_ns};
     struct spl_error why = {0};
     char *location = spl_remote_make_beside(tiles->beside, tile->file);

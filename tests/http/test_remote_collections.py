@@ -86,6 +86,31 @@ TRUTH, PICKS, IDS = on_disk()
 assert {p["tile"] for p in PICKS} == {f"tile-{k}.spld" for k in range(TILES)}
 
 
+def test_where_a_server_sends_on_to():
+    """Within its own origin, or where it has sent the collection itself; credentials go to no other host."""
+    login = f"me:{SECRET}"
+    with Server(files()) as other, Server(files("deep/")) as server:
+        server.files.update(files())
+        away = {f"/{name}.spld": other.url(f"{name}.spld") for name in NAMES}
+        server.moved["/tile-1.spld"] = "/deep/tile-1.spld"
+        with Daemon(REAL, "--watch", "0", datasets=[server.url("city.spld", user=login)]) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3]
+            assert {authorization is not None for _, _, authorization in server.asked} == {True}
+        for elsewhere in (away["/tile-1.spld"], away["/tile-1.spld"].replace("http:", ""), away["/tile-1.spld"].replace("127.0.0.1", "localhost"),
+                          f"http://127.0.0.1:{server.port}@127.0.0.1:{other.port}/tile-1.spld"):
+            server.moved["/tile-1.spld"] = elsewhere
+            with Daemon(REAL, "--watch", "0", datasets=[server.url("city.spld", user=login)]) as d:
+                opened(d)
+                expect_coarse(d, elsewhere, "its server sends it on to another host")
+                assert good(d, IN[0]) == TRUTH[0] and not other.asked and not other.connections, other.asked
+        server.moved.update(away)
+        with Daemon(REAL, "--watch", "0", datasets=[server.url("city.spld", user=login)]) as d:
+            opened(d)
+            assert good(d, ALL) == TRUTH[3]
+            assert len(other.asked) >= 4 and not any(authorization for _, _, authorization in other.asked), other.asked
+
+
 def other_tile():
     """Another dataset of the tile's name."""
     with tempfile.TemporaryDirectory() as folder:
