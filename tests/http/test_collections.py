@@ -124,6 +124,25 @@ def test_a_missing_tile_is_seen_from_afar():
             assert any("tile-1.spld can be read again" in line for line in d.lines)
 
 
+def test_more_missing_tiles_than_may_be_read():
+    """Of a dataset 256 reads are under way: those that failed stand in the way of no others."""
+    wide = 17
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        for k in range(wide * wide):
+            splatd("pack", write_tile(folder / "scan.ply", SIDE * (k % wide), SIDE * (k // wide), k, 8), "-o", folder / f"tile-{k}.spld", "--threads", 1)
+        splatd("collect", folder, "-o", folder / "city.spld")
+        for k in range(1, wide * wide):
+            (folder / f"tile-{k}.spld").unlink()
+        with Daemon(REAL, datasets=[folder / "city.spld"]) as d:
+            middle = wide * SIDE / 2
+            for more in "", "&wait=0":
+                bad = d.ask(f"/v1/datasets/city/view?{VIEW}&eye={middle},{middle},{2 * wide * SIDE}&target={middle},{middle + 1},0&lod=0{more}")
+                assert bad.status == 200 and bad.headers["Splatd-Complete"] == "false", bad.body
+            faulty = d.ask("/v1/datasets/city").json()["faulty_tiles"]
+            assert faulty["count"] == wide * wide - 1 and len(faulty["first"]) == 10
+
+
 def test_what_can_be_wrong_with_a_tile():
     with tempfile.TemporaryDirectory() as top:
         folder = pathlib.Path(top)
