@@ -59,7 +59,7 @@ export class Gallery {
   }
 
   card(dataset) {
-    const {id, title, state, points, reason} = dataset;
+    const {id, title, state, points, reason, faulty_tiles} = dataset;
     const item = document.createElement("li"),
       link = document.createElement("a"),
       shot = document.createElement("span"),
@@ -70,7 +70,13 @@ export class Gallery {
     name.textContent = title ?? id;
     about.textContent =
       state === "ready"
-        ? [title ? id : "", `${points.toLocaleString("en").replaceAll(",", "\u202f")} points`].filter(Boolean).join(", ")
+        ? [
+            title ? id : "",
+            `${points.toLocaleString("en").replaceAll(",", "\u202f")} points`,
+            faulty_tiles?.count ? `${faulty_tiles.count} tiles cannot be read` : "",
+          ]
+            .filter(Boolean)
+            .join(", ")
         : state === "loading"
           ? "being loaded"
           : `cannot be shown: ${reason}`;

@@ -117,6 +117,8 @@ struct spl_dataset_info {
     uint32_t tiles; /* of a collection: datasets that it is made of, whose sums are in the figures above, but in
                        file_bytes and bits; 0 = it is none */
     bool stations_of_maps;        /* no scan says where it was taken from: they are the places of panoramas */
+    uint64_t tile_bytes; /* of a collection: of its tiles' files; of one that does not say so, what their nodes, chunks
+                            and pages take of these */
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */

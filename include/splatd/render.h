@@ -78,11 +78,11 @@ struct spl_frame_stats {
     uint64_t pages_loaded;      /* that the frame has waited for */
     uint32_t tiles;
     bool complete;              /* every chosen page was drawn; else coarser nodes stood in, as the memory limit or
-                                   spl_view.partial demanded */
+                                   spl_view.partial demanded, or for a tile of a collection that cannot be read */
     double select_ms, upload_ms, clear_ms, depth_ms, shade_ms, resolve_ms, readback_ms, total_ms; /* device times where
                                    the device has timestamps, else host times */
     bool pending;               /* not complete, and more of it is on its way: the same view gets more later. Else the
-                                   memory limit has no room for it */
+                                   memory limit has no room for it, or it is of a tile that cannot be read */
     uint64_t panels_drawn, meshes_drawn, lines_drawn; /* as whole ones or cell by cell; straight pieces of lines */
     uint64_t soft_drawn;        /* soft spheres, in every window that they are drawn in */
     double soft_ms;             /* of their stage, as the others */

@@ -63,8 +63,9 @@ int spl_cmd_print_collection(const char *output, struct spl_error *err)
         return rc;
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     spl_cmd_put_text(stderr, output, 0);
-    fprintf(stderr, ": a collection of %u tile%s, version %016llx, %.2f MB\n", info->tiles, info->tiles == 1 ? "" : "s",
-            (unsigned long long)info->version, (double)info->file_bytes / 1e6);
+    fprintf(stderr, ": a collection of %u tile%s, version %016llx, %.2f MB beside their %.2f MB\n", info->tiles,
+            info->tiles == 1 ? "" : "s", (unsigned long long)info->version, (double)info->file_bytes / 1e6,
+            (double)info->tile_bytes / 1e6);
     spl_dataset_close(dataset);
     return SPL_OK;
 }

@@ -245,7 +245,8 @@ static void print_table(const struct spl_info_report *report)
     if (info->title)
         print_line("  title", info->title);
     if (info->tiles)
-        printf("  tiles         %s, which have sizes of their own\n", spl_cmd_group(info->tiles, a));
+        printf("  tiles         %s, which take %.1f MB more\n", spl_cmd_group(info->tiles, a),
+               (double)info->tile_bytes / 1e6);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");

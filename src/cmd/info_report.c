@@ -282,10 +282,11 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_set_new(widths, name, histogram);
     }
     return json_pack(
-        "{s:s, s:I, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, s:{s:b, "
-        "s:b, s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, s:O?, "
-        "s:O?, s:o, s:s?, s:s?, s:o, s:o, s:o, s:o}",
-        "id", info->id, "tiles", (json_int_t)info->tiles, "version", json_sprintf("%016" PRIx64, info->version),
+        "{s:s, s:I, s:I, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, "
+        "s:{s:b, s:b, s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, "
+        "s:O?, s:O?, s:o, s:s?, s:s?, s:o, s:o, s:o, s:o}",
+        "id", info->id, "tiles", (json_int_t)info->tiles, "tile_bytes", (json_int_t)info->tile_bytes, "version",
+        json_sprintf("%016" PRIx64, info->version),
         "file_bytes", (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats",
         (json_int_t)info->leaf_splats, "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes",
         (json_int_t)info->nodes, "chunks", (json_int_t)info->chunks, "pages", (json_int_t)info->pages, "bounds", "min",

@@ -236,8 +236,9 @@ static const struct spl_cmd_option options[] = {
     {"max-points", "N", "an even part of the scans: the coarse levels of COPC, so many points of other files",
      .otherwise = "all", SPL_CMD_COUNT(struct spl_cmd_pack, pack.max_points, 1, UINT64_MAX)},
     {"plan", "N",
-     "nothing is packed yet: decides what N parts of the scans, each a box, are and have alike, into a new folder JOB "
-     "(-o), for processes on any machines; without what is put onto a scan as a whole: photographs, maps, --prune",
+     "nothing is packed yet: decides what N parts of the scans, each a box, are and have alike, into folder JOB (-o), "
+     "which is made, or whose older plan it replaces (its parts are then packed anew), for processes on any machines; "
+     "without what is put onto a scan as a whole: photographs, maps, --prune",
      SPL_CMD_COUNT_32(struct spl_cmd_pack, plan, 1, SPL_JOB_PARTS_MAX)},
     {"halo", "LENGTH",
      "with --plan: how far around its box a part reads points for the normals and radii of its own, in the scans' unit",

@@ -106,7 +106,10 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     if (spl_view_shows_soft(&a->drawing.view))
         fprintf(stderr, ", %llu soft spheres", (unsigned long long)stats->soft_drawn);
     fprintf(stderr, " in %.1f ms", stats->total_ms);
-    if (!stats->complete)
+    const uint32_t faulty = spl_dataset_list_faulty(dataset, NULL, 0);
+    if (!stats->complete && faulty)
+        fprintf(stderr, "; coarser than asked for: %u of its tiles cannot be read", faulty);
+    else if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
     fputc('\n', stderr);

@@ -82,12 +82,23 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
     char shown[1024];
     struct spl_dataset_source source;
     struct spl_error why = {0};
-    const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled, how->moved_ns};
+    const struct spl_remote_how remote = {how->page_cache, how->remote_deadline_ms, how->cancelled, how->moved_ns,
+                                          how->expected ? &how->expected->version : NULL, how->landed};
     int rc = spl_remote_open(url, &remote, &source, &why);
     if (rc)
         return spl_fail(err, rc, "%s", why.message);
     spl_remote_show(url, shown, sizeof shown);
     rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
+    if (rc && source.far->was_remembered(source.context)) { // its state is asked for
+        source.far->remember(source.context, false);
+        spl_dataset_source_close(&source);
+        why = (struct spl_error){0};
+        how->expected->differs = NULL;
+        rc = spl_remote_open(url, &remote, &source, &why);
+        if (rc)
+            return spl_fail(err, rc, "%s", why.message);
+        rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
+    }
     const bool differs = how->expected && how->expected->differs; // as its header says, which holds
     if ((rc == SPL_E_CORRUPT || rc == SPL_E_INPUT || rc == SPL_E_UNSUPPORTED) && !differs &&
         !source.far->has_changed(source.context)) {
@@ -95,6 +106,7 @@ static int open_remote(const char *url, const struct spl_dataset_opening *how, s
         source.far->forget(source.context, 0, source.size);
         rc = spl_dataset_open_source_as(&source, shown, how, out, &why);
     }
+    source.far->remember(source.context, !rc);
     if (rc)
         spl_dataset_source_close(&source);
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;

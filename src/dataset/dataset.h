@@ -51,6 +51,7 @@ struct spl_dataset_opening {
     enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
     struct spl_expected *expected; // may be NULL; of a tile
+    const char *landed;         // may be NULL; of a tile: as of struct spl_remote_how
     _Atomic uint64_t *moved_ns; // may be NULL; what from a server comes is noted there too; borrowed until close
 };
 
@@ -86,6 +87,21 @@ uint32_t spl_dataset_get_part(const struct spl_dataset *dataset, uint32_t page);
  * another one by now. Any thread. */
 uint64_t spl_dataset_get_moved_ns(const struct spl_dataset *dataset, uint32_t part);
 bool spl_dataset_has_changed(const struct spl_dataset *dataset);
+
+/* Of a collection: was a tile found to be missing, another one or damaged a moment ago, so that its leaf stands in? It
+ * is tried again by who needs it after 2 s, then after twice as long each time, a minute at most. Any thread. */
+bool spl_dataset_is_without(const struct spl_dataset *dataset, uint32_t part);
+
+/* Finds the tile that has page `page` to be damaged: what was read of it by itself does not fit together. */
+void spl_dataset_spoil_tile(const struct spl_dataset *dataset, uint32_t page, const struct spl_error *why);
+
+/* Tiles that could not be read when that was tried last, the first `capacity` of them, in the order of the file;
+ * returns how many there are. What was not tried is not known. Any thread. */
+struct spl_faulty_tile {
+    const char *file; /* borrowed until close */
+    char reason[400];
+};
+uint32_t spl_dataset_list_faulty(const struct spl_dataset *dataset, struct spl_faulty_tile *out, size_t capacity);
 
 /* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
  * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;

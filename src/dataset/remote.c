@@ -7,6 +7,7 @@
  * circle. */
 #include "dataset/remote.h"
 
+#include <inttypes.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,6 +23,7 @@
 
 enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, window = 24 /* blocks of a request */, forgotten_most = 1 << 16 /* on disk */ };
 enum { beginning_most = 4096 }; /* what is asked for of a file whose blocks the page cache may have */
+static const uint64_t state_block = (1ull << 40) - 1; /* the number that a state is kept by, beyond all blocks */
 
 struct spl_remote_counts spl_remote_counts;
 
@@ -30,6 +32,7 @@ struct remote {
     struct spl_page_cache *cache; // may be NULL
     struct spl_page_key key;
     struct spl_remote_blocks blocks;
+    bool by_version, remembered; /* its blocks are kept by its version; its state was, and nobody has asked for it */
     uint64_t expected, expected_end; // guarded by: blocks.mutex; bytes that are wanted soon
     size_t beginning_bytes;          // guarded by: blocks.mutex; what of `beginning` is there
     char beginning[beginning_most];
@@ -118,7 +121,8 @@ static void fetch_run(struct remote *remote, struct spl_remote_block **blocks, u
     struct spl_error why = {0};
     for (unsigned i = 0; i < count; i++)
         run.bytes += blocks[i]->bytes;
-    spl_remote_run(&remote->origin, &run, &why);
+    if (spl_remote_run(&remote->origin, &run, &why) && remote->remembered && atomic_load(&remote->origin.changed))
+        spl_page_cache_drop(remote->cache, remote->key, state_block);
     for (unsigned i = a.at; i < count; i++)
         end_block(remote, blocks[i], &why);
     for (unsigned i = 0; i < a.at; i++)
@@ -282,8 +286,51 @@ static bool has_changed(void *context)
     return atomic_load(&((struct remote *)context)->origin.changed);
 }
 
-static const struct spl_source_far far = {
-    .fetch = fetch, .expect = expect, .forget = forget, .get_moved_ns = get_moved_ns, .has_changed = has_changed};
+static void remember(void *context, bool good)
+{
+    struct remote *remote = context;
+    if (good && remote->by_version && !remote->remembered)
+        spl_page_cache_write(remote->cache, remote->key, state_block, &remote->origin.state,
+                             sizeof remote->origin.state);
+    else if (!good && remote->by_version)
+        spl_page_cache_drop(remote->cache, remote->key, state_block);
+}
+
+static bool was_remembered(void *context)
+{
+    return ((struct remote *)context)->remembered;
+}
+
+static void get_landed(void *context, char out[SPL_SOURCE_ORIGIN_MAX])
+{
+    const struct spl_remote_link *link = &((struct remote *)context)->origin.link;
+    _Static_assert((int)SPL_SOURCE_ORIGIN_MAX == (int)SPL_REMOTE_ORIGIN_MAX, "the same");
+    *out = '\0';
+    if (link->get_landed)
+        link->get_landed(link->context, out);
+}
+
+static const struct spl_source_far far = {.fetch = fetch,
+                                          .expect = expect,
+                                          .forget = forget,
+                                          .get_moved_ns = get_moved_ns,
+                                          .has_changed = has_changed,
+                                          .remember = remember,
+                                          .was_remembered = was_remembered,
+                                          .get_landed = get_landed};
+
+/* The state that the page cache has by the file's version. */
+static bool recall(struct remote *remote)
+{
+    struct spl_remote_state *state = &remote->origin.state;
+    if (!remote->by_version ||
+        !spl_page_cache_read(remote->cache, remote->key, state_block, state, sizeof *state) || !state->size) {
+        *state = (struct spl_remote_state){0};
+        return false;
+    }
+    state->etag[sizeof state->etag - 1] = state->modified[sizeof state->modified - 1] = '\0';
+    return remote->remembered = true;
+}
 
 /* All but its link. */
 static void release(struct remote *remote)
@@ -316,7 +363,8 @@ static void put_first(void *context, const void *data, size_t bytes)
     block->bytes += bytes;
 }
 
-/* The first block, with which comes what the file is held to. Where the page cache may have it, the beginning does. */
+/* The first block, with which comes what the file is held to. Where the page cache may have it, the beginning does; of
+ * what is kept by its version it has nothing where it has no state. */
 static int read_first(struct remote *remote, bool kept, struct spl_error *err)
 {
     bool mine;
@@ -332,7 +380,10 @@ static int read_first(struct remote *remote, bool kept, struct spl_error *err)
     block->bytes = 0; // so far
     struct spl_remote_run run = {.bytes = BLOCK, .put = put_first, .context = block};
     int rc = spl_remote_run(&remote->origin, &run, err);
+    if (!rc && remote->by_version)
+        spl_page_cache_write(remote->cache, remote->key, 0, block->data, block->bytes);
     pthread_mutex_lock(&remote->blocks.mutex);
+    block = spl_remote_blocks_shrink(&remote->blocks, block);
     spl_remote_blocks_end(&remote->blocks, block, rc ? &(struct spl_error){.code = rc} : NULL);
     spl_remote_blocks_let_go(block);
     pthread_mutex_unlock(&remote->blocks.mutex);
@@ -356,14 +407,22 @@ int spl_remote_open_link(const struct spl_remote_link *link, const char *shown, 
     origin->deadline_ms = how->deadline_ms ? how->deadline_ms : SPL_REMOTE_DEADLINE_MS;
     origin->cancelled = how->cancelled;
     origin->also_moved_ns = how->moved_ns;
-    int rc = origin->shown && origin->name ? read_first(remote, how->cache, err)
-                                           : spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
+    remote->by_version = how->version && how->cache;
+    if (remote->by_version) {
+        char version[40];
+        snprintf(version, sizeof version, "version %016" PRIx64, *how->version);
+        remote->cache = spl_page_cache_hold(how->cache);
+        remote->key = spl_page_key_of(shown, version, 0);
+    }
+    int rc = !origin->shown || !origin->name ? spl_fail(err, SPL_E_NOMEM, "out of memory for a URL")
+             : recall(remote)                ? SPL_OK
+                                             : read_first(remote, how->cache && !remote->by_version, err);
     if (rc) {
         release(remote);
         return rc;
     }
     const struct spl_remote_state *state = &origin->state;
-    if (*state->etag || *state->modified) { // else nobody knows of what state blocks are
+    if (!remote->by_version && (*state->etag || *state->modified)) { // else nobody knows of what state blocks are
         remote->cache = spl_page_cache_hold(how->cache);
         remote->key = spl_page_key_of(shown, *state->etag ? state->etag : state->modified, state->size);
     }
@@ -384,7 +443,7 @@ int spl_remote_open(const char *url, const struct spl_remote_how *how, struct sp
     int rc = spl_remote_url_parse(url, &account, &parsed, err);
     if (rc)
         return rc;
-    if (!(rc = spl_remote_link_open(&parsed, &account, &link, err)) &&
+    if (!(rc = spl_remote_link_open(&parsed, &account, how->landed, &link, err)) &&
         (rc = spl_remote_open_link(&link, parsed.shown, how, out, err)))
         link.close(link.context);
     spl_remote_url_finish(&parsed);

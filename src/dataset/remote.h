@@ -14,12 +14,14 @@ struct spl_remote_how {
     uint64_t deadline_ms;         /* how long a read goes on asking while nothing comes; 0 = SPL_REMOTE_DEADLINE_MS */
     const atomic_bool *cancelled; // may be NULL; borrowed until close
     _Atomic uint64_t *moved_ns;   // may be NULL; gets when something last came, too; borrowed until close
+    const uint64_t *version;      // may be NULL; what its reader holds it to: what is kept of it is kept by that
+    const char *landed;           // may be NULL; of a tile: the origin to which its server may send it on, "" = none
 };
 
 /* Asks for the beginning of the file at `url` (remote_url.h), which says how long it is and which state of it is there:
- * only that one is read from here on. Errors have the URL without user and query, the status and what to do:
- * SPL_E_USAGE, SPL_E_UNSUPPORTED, SPL_E_NOT_FOUND, SPL_E_IO. Any thread; blocks, for the deadline and once more at
- * most. */
+ * only that one is read from here on. By its version a state may be kept: then nothing is asked for. Errors have the
+ * URL without user and query, the status and what to do: SPL_E_USAGE, SPL_E_UNSUPPORTED, SPL_E_NOT_FOUND, SPL_E_IO. Any
+ * thread; blocks, for the deadline and once more at most. */
 int spl_remote_open(const char *url, const struct spl_remote_how *how, struct spl_dataset_source *out,
                     struct spl_error *err);
 

@@ -8,13 +8,14 @@
 #include "base/condition.h"
 #include "base/memory.h"
 
-enum { kept = 8 /* unused, of a file */, kept_of_all = 64 };
+enum { kept = 8 /* unused, of a file */ };
+static const uint64_t kept_of_all = 64 << 20; /* bytes, of blocks that may be small: 1000 tiles of 64 KiB */
 
 /* Open ones, those that were read last behind the others. */
 static struct {
     pthread_mutex_t mutex;
     TAILQ_HEAD(, spl_remote_blocks) files; // guarded by: mutex
-    _Atomic uint64_t blocks;               /* listed */
+    _Atomic uint64_t bytes;                /* of blocks that are there and listed */
 } all = {.mutex = PTHREAD_MUTEX_INITIALIZER, .files = TAILQ_HEAD_INITIALIZER(all.files)};
 
 struct spl_remote_block *spl_remote_blocks_find(struct spl_remote_blocks *blocks, uint64_t index)
@@ -38,7 +39,6 @@ struct spl_remote_block *spl_remote_blocks_hold(struct spl_remote_blocks *blocks
             return NULL;
         *block = (struct spl_remote_block){.index = index, .state = SPL_REMOTE_WANTED, .listed = true, .bytes = bytes};
         blocks->listed++;
-        atomic_fetch_add(&all.blocks, 1);
     }
     TAILQ_INSERT_TAIL(&blocks->list, block, link);
     block->users++;
@@ -56,10 +56,20 @@ static void unlist(struct spl_remote_blocks *blocks, struct spl_remote_block *bl
     if (block->listed)
         TAILQ_REMOVE(&blocks->list, block, link);
     blocks->listed -= block->listed;
-    atomic_fetch_sub(&all.blocks, block->listed);
+    atomic_fetch_sub(&all.bytes, block->counted);
+    block->counted = 0;
     block->listed = false;
     if (!block->users)
         free(block);
+}
+
+struct spl_remote_block *spl_remote_blocks_shrink(struct spl_remote_blocks *blocks, struct spl_remote_block *block)
+{
+    TAILQ_REMOVE(&blocks->list, block, link);
+    struct spl_remote_block *smaller = realloc(block, sizeof *block + block->bytes);
+    block = smaller ? smaller : block;
+    TAILQ_INSERT_TAIL(&blocks->list, block, link);
+    return block;
 }
 
 void spl_remote_blocks_end(struct spl_remote_blocks *blocks, struct spl_remote_block *block,
@@ -69,6 +79,9 @@ void spl_remote_blocks_end(struct spl_remote_blocks *blocks, struct spl_remote_b
     if (why) {
         block->err = *why;
         unlist(blocks, block);
+    } else if (block->listed) {
+        block->counted = block->bytes;
+        atomic_fetch_add(&all.bytes, block->counted);
     }
     pthread_cond_broadcast(&blocks->ended);
 }
@@ -107,7 +120,7 @@ void spl_remote_blocks_trim(struct spl_remote_blocks *blocks)
     TAILQ_INSERT_TAIL(&all.files, blocks, link);
     TAILQ_FOREACH(other, &all.files, link)
     {
-        if (other == blocks || atomic_load(&all.blocks) <= kept_of_all)
+        if (other == blocks || atomic_load(&all.bytes) <= kept_of_all)
             break;
         trim(other, 0);
     }

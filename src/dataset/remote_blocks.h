@@ -18,7 +18,7 @@ struct spl_remote_block {
     enum { SPL_REMOTE_WANTED, SPL_REMOTE_READY, SPL_REMOTE_FAILED } state;
     unsigned users;
     bool listed;
-    size_t bytes;
+    size_t bytes, counted; /* of memory, once it is there */
     struct spl_error err; /* why it failed */
     char data[];
 };
@@ -52,6 +52,9 @@ struct spl_remote_block *spl_remote_blocks_find(struct spl_remote_blocks *blocks
 struct spl_remote_block *spl_remote_blocks_hold(struct spl_remote_blocks *blocks, uint64_t index, size_t bytes,
                                                 bool *mine, struct spl_error *err);
 void spl_remote_blocks_let_go(struct spl_remote_block *block);
+
+/* A block whose bytes have become fewer, in less memory; of its one user, before it is there. */
+struct spl_remote_block *spl_remote_blocks_shrink(struct spl_remote_blocks *blocks, struct spl_remote_block *block);
 
 /* It is there, or, with `why`, failed. */
 void spl_remote_blocks_end(struct spl_remote_blocks *blocks, struct spl_remote_block *block,

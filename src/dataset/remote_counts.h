@@ -14,6 +14,7 @@ struct spl_remote_counts {
     _Atomic uint64_t cache_hits, cache_misses;      /* blocks found in the page cache, and fetched */
     _Atomic uint64_t cache_evicted, cache_spoilt;   /* blocks that made room; whose checksum did not hold */
     _Atomic uint64_t cache_failures;                /* writes that the disk refused */
+    _Atomic uint64_t tile_faults;                   /* tiles of collections, here or there, found not to be readable */
 };
 
 extern struct spl_remote_counts spl_remote_counts;

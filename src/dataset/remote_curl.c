@@ -5,7 +5,9 @@
  * Invariants: nothing but http and https is spoken, after a redirect too, and from https no redirect leads to http.
  * Bytes of any answer but a 206 whose head was found right never reach who asked. What is secret (user, password,
  * query, keys) is in no message: those are made here, of curl's words for a code, never of its own texts. S3's
- * signature covers each request anew, so it follows no redirect. */
+ * signature covers each request anew, so it follows no redirect. A tile of a collection is sent on to its own origin
+ * alone, or to the one that the collection itself was sent on to: what a server says of its neighbours is no reason to
+ * ask a third party. curl sends user and password to no other host. */
 #include "dataset/remote_link.h"
 
 #include <inttypes.h>
@@ -30,7 +32,10 @@ struct server {
     size_t origin_bytes; /* of the URL, with its host */
     bool tls, s3, sign;
     char *key_id, *secret, *token_header, *provider; // NULL where nothing is signed
-    TAILQ_ENTRY(server) link; // guarded by: parked.mutex, as all below; in its list where it has some
+    bool bound; /* redirects lead to `own` and to `may_land` alone */
+    char own[SPL_REMOTE_ORIGIN_MAX], may_land[SPL_REMOTE_ORIGIN_MAX];
+    char landed[SPL_REMOTE_ORIGIN_MAX]; // guarded by: parked.mutex, as all below
+    TAILQ_ENTRY(server) link; /* in its list where it has some */
     CURL *kept[handles_kept];
     unsigned kept_count;
 };
@@ -44,6 +49,9 @@ static struct {
 
 /* One request under way. */
 struct exchange {
+    const struct server *server;
+    CURLU *at; // NULL: redirects may lead anywhere; else where it is
+    bool astray; /* one would have led elsewhere */
     const struct spl_remote_ask *ask;
     struct spl_remote_reply *reply;
     bool begun, refused; /* the head of a 206 was found right; what comes is not wanted */
@@ -88,7 +96,8 @@ static void read_range(struct spl_remote_reply *reply, const char *value, size_t
 
 static size_t on_header(char *line, size_t one, size_t length, void *context)
 {
-    struct spl_remote_reply *reply = ((struct exchange *)context)->reply;
+    struct exchange *e = context;
+    struct spl_remote_reply *reply = e->reply;
     const char *value;
     size_t bytes;
     (void)one;
@@ -107,6 +116,10 @@ static size_t on_header(char *line, size_t one, size_t length, void *context)
     } else if ((value = value_of(line, length, "content-encoding", &bytes))) {
         copy(reply->encoding, sizeof reply->encoding, bytes < sizeof reply->encoding ? value : "unknown",
              bytes < sizeof reply->encoding ? bytes : 7);
+    } else if (e->at && reply->status >= 300 && reply->status < 400 &&
+               (value = value_of(line, length, "location", &bytes))) {
+        e->astray = !spl_curl_may_go_on(e->server->curl, e->at, value, bytes, e->server->own, e->server->may_land);
+        return e->astray ? 0 : length;
     }
     return length;
 }
@@ -287,14 +300,35 @@ static void give_handle(struct server *server, CURL *handle)
         server->curl->curl_easy_cleanup(surplus);
 }
 
+static void note_landed(struct server *server, CURL *handle)
+{
+    char *url = NULL, origin[SPL_REMOTE_ORIGIN_MAX];
+    if (server->curl->curl_easy_getinfo(handle, CURLINFO_EFFECTIVE_URL, &url) || !url ||
+        !spl_curl_origin_of(server->curl, url, origin))
+        return;
+    pthread_mutex_lock(&parked.mutex);
+    memcpy(server->landed, origin, sizeof origin);
+    pthread_mutex_unlock(&parked.mutex);
+}
+
+static void get_landed(void *context, char out[SPL_REMOTE_ORIGIN_MAX])
+{
+    const struct server *server = context;
+    pthread_mutex_lock(&parked.mutex);
+    memcpy(out, server->landed, SPL_REMOTE_ORIGIN_MAX);
+    pthread_mutex_unlock(&parked.mutex);
+}
+
 static void ask(void *context, const struct spl_remote_ask *what, struct spl_remote_reply *reply)
 {
     struct server *server = context;
-    struct exchange e = {.ask = what, .reply = reply, .moved_ns = spl_now_ns()};
+    struct exchange e = {.server = server, .ask = what, .reply = reply, .moved_ns = spl_now_ns()};
     struct curl_slist *headers = NULL;
     *reply = (struct spl_remote_reply){0};
     CURL *handle = take_handle(server);
-    if (!handle || !set_up(server, handle, &e, &headers)) {
+    const bool bound = !server->bound || ((e.at = server->curl->curl_url()) &&
+                                          !server->curl->curl_url_set(e.at, CURLUPART_URL, server->url, 0));
+    if (!handle || !bound || !set_up(server, handle, &e, &headers)) {
         reply->may_pass = true;
         snprintf(reply->why, sizeof reply->why, "out of memory for a request");
     } else {
@@ -303,7 +337,13 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
         if (!server->curl->curl_easy_getinfo(handle, CURLINFO_RETRY_AFTER, &seconds) && seconds > 0)
             reply->retry_after_s = (uint64_t)seconds;
         read_code(&e);
-        if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
+        if (reply->status == 206 && !server->bound)
+            note_landed(server, handle);
+        if (e.astray) {
+            snprintf(reply->why, sizeof reply->why,
+                     "its server sends it on to another host, where the tiles of a collection are not looked for");
+            reply->status = 0;
+        } else if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
             bool partly = reply->status == 206;
             reply->may_pass = may_pass(code) || e.stalled;
             snprintf(reply->why, sizeof reply->why, "%s",
@@ -314,6 +354,7 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
     }
     if (handle)
         give_handle(server, handle);
+    server->curl->curl_url_cleanup(e.at);
     server->curl->curl_slist_free_all(headers);
 }
 
@@ -344,7 +385,7 @@ static char *join(const char *a, const char *b)
     return asprintf(&text, "%s%s", a, b) < 0 ? NULL : text;
 }
 
-int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_account *account,
+int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_account *account, const char *landed,
                          struct spl_remote_link *out, struct spl_error *err)
 {
     *out = (struct spl_remote_link){0};
@@ -359,6 +400,9 @@ int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_a
     server->s3 = url->s3;
     server->sign = url->s3 && account->key_id && *account->key_id;
     bool refused = !(server->url = strdup(url->get));
+    server->bound = landed;
+    snprintf(server->may_land, sizeof server->may_land, "%s", landed ? landed : "");
+    spl_curl_origin_of(curl, url->get, server->own);
     const char *host = strstr(url->get, "://");
     server->origin_bytes = host ? (size_t)(host + 3 - url->get) + strcspn(host + 3, "/?") : strlen(url->get);
     if (server->sign) {
@@ -374,6 +418,7 @@ int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_a
         close_server(server);
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a URL");
     }
-    *out = (struct spl_remote_link){.ask = ask, .close = close_server, .context = server};
+    *out = (struct spl_remote_link){
+        .ask = ask, .close = close_server, .context = server, .get_landed = get_landed};
     return SPL_OK;
 }

@@ -37,15 +37,20 @@ struct spl_remote_reply {
     char why[256];      /* "" = the answer came to its end */
 };
 
+enum { SPL_REMOTE_ORIGIN_MAX = 300 }; /* scheme, host and port */
+
 struct spl_remote_link {
     /* Fills *reply, whatever happens. From several threads at once; blocks until the deadline at most. */
     void (*ask)(void *context, const struct spl_remote_ask *ask, struct spl_remote_reply *reply);
     void (*close)(void *context);
     void *context;
+    /* Where the last good answer came from, redirects followed; "" = none has. May be NULL: nobody knows. */
+    void (*get_landed)(void *context, char out[SPL_REMOTE_ORIGIN_MAX]);
 };
 
-/* remote_curl.c, or a stub that says that it was left out. `url` is borrowed during the call. SPL_E_UNSUPPORTED. */
-int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_account *account,
+/* remote_curl.c, or a stub that says that it was left out. Redirects are followed wherever they lead; where `landed` is
+ * not NULL only to the URL's own origin, and to that one. `url` is borrowed during the call. SPL_E_UNSUPPORTED. */
+int spl_remote_link_open(const struct spl_remote_url *url, const struct spl_s3_account *account, const char *landed,
                          struct spl_remote_link *out, struct spl_error *err);
 
 #endif

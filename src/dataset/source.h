@@ -10,6 +10,7 @@
 
 /* What a source from afar can beside reading: a read takes long, and may bring what was spoilt on its way. From any
  * thread, from several at once. */
+enum { SPL_SOURCE_ORIGIN_MAX = 300 };
 struct spl_source_far {
     /* read() of all of `bytes`, which says why not. */
     int (*fetch)(void *context, uint64_t offset, void *out, size_t bytes, struct spl_error *err);
@@ -21,6 +22,12 @@ struct spl_source_far {
     uint64_t (*get_moved_ns)(void *context);
     /* Has it been found to be another file than was opened, so that only what was read before can be read? */
     bool (*has_changed)(void *context);
+    /* What is read of it was `good`, or not: then its state is kept by its version, so that it is opened the next time
+     * without a request, or is kept no longer. was_remembered(): it was opened so. NULL of what is no tile. */
+    void (*remember)(void *context, bool good);
+    bool (*was_remembered)(void *context);
+    /* The origin (scheme, host, port) that its last answer came from; "" = not known. NULL of what is no collection. */
+    void (*get_landed)(void *context, char out[SPL_SOURCE_ORIGIN_MAX]);
 };
 
 struct spl_dataset_source {

@@ -1,7 +1,7 @@
 /* Tiles of a collection, opened for who reads of them; see tiles.h. One that nobody uses is closed when another is to
  * be opened and there are enough; of these the one that was used longest ago. A tile must be the very one that the
- * collection was made of, which its version and the sizes of all its pages say: a tile that is replaced fails what
- * needs it, until the collection is made anew. Any thread.
+ * collection was made of, which its version and the sizes of all its pages say: a tile that is replaced is none,
+ * until the collection is made anew (tiles_faults.c). Any thread.
  *
  * Invariant: a tile is opened by one thread, which holds no mutex meanwhile: who wants another one does not wait for a
  * disk or a server that does not answer. open_count counts those that are being opened as well. */
@@ -109,10 +109,14 @@ static int open_tile(const struct spl_dataset *dataset, struct spl_tile *tile, s
 {
     struct spl_tiles *tiles = dataset->tiles;
     struct spl_expected expected = {.version = tile->version, .pages = tile->page_count};
+    char landed[SPL_SOURCE_ORIGIN_MAX] = "";
+    if (dataset->remote && dataset->source.far->get_landed)
+        dataset->source.far->get_landed(dataset->source.context, landed);
     const struct spl_dataset_opening how = {.cancelled = dataset->cancelled,
                                             .page_cache = tiles->page_cache,
                                             .remote_deadline_ms = tiles->remote_deadline_ms,
                                             .expected = &expected,
+                                            .landed = landed,
                                             .moved_ns = &tile->moved_ns};
     struct spl_error why = {0};
     char *location = spl_remote_make_beside(tiles->beside, tile->file);
@@ -189,7 +193,9 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
                      struct spl_error *err)
 {
     struct spl_tiles *tiles = dataset->tiles;
+    struct spl_error why = {0};
     int rc = SPL_OK;
+    bool opened = false;
     *out = NULL;
     if (!tiles->beside)
         return spl_fail(err, SPL_E_UNSUPPORTED,
@@ -198,10 +204,12 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
                         spl_dataset_get_name(dataset), tile->file);
     spl_remote_begin(); /* opening is many reads, and looks at the flag between them */
     pthread_mutex_lock(&tiles->mutex);
-    while (tile->opening && !(rc = spl_dataset_check_cancelled(dataset, err))) // who opens it has a deadline
+    while (tile->opening && !(rc = spl_dataset_check_cancelled(dataset, &why))) // who opens it has a deadline
         spl_condition_wait(&tiles->opened, &tiles->mutex, spl_now_ns() + look_around_ns);
-    if (!rc && !tile->open)
-        rc = open_for_all(dataset, tile, err);
+    if (!rc && !tile->open) {
+        rc = open_for_all(dataset, tile, &why);
+        opened = true;
+    }
     if (!rc) {
         tile->users++;
         tile->used = ++tiles->borrowings;
@@ -209,7 +217,9 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
     }
     pthread_mutex_unlock(&tiles->mutex);
     spl_remote_end();
-    return rc;
+    if (opened)
+        spl_tiles_note(dataset, tile, SPL_TILE_OPENED, rc, &why);
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
 }
 
 void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *tile, bool spoilt)
@@ -219,7 +229,8 @@ void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *til
     pthread_mutex_lock(&tiles->mutex);
     if (spoilt)
         tile->spoilt = true;
-    if (!--tile->users && (tile->spoilt || tiles->open_count > tiles->open_most))
+    const bool stays = !tile->spoilt && !tile->fault && tiles->open_count <= tiles->open_most; // it may be put back
+    if (!--tile->users && !stays)
         surplus = take(tiles, tile);
     pthread_mutex_unlock(&tiles->mutex);
     spl_dataset_close(surplus);
@@ -232,6 +243,7 @@ void spl_tiles_destroy(struct spl_tiles *tiles)
     for (uint32_t i = 0; tiles->list && i < tiles->count; i++) {
         spl_dataset_close(tiles->list[i].open);
         free(tiles->list[i].file);
+        free(tiles->list[i].fault);
     }
     spl_page_cache_let_go(tiles->page_cache);
     pthread_cond_destroy(&tiles->opened);

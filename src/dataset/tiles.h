@@ -23,6 +23,12 @@ struct spl_tile {
     bool spoilt;   /* something of the open one did not hold: it is closed by its last user */
     bool opening;  /* somebody opens it, without the mutex */
     uint64_t rests_until_ns; /* its server was given up a moment ago */
+
+    /* What of it could not be read last and was not read since; it is as good as not there until then. */
+    char *fault;       // owned; why; NULL: nothing
+    uint64_t faulty;   /* which that was, as of spl_tiles_note() */
+    uint64_t pause_ns; /* after which it is tried again, doubled each time */
+    _Atomic uint64_t without_until_ns;
 };
 
 struct spl_tiles {
@@ -39,6 +45,7 @@ struct spl_tiles {
     unsigned open_most;  /* SPL_TILES_OPEN_MAX, _FAR_MAX; tests set less */
     unsigned open_count; // guarded by: mutex, as below
     uint64_t borrowings;
+    _Atomic uint32_t fault_count; /* of tiles; changed with the mutex */
 };
 
 /* Of a disk each open one has a descriptor; of a server none, and to open one anew takes round trips. */
@@ -65,6 +72,20 @@ int spl_tiles_fail(const struct spl_dataset *dataset, const struct spl_tile *til
 /* spl_dataset_read_page() and _read_tables() of a page of a tile. */
 int spl_tiles_read_page(const struct spl_dataset *dataset, uint32_t page, void *out, struct spl_error *err);
 int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void *block, struct spl_error *err);
+
+/* What was to be read of a tile: what opening it reads, words without their checksum, or a page or the tables of one,
+ * by its number in the collection. */
+#define SPL_TILE_OPENED UINT64_MAX
+#define SPL_TILE_WORDS (UINT64_MAX - 1)
+static inline uint64_t spl_tile_page(uint32_t page, bool tables)
+{
+    return 2 * (uint64_t)page + tables;
+}
+
+/* How reading it went: SPL_E_CORRUPT is a fault of the tile, which is logged once, and SPL_OK of the same ends that;
+ * other codes say nothing of it. The mutex is not held. */
+void spl_tiles_note(const struct spl_dataset *dataset, struct spl_tile *tile, uint64_t what, int rc,
+                    const struct spl_error *why);
 
 /* NULL-safe. */
 void spl_tiles_destroy(struct spl_tiles *tiles);

@@ -8,6 +8,7 @@
 
 #include "base/condition.h"
 #include "base/memory.h"
+#include "dataset/head.h"
 #include "dataset/open.h"
 #include "dataset/remote_url.h"
 #include "dataset/tiles.h"
@@ -60,6 +61,7 @@ static int get_file(const struct spl_dataset *dataset, size_t index, const json_
 /* What all tiles have together so far, their collection's own among it. */
 struct sums {
     uint64_t pages, page_room, levels;
+    uint64_t held; /* bytes of the tile's nodes, chunks and pages */
     double radii; /* of all leaf splats */
     struct spl_page_row row; /* the next page's */
 };
@@ -87,6 +89,7 @@ static int add_page(struct spl_dataset *dataset, size_t index, const json_t *pag
     sums->row.first_chunk += numbers[1];
     sums->row.first_id += numbers[2];
     dataset->info.page_bytes += numbers[3];
+    sums->held += numbers[3] + spl_head_bytes(numbers[0], numbers[1], dataset->info.stream_count, false, false);
     return SPL_OK;
 }
 
@@ -147,8 +150,14 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
     tile->first_id = sums->row.first_id;
     if (!tile->page_count || sums->pages + tile->page_count > sums->page_room)
         return wrong(dataset, index, "pages", "is no list of pages", err);
+    sums->held = 0;
     for (uint32_t p = 0; !rc && p < tile->page_count; p++)
         rc = add_page(dataset, index, json_array_get(pages, p), sums, err);
+    uint64_t bytes = sums->held;
+    if (!rc && json_object_get(json, "bytes"))
+        rc = get(dataset, index, json, "bytes", sums->held, sum_most, &bytes, err);
+    if (!rc && (info->tile_bytes += bytes) > sum_most)
+        rc = wrong(dataset, index, "bytes", "is more than all together can have", err);
     return rc ? rc : tie(dataset, index, tile, sums, err);
 }
 

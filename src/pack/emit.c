@@ -98,20 +98,22 @@ static int write_node(struct emit *e, size_t index, struct spl_encoded_node *enc
     return 0;
 }
 
-/* A node's box holds its descendants' too; rounded outwards where origins differ. */
-static void unite_boxes(struct spl_node *nodes, uint32_t count)
+void spl_emitted_hold_box(struct spl_node *node, const struct spl_node *child)
+{
+    for (int c = 0; c < 3; c++) {
+        double shift = child->origin[c] - node->origin[c];
+        float low = nextafterf((float)(shift + child->box_min[c]), -INFINITY);
+        float high = nextafterf((float)(shift + child->box_max[c]), INFINITY);
+        node->box_min[c] = fminf(node->box_min[c], low);
+        node->box_max[c] = fmaxf(node->box_max[c], high);
+    }
+}
+
+void spl_emitted_unite_boxes(struct spl_node *nodes, uint32_t count)
 {
     for (uint32_t i = count; i-- > 0;)
-        for (uint32_t k = 0; k < nodes[i].child_count; k++) {
-            const struct spl_node *child = &nodes[nodes[i].first_child + k];
-            for (int c = 0; c < 3; c++) {
-                double shift = child->origin[c] - nodes[i].origin[c];
-                float low = nextafterf((float)(shift + child->box_min[c]), -INFINITY);
-                float high = nextafterf((float)(shift + child->box_max[c]), INFINITY);
-                nodes[i].box_min[c] = fminf(nodes[i].box_min[c], low);
-                nodes[i].box_max[c] = fmaxf(nodes[i].box_max[c], high);
-            }
-        }
+        for (uint32_t k = 0; k < nodes[i].child_count; k++)
+            spl_emitted_hold_box(&nodes[i], &nodes[nodes[i].first_child + k]);
 }
 
 static int allocate(struct emit *e, const struct spl_node_encoder *encoder, struct spl_emitted *out,
@@ -166,7 +168,7 @@ int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struc
             rc = spl_stage_check(stage, err);
     }
     if (!rc) {
-        unite_boxes(out->nodes, tree->count);
+        spl_emitted_unite_boxes(out->nodes, tree->count);
         out->bits[SPL_ATTRIBUTE_CHUNK] += (uint64_t)tree->count * SPL_NODE_BYTES * 8;
         spl_dataset_writer_set_streams(writer, out->streams.list, out->streams.count);
         spl_stage_end(stage);

@@ -26,6 +26,11 @@ int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struc
              const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,
              struct spl_emitted *out, struct spl_error *err);
 
+/* A node's box holds its descendants' too, rounded outwards where origins differ: that of one child, or of all nodes,
+ * of which children follow their parents. */
+void spl_emitted_hold_box(struct spl_node *node, const struct spl_node *child);
+void spl_emitted_unite_boxes(struct spl_node *nodes, uint32_t count);
+
 void spl_emitted_finish(struct spl_emitted *emitted);
 
 #endif

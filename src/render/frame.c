@@ -22,10 +22,14 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 };
 
 /* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same
- * answers. One that does not takes what is there, but for the first page. */
+ * answers. One that does not takes what is there, but for the first page. Of a tile of a collection that cannot be read
+ * nothing is there, and its leaf stands in. */
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
+    const uint32_t part = spl_slot_get_part(job->resident->dataset, slot);
     struct spl_error why = {0};
+    if (spl_dataset_is_without(job->resident->dataset, part))
+        return SPL_SELECT_NO;
     if (job->counts && slot < spl_slot_of_tables(job->resident->dataset, 0))
         return SPL_SELECT_YES;
     bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
@@ -34,7 +38,7 @@ static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
     /* for which a coarser one stands in */
     bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT);
-    if (rc < 0 && !no_room)
+    if (rc < 0 && !no_room && !spl_slot_may_miss(job->resident->dataset, slot, rc))
         spl_fail(&job->page_error, rc, "%s", why.message);
     if (rc == SPL_SLOT_PENDING && !awaited)
         return SPL_SELECT_LATER;

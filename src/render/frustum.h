@@ -48,6 +48,49 @@ static inline bool spl_view_box_visible(const struct spl_camera *camera, const s
     return true;
 }
 
+/* The same of a box in the world, and closer: its faces are looked at as well as the image's. For what is dear to look
+ * at. `least` is relative to the eye. */
+static inline bool spl_frustum_meets(const struct spl_camera *camera, const double least[3], const double size[3],
+                                     double pad)
+{
+    const bool parallel = camera->projection == SPL_ORTHOGRAPHIC;
+    const double *rows[3] = {camera->rotation, camera->rotation + 3, camera->rotation + 6}, near = camera->near;
+    const double edges[2][2] = {{(-pad - camera->cx) / camera->fx, (camera->width + pad - camera->cx) / camera->fx},
+                                {(-pad - camera->cy) / camera->fy, (camera->height + pad - camera->cy) / camera->fy}};
+    double along[2] = {0}; // the eye's axis
+    for (int k = 0; k < 3; k++) {
+        along[0] += fmin(rows[2][k] * least[k], rows[2][k] * (least[k] + size[k]));
+        along[1] += fmax(rows[2][k] * least[k], rows[2][k] * (least[k] + size[k]));
+    }
+    if (along[1] < near || along[0] > camera->far)
+        return false;
+    for (int i = 0; i < 4; i++) { // beyond an edge of the image
+        const double sign = i % 2 ? 1 : -1, edge = edges[i / 2][i % 2];
+        double closest = parallel ? -sign * edge : 0;
+        for (int k = 0; k < 3; k++) {
+            const double d = sign * (rows[i / 2][k] - (parallel ? 0 : edge * rows[2][k]));
+            closest += fmin(d * least[k], d * (least[k] + size[k]));
+        }
+        if (closest > 0)
+            return false;
+    }
+    for (int k = 0; k < 3; k++) { // beyond a face of the box is all that is seen
+        double low = INFINITY, high = -INFINITY;
+        for (int corner = 0; corner < 4; corner++) {
+            const double across = edges[0][corner & 1] * rows[0][k] + edges[1][corner >> 1] * rows[1][k];
+            const double step = rows[2][k] + (parallel ? 0 : across), from = (parallel ? across : 0) + near * step;
+            const double to = isfinite(camera->far) ? from + (camera->far - near) * step
+                              : step == 0           ? from
+                                                    : copysign(INFINITY, step);
+            low = fmin(low, fmin(from, to));
+            high = fmax(high, fmax(from, to));
+        }
+        if (least[k] > high || least[k] + size[k] < low)
+            return false;
+    }
+    return true;
+}
+
 /* The samples [low, high] that the box can project to, 2 around it for the low pass and rounding. False when it reaches
  * the near plane: then it has no bound. */
 static inline bool spl_view_box_project(const struct spl_camera *camera, const struct spl_view_box *box, double low[2],

@@ -19,7 +19,7 @@ static void begin_reads(struct spl_hold *hold)
         uint32_t slot = hold->slots[hold->begun];
         struct spl_resident_page *page = &hold->pages[slot];
         struct spl_io_rank rank = {.awaited = true};
-        if (spl_resident_has_room(page) && !page->filled && !page->failed &&
+        if (spl_resident_has_room(page) && !page->filled && !page->failed && !page->missed &&
             !spl_residency_begin_read(hold->residency, hold->dataset, page, slot, rank))
             return;
     }
@@ -100,11 +100,13 @@ int spl_hold_end_walk(struct spl_residency *residency, struct spl_resident_datas
     return SPL_SLOT_PENDING;
 }
 
-/* Has every slot come? 1 = yes, or one was driven out; 0 = no. */
+/* Has every slot come, or will never? 1 = yes, or one was driven out; 0 = no. */
 static int follow(struct spl_hold *hold, struct spl_error *err)
 {
     for (; hold->come < hold->count; hold->come++) {
         const struct spl_resident_page *page = &hold->pages[hold->slots[hold->come]];
+        if (page->missed)
+            continue;
         if (page->failed)
             return spl_fail(err, page->read->err.code, "%s", page->read->err.message);
         if (!spl_resident_has_room(page))
@@ -146,7 +148,7 @@ static void let_go(struct spl_hold *hold, bool all)
     struct spl_residency *residency = hold->residency;
     for (size_t i = 0; i < hold->count; i++) {
         struct spl_resident_page *page = &hold->pages[hold->slots[i]];
-        if (!--page->holds && (page->failed || (all && spl_resident_has_room(page) && !page->filled)))
+        if (!--page->holds && (page->failed || page->missed || (all && spl_resident_has_room(page) && !page->filled)))
             spl_residency_drop_slot(residency, page);
     }
     residency->releases += hold->count > 0;

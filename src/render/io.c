@@ -19,7 +19,7 @@
 
 enum state { FREE, WAITS, BEING_READ, ENDED, TAKEN };
 
-enum { READS = 4 * SPL_IO_READS };
+enum { READS = 4 * SPL_IO_READS, hanging_most = 4 /* of a source, before it gets no more threads */ };
 static const uint64_t hangs_ns = SPL_NS_PER_S;
 
 TAILQ_HEAD(read_list, spl_io_read);
@@ -75,7 +75,7 @@ static bool is_busy(struct spl_io *io, const struct spl_io_what *what)
         hanging += hung;
         part_hangs |= hung && read->what.part == what->part;
     }
-    return part_hangs || moving >= most || hanging >= most;
+    return part_hangs || moving >= most || hanging >= (most < hanging_most ? most : hanging_most);
 }
 
 /* Is there memory for it, and from afar a thread? */

@@ -21,7 +21,7 @@
 
 enum {
     SPL_IO_READS = 256, /* of a source that may be under way, with ended ones not yet given back; 4 times of all */
-    SPL_IO_THREADS = 64, /* three quarters of both may be from afar */
+    SPL_IO_THREADS = 128, /* three quarters of both may be from afar */
 };
 #define SPL_IO_BYTES (64ull << 20) /* that may be read and not given back; one read alone may have more */
 /* The same of what comes from afar, apart from that. What of it hangs counts apart as well: so much may, and more from
@@ -37,7 +37,7 @@ struct spl_io_what {
     void *owner;  /* of the read; not looked at */
     uint64_t (*get_moved_ns)(const void *source, uint32_t index); // when a read of its part that has not ended last
                                                                   // came on; NULL: it is not from afar
-    unsigned at_once; /* reads of the source under way together, beside as many that hang; 0 = 1 */
+    unsigned at_once; /* reads of the source under way together, beside as many that hang, 4 at most; 0 = 1 */
     uint32_t part;    /* of the source: where something of another part hangs this one is read */
 };
 

@@ -17,6 +17,7 @@ static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
 enum {
     remote_reads = 4, /* of a dataset from afar at once */
+    tile_reads = 32,  /* of a collection from afar: mostly of one small tile each, a round trip */
     failures_max = 16, // that are remembered where nobody waits: each takes a read's place
     uploads_max = 16,  // at a time, and SPL_IO_BYTES: tiles come between
 };
@@ -39,7 +40,7 @@ void spl_residency_drop_slot(struct spl_residency *residency, struct spl_residen
     page->tables = NULL;
     page->host_bytes = 0;
     residency->failures -= page->failed;
-    page->filled = page->failed = false;
+    page->filled = page->failed = page->missed = false;
 }
 
 static void drop_dataset(struct spl_residency *residency, struct spl_resident_dataset *resident)
@@ -133,8 +134,8 @@ bool spl_residency_begin_read(struct spl_residency *residency, const struct spl_
                                .bytes = spl_slot_get_bytes(dataset, slot),
                                .owner = page,
                                .get_moved_ns = remote ? spl_slot_get_moved_ns : NULL,
-                               .at_once = remote ? remote_reads : 1,
                                .part = spl_slot_get_part(dataset, slot)};
+    what.at_once = !remote ? 1 : what.part ? tile_reads : remote_reads;
     if (page->read)
         spl_io_raise(residency->io, page->read, rank);
     else
@@ -180,7 +181,7 @@ static int ask(struct spl_residency *residency, struct spl_resident_dataset *res
     page->last_frame = residency->frame;
     if (page->failed && is_told(page, awaited))
         return tell_failure(residency, resident, page, err);
-    if (page->failed)
+    if (page->failed || page->missed)
         spl_residency_drop_slot(residency, page);
     if (residency->crowded && !page->filled) // the walk will be made anew from its start
         return SPL_SLOT_CROWDED;
@@ -241,6 +242,18 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
     return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
 }
 
+/* The dataset remembers why; the read's place is for others, of which there may be as many as tiles. */
+static void miss(struct spl_residency *residency, struct spl_resident_page *page)
+{
+    if (!page->holds) {
+        spl_residency_drop_slot(residency, page);
+        return;
+    }
+    spl_io_end(residency->io, page->read);
+    page->read = NULL;
+    page->missed = true;
+}
+
 int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
 {
     int rc = SPL_OK;
@@ -249,6 +262,10 @@ int spl_residency_upload(struct spl_residency *residency, struct spl_error *err)
     for (int i = 0; !rc && i < uploads_max && bytes < SPL_IO_BYTES && (read = spl_io_take(residency->io)); i++) {
         struct spl_resident_page *page = read->what.owner;
         bytes += read->what.bytes;
+        if (!read->data && spl_slot_may_miss(read->what.source, read->what.index, read->err.code)) {
+            miss(residency, page);
+            continue;
+        }
         if (!read->data) {
             page->failed = true;
             if (residency->failures++ > failures_max && !page->holds)

@@ -31,6 +31,7 @@ struct spl_resident_page {
     uint64_t last_frame;           /* when it was last asked for */
     uint32_t holds;                /* frames that wait with it */
     bool filled, failed;
+    bool missed;                   /* of a tile that cannot be read: nothing comes, and frames go on without */
 };
 
 /* Is it there, or on its way? */

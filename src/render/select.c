@@ -66,6 +66,23 @@ static bool is_seen(const struct spl_walk *w, const struct spl_found_node *found
     return spl_view_box_visible(camera, &all, pad);
 }
 
+/* Is anything in view of what hangs below a leaf of a collection, a tile, which would have to be opened? */
+static bool needs_tile(const struct spl_walk *w, const struct spl_found_node *found)
+{
+    const struct spl_dataset *dataset = w->params->dataset;
+    const struct spl_node *node = found->node;
+    if (!spl_dataset_get_info(dataset)->tiles || spl_dataset_get_part(dataset, node->page) ||
+        !spl_dataset_get_part(dataset, spl_dataset_find_page_of_node(dataset, node->first_child)))
+        return true;
+    const double more = fmax(spl_walk_typical(node), w->params->lod > 0 ? largest_of(found) : 0);
+    double least[3], size[3];
+    for (int i = 0; i < 3; i++) {
+        least[i] = node->origin[i] - w->params->camera->eye[i] + node->box_min[i] - more;
+        size[i] = (double)node->box_max[i] - node->box_min[i] + 2 * more;
+    }
+    return spl_frustum_meets(w->params->camera, least, size, w->params->low_pass);
+}
+
 /* Pushes the children that are in view, the nearest on top. Nothing is pushed, and *pushed false, when the page or the
  * tables of one of them cannot be had: then the node itself is drawn. */
 static int push_children(struct spl_walk *w, const struct spl_node *node, struct spl_found_node *stack, size_t *depth,
@@ -117,6 +134,8 @@ static int walk_tree(struct spl_walk *w, struct spl_error *err)
         if (!is_seen(w, &found, &box) || spl_walk_drops_node(w, found.node, &box))
             continue;
         if (!is_drawn(w, found.node, &box) && depth + 8 <= stack_max) {
+            if (!needs_tile(w, &found))
+                continue;
             rc = push_children(w, found.node, stack, &depth, &pushed, err);
             w->list->complete &= pushed;
         }

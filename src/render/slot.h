@@ -32,6 +32,11 @@ int spl_slot_read(const void *source, uint32_t slot, void *out, struct spl_error
 void spl_slot_hold(const void *source);
 void spl_slot_let_go(const void *source);
 uint32_t spl_slot_get_part(const struct spl_dataset *dataset, uint32_t slot);
+/* Is it of a tile, whose leaf stands in for it where reading it fails so? */
+static inline bool spl_slot_may_miss(const struct spl_dataset *dataset, uint32_t slot, int code)
+{
+    return code == SPL_E_CORRUPT && spl_slot_get_part(dataset, slot);
+}
 uint64_t spl_slot_get_moved_ns(const void *source, uint32_t slot); /* spl_dataset_get_moved_ns() */
 
 #endif

@@ -41,7 +41,7 @@ def signature(account, method, path, headers, signed, stamp):
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
+    protocol_version, disable_nagle_algorithm = "HTTP/1.1", True  # a head and a short body are two packets
 
     def log_message(self, *_):
         pass

@@ -108,6 +108,14 @@ static int know_stations(struct spl_points *p, struct spl_error *err)
     return SPL_OK;
 }
 
+/* What hangs below a leaf is looked for in its box. */
+static void hold_roots(const struct spl_collect *c, uint32_t first, struct spl_node *nodes, uint32_t count)
+{
+    for (size_t i = 0; i < c->count; i++)
+        spl_emitted_hold_box(&nodes[first + i], &c->tiles[i].root);
+    spl_emitted_unite_boxes(nodes, count);
+}
+
 static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, const struct spl_pack_options *said,
                  struct spl_dataset_writer *writer, struct spl_emitted *emitted, struct spl_error *err)
 {
@@ -137,6 +145,7 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
     if (!rc)
         rc = spl_emit(tree, &c->points, &c->wires, &chunk, writer, c->stage, emitted, err);
     if (!rc) {
+        hold_roots(c, first, emitted->nodes, tree->count);
         spl_stage_begin(c->stage, "writing", NULL, 0);
         rc = spl_dataset_writer_finish(writer, emitted->nodes, tree->count, emitted->chunks, emitted->chunk_count, meta,
                                        err);

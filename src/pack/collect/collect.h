@@ -21,8 +21,7 @@ struct spl_collect_tile {
     const char *name; /* of `path`: the file's, in its folder */
     bool in_folder;   /* it was not named itself, so it may be left out */
     uint64_t version;
-    double origin[3], bounds[2][3]; /* of the root's cube; least and most of its points */
-    float size;
+    struct spl_node root; /* as it has it */
     size_t begin, end; /* its root's splats among the points */
     size_t first_vertex, end_vertex; /* its root's lines among those of the wires */
     json_t *entry;     // owned; its object in META, but for "node"

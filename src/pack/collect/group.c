@@ -26,7 +26,7 @@ static int by_key(const void *a, const void *b)
 
 static double middle_of(const struct spl_collect_tile *tile, int axis)
 {
-    return tile->origin[axis] + (double)tile->size / 2;
+    return tile->root.origin[axis] + (double)tile->root.size / 2;
 }
 
 /* By the middles of their cubes, of equal ones by name. */
@@ -100,8 +100,8 @@ static int set_cubes(const struct spl_collect *c, struct spl_tree *tree, uint32_
     for (uint32_t i = 0; i < c->count; i++) {
         struct spl_tree_node *leaf = &tree->nodes[inner + i];
         for (int a = 0; a < 3; a++)
-            leaf->origin[a] = c->tiles[i].origin[a];
-        leaf->size = (double)c->tiles[i].size;
+            leaf->origin[a] = c->tiles[i].root.origin[a];
+        leaf->size = (double)c->tiles[i].root.size;
         leaf->begin = c->tiles[i].begin;
         leaf->end = c->tiles[i].end;
         leaf->splat_count = (uint32_t)(leaf->end - leaf->begin);

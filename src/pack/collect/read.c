@@ -159,6 +159,7 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
                               "min", vector(i->bounds_min), "max", vector(i->bounds_max), "pages", pages);
     failed |= !entry || json_object_set_new(entry, "splat_radius", json_real(i->splat_radius)) != 0;
     failed |= !entry || json_object_set_new(entry, "mesh_points", json_integer((json_int_t)i->mesh_points)) != 0;
+    failed |= !entry || json_object_set_new(entry, "bytes", json_integer((json_int_t)i->file_bytes)) != 0;
     if (!failed)
         return entry;
     json_decref(entry);

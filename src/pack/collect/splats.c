@@ -162,10 +162,8 @@ int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, 
         rc = take_chunk(c, tile, dataset, tables, i, err);
     tile->end = c->points.count;
     tile->end_vertex = c->wires.count;
-    if (!rc) {
-        memcpy(tile->origin, tables->nodes[0].origin, sizeof tile->origin);
-        tile->size = tables->nodes[0].size;
-    }
+    if (!rc)
+        tile->root = tables->nodes[0];
     if (!rc && tile->end == tile->begin)
         rc = spl_fail_field(err, SPL_E_INPUT, "inputs", "%.200s: its root has no splats; pack it again", tile->path);
     free(read);

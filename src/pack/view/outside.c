@@ -11,6 +11,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "geom/size.h"
 #include "geom/vector.h"
 #include "pack/median.h"
 
@@ -138,8 +139,17 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
 static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
                       double share, double least, double most, double fit[2], struct spl_error *err)
 {
+    static const double none[3] = {0};
     struct spl_camera camera = {0};
-    int rc = spl_camera_look_at(&camera, eye, target, up, err);
+    double ahead[3], length = 0; /* the frame may turn coordinates that a camera can have into larger ones */
+    for (int c = 0; c < 3; c++) {
+        ahead[c] = target[c] - eye[c];
+        length = fmax(length, fmax(fabs(eye[c]), fabs(target[c])));
+    }
+    for (int c = 0; c < 3; c++)
+        ahead[c] /= fmax(length, DBL_MIN);
+    int rc = length > SPL_CAMERA_COORDINATE_MAX ? spl_camera_look_at(&camera, none, ahead, up, err)
+                                                : spl_camera_look_at(&camera, eye, target, up, err);
     double *values = rc ? NULL : spl_alloc_raw(s->count, sizeof *values, err);
     if (!values)
         return rc ? rc : SPL_E_NOMEM;
@@ -156,6 +166,22 @@ static int fit_sample(const struct spl_view_sample *s, const double eye[3], cons
     }
     free(values);
     return 0;
+}
+
+/* An eye farther out than a camera can stand comes as near as it can, and then needs a wider field. */
+static bool bring_near(const struct spl_view_sample *s, double eye[3])
+{
+    static const double most = 0.999 * SPL_CAMERA_COORDINATE_MAX;
+    double world[3];
+    bool far = false;
+    spl_view_to_world(s, eye, world);
+    for (int c = 0; c < 3; c++) {
+        far |= fabs(world[c]) > most;
+        world[c] = fmin(fmax(world[c], -most), most);
+    }
+    if (far)
+        spl_view_to_frame(s, world, eye);
+    return far;
 }
 
 /* Degrees above the horizon from which the subject is looked at first: flat ones from above, upright ones from
@@ -216,7 +242,9 @@ int spl_view_from_outside(const struct spl_view_sample *s, unsigned threads, str
             eye[c] -= (depth_of - at) * axes[2][c];
             target[c] = eye[c] + depth_of * axes[2][c];
         }
-        rc = fit_sample(s, eye, target, up, beyond, 20, 90, view->fit, err);
+        const bool near = bring_near(s, eye);
+        bring_near(s, target);
+        rc = fit_sample(s, eye, target, up, beyond, 20, near ? 150 : 90, view->fit, err);
     }
     if (!rc) {
         spl_view_to_world(s, eye, view->eye);

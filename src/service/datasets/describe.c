@@ -164,6 +164,18 @@ static json_t *describe_stations(const struct spl_catalog_entry *entry)
                      info->stations_of_maps ? "panoramas" : "scan", "uri", json_sprintf("%s/stations", entry->uri));
 }
 
+/* Tiles that could not be read when that was tried last. */
+static json_t *describe_faulty(const struct spl_catalog_entry *entry)
+{
+    enum { most = 10 };
+    struct spl_faulty_tile tiles[most];
+    const uint32_t all = spl_dataset_list_faulty(entry->dataset, tiles, most);
+    json_t *list = json_array();
+    for (uint32_t i = 0; i < all && i < most; i++)
+        json_array_append_new(list, json_pack("{s:s, s:s}", "file", tiles[i].file, "reason", tiles[i].reason));
+    return json_pack("{s:o, s:o}", "count", count(all), "first", list);
+}
+
 json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
 {
     const struct spl_dataset_info *info = entry->info;
@@ -183,6 +195,10 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "bytes", count(info->file_bytes));
     set(json, "resident_bytes", count(spl_catalog_entry_get_resident_bytes(entry)));
     set(json, "bounds", json_pack("{s:o, s:o}", "min", vector(info->bounds_min), "max", vector(info->bounds_max)));
+    if (info->tiles) {
+        set(json, "tile_bytes", count(info->tile_bytes));
+        set(json, "faulty_tiles", describe_faulty(entry));
+    }
     if (!full)
         return json;
     struct spl_profile profile;

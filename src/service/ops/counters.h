@@ -27,6 +27,7 @@ static inline void spl_counters_collect(struct spl_counters *counters)
     atomic_store(&counters->page_cache_evicted, atomic_load(&remote->cache_evicted));
     atomic_store(&counters->page_cache_spoilt, atomic_load(&remote->cache_spoilt));
     atomic_store(&counters->page_cache_failures, atomic_load(&remote->cache_failures));
+    atomic_store(&counters->tile_faults, atomic_load(&remote->tile_faults));
 }
 
 #define spl_count(counters, name) atomic_fetch_add_explicit(&(counters)->name, 1, memory_order_relaxed)

@@ -127,6 +127,15 @@ static void print_datasets(FILE *out, const struct spl_catalog *catalog)
             fprintf(out, "splatd_dataset_resident_bytes{dataset=\"%s\"} %llu\n", slot->id,
                     (unsigned long long)spl_catalog_entry_get_resident_bytes(slot->current));
     }
+    fprintf(out, "# HELP splatd_dataset_faulty_tiles Tiles of a collection that are missing, other ones or damaged, as "
+                 "far as views have met them; /v1/datasets says which.\n"
+                 "# TYPE splatd_dataset_faulty_tiles gauge\n");
+    for (size_t i = 0; i < catalog->count; i++) {
+        const struct spl_catalog_slot *slot = &catalog->slots[i];
+        if (slot->current && slot->current->info->tiles)
+            fprintf(out, "splatd_dataset_faulty_tiles{dataset=\"%s\"} %u\n", slot->id,
+                    spl_dataset_list_faulty(slot->current->dataset, NULL, 0));
+    }
     gauge(out, "splatd_datasets", "Datasets that are served.", served);
     gauge(out, "splatd_datasets_refused", "Datasets whose newest file is not served; /v1/datasets says why.", refused);
 }

@@ -702,6 +702,28 @@ static void test_many_files(void **state)
     stop(&s);
 }
 
+/* What small files take is what they have: as many as fit stay, all of them read by one request each. */
+static void test_many_small_files(void **state)
+{
+    (void)state;
+    enum { count = 300, small = 30000 };
+    struct server s;
+    struct spl_dataset_source sources[count];
+    start(&s, small);
+    const size_t before = count_held();
+    for (int i = 0; i < count; i++)
+        sources[i] = open_with(&s, &(struct spl_remote_how){0});
+    assert_int_equal(s.asks, count);
+    if (before)
+        assert_in_range(count_held() - before, count * small, count * (small + 12000));
+    for (int i = 0; i < count; i++)
+        expect_range(&sources[i], &s, 0, small);
+    assert_int_equal(s.asks, count);
+    for (int i = 0; i < count; i++)
+        spl_dataset_source_close(&sources[i]);
+    stop(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -712,6 +734,7 @@ int main(void)
         cmocka_unit_test(test_crowd),                          cmocka_unit_test(test_cancelling),
         cmocka_unit_test(test_the_page_cache),                 cmocka_unit_test(test_bytes_that_are_spoilt),
         cmocka_unit_test(test_a_server_that_claims_exabytes),  cmocka_unit_test(test_many_files),
+        cmocka_unit_test(test_many_small_files),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 #include <xxhash.h>
 
+#include "base/clock.h"
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "dataset/open.h"
@@ -94,8 +95,9 @@ static json_t *describe(unsigned t)
     return json;
 }
 
-/* The coarse levels: splats over a cube of 64, of which each octant has some. */
-static void make_city(const char *name, const json_t *said)
+/* The coarse levels: splats over a cube of 64, of which each octant has some; those of the first are a layer as high as
+ * `layer`, if that is not 0. */
+static void make_layered_city(const char *name, const json_t *said, double layer)
 {
     struct make_splat splats[own_splats];
     json_t *meta = json_object();
@@ -104,11 +106,20 @@ static void make_city(const char *name, const json_t *said)
         splats[i] = (struct make_splat){.normal = {0, 0, 1}, .radius = 8, .color = {200}};
         for (int a = 0; a < 3; a++)
             splats[i].position[a] = 64.0 * (i >> 2 * a & 3) / 3;
+        if (layer > 0 && splats[i].position[0] < 32 && splats[i].position[1] < 32 && splats[i].position[2] < 32) {
+            splats[i].position[2] = layer;
+            splats[i].radius = 5;
+        }
     }
     make_dataset_meta = meta;
     make_dataset_file(path_of(name), splats, own_splats, 2);
     make_dataset_meta = NULL;
     json_decref(meta);
+}
+
+static void make_city(const char *name, const json_t *said)
+{
+    make_layered_city(name, said, 0);
 }
 
 /* "forged.spld", which says this of a tile; `value` NULL: nothing. */
@@ -223,16 +234,21 @@ static void test_one_dataset(void **state)
     const struct spl_dataset_info *info = spl_dataset_get_info(city);
     const struct spl_tables *own = spl_dataset_get_tables(city, 0);
     uint32_t page = 1;
-    uint64_t node = own->node_count, id = 0, points = 0, linear = 0;
+    uint64_t node = own->node_count, id = 0, points = 0, linear = 0, bytes = 0;
     for (uint32_t c = 0; c < own->chunk_count; c++)
         id += own->chunks[c].count;
     assert_int_equal(info->tiles, tile_count);
     assert_false(spl_dataset_keeps_all(city));
     assert_null(spl_dataset_find_tile(city, 0));
     for (unsigned t = 0; t < tile_count; t++) {
+        struct spl_dataset *tile = open_tile(t);
+        for (uint32_t i = 0; i < tile->found[SPL_KIND_PAGES].count; i++)
+            bytes += tile->found[SPL_KIND_PAGES].at[i]->bytes + tile->found[SPL_KIND_HEADS].at[i]->bytes;
+        spl_dataset_close(tile);
         points += splats_of[t];
         check_tile(city, t, &page, &node, &id);
     }
+    assert_true(info->tile_bytes == bytes && info->page_bytes < bytes);
     assert_int_equal(info->pages, page);
     assert_true(info->nodes == node && info->ids == id && info->points == points && info->leaf_splats == points);
     assert_int_equal(info->levels, 4);
@@ -300,6 +316,73 @@ static void test_a_tile_that_is_damaged(void **state)
     }
     free(page);
     free(again);
+    spl_dataset_close(city);
+}
+
+/* What the third tile is said to be, if anything is; no other has a fault. */
+static bool is_faulty(const struct spl_dataset *city, const char *said)
+{
+    struct spl_faulty_tile faulty[2] = {{0}};
+    const uint32_t count = spl_dataset_list_faulty(city, faulty, 2);
+    assert_true(count <= 1 && spl_dataset_list_faulty(city, NULL, 0) == count);
+    if (count && (strcmp(faulty[0].file, "tile-2.spld") || !strstr(faulty[0].reason, said)))
+        fail_msg("%s: %s", faulty[0].file, faulty[0].reason);
+    for (uint32_t part = 0; part <= tile_count; part++)
+        assert_true(part == 3 || !spl_dataset_is_without(city, part));
+    assert_true(count || !spl_dataset_is_without(city, 3));
+    return count;
+}
+
+static int read_tables(const struct spl_dataset *city, uint32_t page)
+{
+    char *block = malloc(spl_dataset_get_tables_bytes(city, page));
+    int rc = spl_dataset_read_tables(city, page, block, NULL);
+    free(block);
+    return rc;
+}
+
+/* A fault is remembered, and tried again later and later, until what was found wrong is found right. */
+static void test_faults_of_tiles(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    uint32_t page = city->tiles->list[2].first_page, word;
+    assert_false(is_faulty(city, ""));
+    unlink(path_of("tile-2.spld"));
+    assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+    assert_true(is_faulty(city, "there is no such file") && spl_dataset_is_without(city, 3));
+    assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+    assert_true(city->tiles->list[2].pause_ns == 2 * SPL_NS_PER_S); // told by several at once
+    for (unsigned i = 2; i < 10; i++) {
+        const uint64_t all_ns = SPL_NS_PER_S << i, most_ns = 60 * SPL_NS_PER_S;
+        atomic_store(&city->tiles->list[2].without_until_ns, 1); // by now
+        assert_true(!spl_dataset_is_without(city, 3) && is_faulty(city, "there is no such file"));
+        assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+        assert_true(city->tiles->list[2].pause_ns == (all_ns < most_ns ? all_ns : most_ns));
+    }
+    make_tile(2, 2);
+    assert_int_equal(read_tables(city, page), SPL_OK);
+    assert_false(is_faulty(city, ""));
+
+    struct spoil file = spoil_load(path_of("tile-2.spld"));
+    ((uint8_t *)spoil_at(&file, SPL_SECTION_PAGE))[40] ^= 1;
+    spoil_store(&file, path_of("tile-2.spld"), false);
+    free(file.bytes);
+    char *bytes = malloc(spl_dataset_get_page_bytes(city, page));
+    assert_int_equal(spl_dataset_read_page(city, page, bytes, NULL), SPL_E_CORRUPT);
+    assert_int_equal(read_tables(city, page), SPL_OK); // these hold
+    assert_int_equal(spl_dataset_read_words(city, page, 0, &word, 1, NULL), SPL_OK);
+    assert_true(is_faulty(city, "page 0 fails its checksum") && spl_dataset_is_without(city, 3));
+    unlink(path_of("tile-2.spld"));
+    make_tile(2, 2);
+    assert_int_equal(spl_dataset_read_page(city, page, bytes, NULL), SPL_OK);
+    assert_false(is_faulty(city, ""));
+    free(bytes);
+
+    const struct spl_error why = {.code = SPL_E_CORRUPT, .message = "node 5 lies elsewhere"};
+    spl_dataset_spoil_tile(city, page, &why);
+    assert_true(is_faulty(city, "its tile tile-2.spld cannot be read: node 5 lies elsewhere") &&
+                spl_dataset_is_without(city, 3));
     spl_dataset_close(city);
 }
 
@@ -381,6 +464,8 @@ static void test_forged(void **state)
                 {"pages", "[]", "tiles[3].pages"},               {"pages", "[[1,1,1]]", "tiles[3].pages"},
                 {"pages", "[[0,1,1,64]]", "tiles[3].pages"},     {"pages", "[[1,1,1,63]]", "tiles[3].pages"},
                 {"pages", "[[1,1,1,4294967296]]", "tiles[3].pages"},
+                {"bytes", "4095", "tiles[3].bytes"},             {"bytes", "1e5", "tiles[3].bytes"},
+                {"bytes", "2305843009213693951", "tiles[3].bytes"},
                 {"pages", "7", "tiles[3].pages"},                {"splat_radius", "0", "tiles[3].splat_radius"},
                 {"splat_radius", "\"1\"", "tiles[3].splat_radius"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -419,6 +504,30 @@ static void test_tiles_that_do_not_fit(void **state)
         refuse_page(city, rows[i].said);
         spl_dataset_close(city);
     }
+}
+
+/* Checksums hold, but tiles hang below each other's leaves: what they have would be looked for where it is not. */
+static void test_tiles_that_lie_elsewhere(void **state)
+{
+    (void)state;
+    json_t *forged = json_deep_copy(tiles);
+    json_object_set_new(json_array_get(forged, 0), "node", json_integer(4));
+    json_object_set_new(json_array_get(forged, 3), "node", json_integer(1));
+    make_city("forged.spld", forged);
+    struct spl_dataset *city = open_city("forged.spld");
+    refuse_page(city, "does not lie in node 4, which \"node\" of \"tiles\" says: its root's y is from 3.9");
+    json_decref(forged);
+    spl_dataset_close(city);
+    make_layered_city("forged.spld", tiles, 29); // in the leaf's cube, and not in its box
+    city = open_city("forged.spld");
+    refuse_page(city, "does not lie in node 1, which \"node\" of \"tiles\" says: its root's z is from 3.9");
+    spl_dataset_close(city);
+    make_layered_city("forged.spld", tiles, 8);
+    city = open_city("forged.spld");
+    struct spl_tables *read;
+    assert_non_null(spl_dataset_borrow_tables(city, 1, &read, NULL));
+    free(read);
+    spl_dataset_close(city);
 }
 
 /* A tile that is a collection itself is refused, whatever else it has. */
@@ -528,10 +637,12 @@ int main(void)
         cmocka_unit_test(test_one_dataset),
         cmocka_unit_test(test_a_tile_that_is_another),
         cmocka_unit_test(test_a_tile_that_is_damaged),
+        cmocka_unit_test(test_faults_of_tiles),
         cmocka_unit_test(test_only_beside_a_file),
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
         cmocka_unit_test(test_tiles_that_do_not_fit),
+        cmocka_unit_test(test_tiles_that_lie_elsewhere),
         cmocka_unit_test(test_tiles_that_hold_more),
         cmocka_unit_test(test_a_tile_of_too_many_sections),
         cmocka_unit_test(test_what_stays_of_a_tile),

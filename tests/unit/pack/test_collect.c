@@ -51,7 +51,7 @@ static void write_scan(const char *path, int tile, bool fractions)
                "property double intensity\nend_header\n", points);
     for (int i = 0; i < points; i++) {
         double x = side * uniform(&random), y = side * uniform(&random), z = 0.002 * uniform(&random);
-        z += i < on_wire ? 4 : x > side / 2 ? 1 : 0;
+        z += i == points - 1 ? 9 : i < on_wire ? 4 : x > side / 2 ? 1 : 0; /* one far off all others */
         y = i < on_wire ? 3 + 0.001 * y : y;
         fprintf(f, "%.4f %.4f %.4f %d %d %d %d %.2f\n", 500000 + side * (tile % 4) + x, 5400000 + side * (tile / 4) + y,
                 z, color_of(tile, 0), color_of(tile, 1), 90, 2 + tile % 3,
@@ -196,6 +196,7 @@ static void check_entry(const json_t *entry, const struct spl_dataset *tile)
     assert_int_equal(number_of(entry, "panel_points"), i->panel_points);
     assert_int_equal(number_of(entry, "meshes"), i->meshes);
     assert_int_equal(number_of(entry, "mesh_points"), i->mesh_points);
+    assert_int_equal(number_of(entry, "bytes"), i->file_bytes);
     for (size_t a = 0; a < 3; a++) {
         const json_t *bounds = json_object_get(entry, "bounds");
         assert_true(json_number_value(json_array_get(json_object_get(bounds, "min"), a)) == i->bounds_min[a]);
@@ -227,6 +228,15 @@ static void check_streams(const struct spl_dataset *city, const struct spl_datas
     }
 }
 
+/* As of any child (api/format.md, 3): who culls the one does not miss the other. */
+static void assert_box_holds(const struct spl_node *parent, const struct spl_node *child)
+{
+    for (int a = 0; a < 3; a++) {
+        assert_true(parent->origin[a] + parent->box_min[a] <= child->origin[a] + child->box_min[a]);
+        assert_true(parent->origin[a] + parent->box_max[a] >= child->origin[a] + child->box_max[a]);
+    }
+}
+
 static void test_a_tree_above_the_tiles(void **state)
 {
     (void)state;
@@ -243,8 +253,11 @@ static void test_a_tree_above_the_tiles(void **state)
     assert_int_equal(tables->node_count, 1 + 2 + tiles);
     assert_int_equal(tables->nodes[0].child_count, 2);
     for (uint32_t n = 0; n < 3; n++)
-        for (uint32_t k = 0; k < tables->nodes[n].child_count; k++)
-            assert_null(spl_node_judge_child(&tables->nodes[n], &tables->nodes[tables->nodes[n].first_child + k]));
+        for (uint32_t k = 0; k < tables->nodes[n].child_count; k++) {
+            const struct spl_node *child = &tables->nodes[tables->nodes[n].first_child + k];
+            assert_null(spl_node_judge_child(&tables->nodes[n], child));
+            assert_box_holds(&tables->nodes[n], child);
+        }
     for (int a = 0; a < 2; a++) {
         assert_true(fabs(info->bounds_min[a] - (a ? 5400000 : 500000)) < 0.1);
         assert_true(fabs(info->bounds_max[a] - (a ? 5400000 + 3 * side : 500000 + 4 * side)) < 0.1);
@@ -261,6 +274,7 @@ static void test_a_tree_above_the_tiles(void **state)
         taken[node] = true;
         root.depth = 3;
         assert_null(spl_node_judge_child(&tables->nodes[node], &root));
+        assert_box_holds(&tables->nodes[node], &root);
         for (uint32_t c = 0; c < root.chunk_count; c++)
             splats += spl_chunk_kind(&chunks[c]) == SPL_CHUNK_DISCS ? chunks[c].count : 0;
         uint32_t own = check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), i, 0);
@@ -339,12 +353,12 @@ static double get_cell(const struct spl_dataset *tile)
     return (double)most;
 }
 
-/* A single tile; bare points; panels, which are splats from afar. */
+/* A single tile; bare points; panels, which are splats from afar; few splats in the box of many. */
 static void test_other_kinds_of_tiles(void **state)
 {
     (void)state;
     static const struct spl_pack_options kinds[] = {
-        {0}, {.points_only = true}, {.primitives = SPL_PRIMITIVES_ALL, .error = 0.05}};
+        {0}, {.points_only = true}, {.primitives = SPL_PRIMITIVES_ALL, .error = 0.05}, {.prune = 20}};
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
         const char *names[] = {"kind-a.spld", "kind-b.spld"};
         struct spl_error err = {0};
@@ -363,6 +377,7 @@ static void test_other_kinds_of_tiles(void **state)
             assert_int_equal(node, count == 1 ? 0 : 1); /* y weighs more than x: tile 8 comes later */
             assert_true(check_leaf(city, tables, &tables->nodes[node], spl_dataset_get_info(tile), 3,
                                    k == 2 ? 2 * get_cell(tile) : 0) > 0);
+            assert_box_holds(&tables->nodes[node], spl_dataset_get_nodes(tile, &(uint64_t){0}));
             check_streams(city, tile);
             free(read);
             spl_dataset_close(tile);

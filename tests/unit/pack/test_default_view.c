@@ -286,6 +286,27 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* A scan as wide as coordinates go: an eye that sees all of it from outside would stand where no camera can. */
+static void as_wide_as_coordinates_go(void **state)
+{
+    (void)state;
+    static const double most = 0.99e12, none[3] = {0};
+    for (int corner = 0; corner < 2; corner++) {
+        struct cloud cloud = {0};
+        const double wide = corner ? most : 2 * most;
+        add_sheet(&cloud, (double[3]){corner ? 0 : -most, -most, 0}, (double[3]){wide, 0, 0}, (double[3]){0, wide, 0},
+                  2e10, none);
+        struct spl_dataset *dataset = open_packed(&cloud, false, NULL);
+        const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+        double fill;
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(info->default_eye[c]) <= 1e12 && fabs(info->default_target[c]) <= 1e12);
+        assert_true(share_in_view(dataset, &cloud, cloud.count, 160, 90, &fill) > 0.8 && fill < 1.5);
+        spl_dataset_close(dataset);
+        free(cloud.at);
+    }
+}
+
 /* Of few and many, of all kinds and of two alone, rising and at random. */
 static void a_quantile_is_that_of_sorted_values(void **state)
 {
@@ -320,6 +341,7 @@ int main(void)
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
+        cmocka_unit_test(as_wide_as_coordinates_go),
         cmocka_unit_test(a_quantile_is_that_of_sorted_values),
         cmocka_unit_test(what_is_said_stands),
         cmocka_unit_test(what_is_said_wrongly_is_refused_by_name),

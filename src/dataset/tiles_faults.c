@@ -1,0 +1,110 @@
+/* Tiles of a collection that cannot be read: missing, another one, damaged. A view that needs one draws the tile's leaf
+ * instead of it and says that it is not complete; so each is remembered for a while, in which nobody looks for it, and
+ * then tried again. Servers that do not answer are no fault of a tile. Any thread.
+ *
+ * Invariant: a tile has a fault from what was found wrong on until the same is found right, however long it rests: who
+ * tries it again in between learns it anew. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "dataset/remote_counts.h"
+#include "dataset/open.h"
+#include "dataset/tiles.h"
+
+static const uint64_t pause_least_ns = 2 * SPL_NS_PER_S, pause_most_ns = 60 * SPL_NS_PER_S;
+
+/* The mutex is held. */
+static void end_fault(struct spl_tiles *tiles, struct spl_tile *tile)
+{
+    free(tile->fault);
+    tile->fault = NULL;
+    tile->pause_ns = 0;
+    atomic_store(&tile->without_until_ns, 0);
+    atomic_fetch_sub(&tiles->fault_count, 1);
+}
+
+/* True where it is news. The mutex is held. */
+static bool begin_fault(struct spl_tiles *tiles, struct spl_tile *tile, uint64_t what, const char *message)
+{
+    const uint64_t now_ns = spl_now_ns();
+    const bool news = !tile->fault || strcmp(tile->fault, message);
+    if (news) {
+        char *fault = strdup(message);
+        atomic_fetch_add(&tiles->fault_count, fault && !tile->fault);
+        free(fault ? tile->fault : NULL);
+        tile->fault = fault ? fault : tile->fault;
+    }
+    if (now_ns >= atomic_load(&tile->without_until_ns)) { // else it is told by several who read it at once
+        tile->pause_ns = tile->pause_ns ? 2 * tile->pause_ns : pause_least_ns;
+        if (tile->pause_ns > pause_most_ns)
+            tile->pause_ns = pause_most_ns;
+        atomic_store(&tile->without_until_ns, now_ns + tile->pause_ns);
+    }
+    tile->faulty = what;
+    return news;
+}
+
+void spl_tiles_note(const struct spl_dataset *dataset, struct spl_tile *tile, uint64_t what, int rc,
+                    const struct spl_error *why)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    bool news = false;
+    if (rc && rc != SPL_E_CORRUPT)
+        return;
+    if (!rc && !atomic_load(&tiles->fault_count))
+        return;
+    pthread_mutex_lock(&tiles->mutex);
+    if (rc)
+        news = begin_fault(tiles, tile, what, why->message);
+    else if ((news = tile->fault && tile->faulty == what))
+        end_fault(tiles, tile);
+    pthread_mutex_unlock(&tiles->mutex);
+    if (!news)
+        return;
+    if (rc) {
+        spl_remote_count(tile_faults, 1);
+        spl_log_warn("%s; views draw what it is from afar instead, and are not complete", why->message);
+    } else {
+        spl_log_info("%s: its tile %s can be read again", spl_dataset_get_name(dataset), tile->file);
+    }
+}
+
+bool spl_dataset_is_without(const struct spl_dataset *dataset, uint32_t part)
+{
+    if (!part || !atomic_load(&dataset->tiles->fault_count))
+        return false;
+    const uint64_t until_ns = atomic_load(&dataset->tiles->list[part - 1].without_until_ns);
+    return until_ns && spl_now_ns() < until_ns;
+}
+
+void spl_dataset_spoil_tile(const struct spl_dataset *dataset, uint32_t page, const struct spl_error *why)
+{
+    struct spl_tile *tile = spl_tiles_find(dataset, page);
+    struct spl_error told = {0};
+    spl_tiles_fail(dataset, tile, why, &told);
+    spl_tiles_note(dataset, tile, spl_tile_page(page, true), SPL_E_CORRUPT, &told);
+}
+
+uint32_t spl_dataset_list_faulty(const struct spl_dataset *dataset, struct spl_faulty_tile *out, size_t capacity)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    uint32_t count = 0;
+    if (!tiles || !atomic_load(&tiles->fault_count))
+        return 0;
+    pthread_mutex_lock(&tiles->mutex);
+    for (uint32_t i = 0; i < tiles->count; i++) {
+        const struct spl_tile *tile = &tiles->list[i];
+        if (!tile->fault)
+            continue;
+        if (count < capacity) {
+            out[count].file = tile->file;
+            snprintf(out[count].reason, sizeof out[count].reason, "%s", tile->fault);
+        }
+        count++;
+    }
+    pthread_mutex_unlock(&tiles->mutex);
+    return count;
+}
