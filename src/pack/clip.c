@@ -98,7 +98,7 @@ static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
         float u[3], v[3];
         if (i % 256 == 0)
             spl_spill_keep_bound(p->spill);
-        if (!l->candidate[i])
+        if (!(l->candidate[i / 8] >> i % 8 & 1))
             continue;
         spl_neighbours_find(l->neighbours, i, l->wide, &near);
         spl_tangent_frame(p->normal[i], u, v);
