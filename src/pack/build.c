@@ -46,12 +46,12 @@ static const double bytes_written = 16; /* a point, scalars apart: 8 of a wall, 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
     size_t sample = points->count < 65536 ? points->count : 65536;
-    float *radii = spl_alloc_raw(sample, sizeof *radii, err);
+    double *radii = spl_alloc_raw(sample, sizeof *radii, err);
     if (!radii)
         return SPL_E_NOMEM;
     for (size_t i = 0; i < sample; i++)
-        radii[i] = points->radius[i * points->count / sample];
-    *median = spl_median(radii, sample);
+        radii[i] = (double)points->radius[i * points->count / sample];
+    *median = spl_nth(radii, sample, sample / 2);
     free(radii);
     return 0;
 }

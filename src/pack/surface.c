@@ -131,7 +131,8 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                 spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
             w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at],
                                                      &near, &w->limit[i - begin], &edge);
-            if (edge && s->edge)
+            const bool kept = !s->points->halo || !s->points->halo[i]; /* of others nobody asks for lines */
+            if (edge && kept && s->edge)
                 s->edge[i / 8] |= (uint8_t)(1 << i % 8); /* blocks share no byte */
         }
         const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, &vicinity, w->limit};
