@@ -106,12 +106,13 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         const char *name;
         double seconds;
         bool of_surface;
-    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
-                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"planes", 0.5, true},
-                 {"joining wires", 0.05, false}, {"outlines", 0.2, true},    {"panels", 0.3, true},
-                 {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
+        double early; /* more, where nodes are encoded while levels are built */
+    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},        {"wires", 0.25, false},
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true},       {"planes", 0.5, true},
+                 {"joining wires", 0.05, false}, {"outlines", 0.2, true},          {"panels", 0.3, true},
+                 {"levels", 0.2, false, 0.2},    {"encoding", 0.25, false, -0.2}, {"writing", 0.3, false}};
     uint64_t points = 0;
-    bool twice = writes_twice(p, later);
+    bool twice = writes_twice(p, later), early = p->stage->spill && p->options->primitives == SPL_PRIMITIVES_OFF;
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
     uint64_t read = points; /* of which a part keeps some */
@@ -122,7 +123,8 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
              p->options->primitives != SPL_PRIMITIVES_OFF) &&
             (strcmp(parts[i].name, "outlines") || p->options->export_primitives))
             spl_stage_plan(p->stage, parts[i].name,
-                           (parts[i].seconds + (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
+                           (parts[i].seconds + (early ? parts[i].early : 0) +
+                            (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
                                (double)(i ? points : read),
                            i ? 0 : read);
     if (later && later->photographs.count)
