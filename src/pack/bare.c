@@ -74,14 +74,15 @@ int spl_bare_points(struct spl_points *points, struct spl_stage *stage, struct s
     struct bare b = {.points = points};
     spl_stage_begin(stage, "spacing", "points", points->count);
     spl_spill_free(points->spill, points->normal);
-    points->normal = spl_spill_alloc(points->spill, points->count + SPL_POINTS_PAD, sizeof *points->normal, err);
+    points->normal = NULL;
     points->radius = spl_spill_alloc(points->spill, points->count, sizeof *points->radius, err);
-    points->uncertainty = spl_spill_alloc(points->spill, points->count, sizeof *points->uncertainty, err);
-    int rc = points->normal && points->radius && points->uncertainty ? 0 : SPL_E_NOMEM;
-    if (!rc)
-        rc = size_points(&b, stage->threads, err);
+    int rc = points->radius ? size_points(&b, stage->threads, err) : SPL_E_NOMEM;
     if (rc)
         return rc;
+    points->normal = spl_spill_alloc(points->spill, points->count + SPL_POINTS_PAD, sizeof *points->normal, err);
+    points->uncertainty = spl_spill_alloc(points->spill, points->count, sizeof *points->uncertainty, err);
+    if (!points->normal || !points->uncertainty)
+        return SPL_E_NOMEM;
     for (size_t i = 0; i < points->count; i++)
         points->normal[i][2] = 1;
     points->no_surface = true;

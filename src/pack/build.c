@@ -1,12 +1,14 @@
 /* Scans into a dataset: the stages in a row.
  *
- * Memory, bytes a point: 28 while reading (40 with given normals), 52 (64) while sorting; then, where coordinates stay
+ * Memory, bytes a point: 28 while reading (40 with given normals), 40 (52) while sorting; then, where coordinates stay
  * doubles, 57 while neighbours are found, 57 while clip lines are, and the inner levels' 11 on top of 53 while
- * encoding; 12 less of each where they are 32 bits (narrow.c). Where planes are looked for, 93 meanwhile and 4 more
- * from then on; outlining them for an export takes 4, and each thread 60 MB and 20 a point of a plane. Each scalar adds
- * the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each on a wire takes 60 more while wires are
- * joined, and besides about 50 of pairs, or of the vertex that becomes of it and stays until the end. Stations have
- * seen points, not panels: where there are both, the scan is written once more without panels.
+ * encoding; 12 less of each where they are 32 bits (narrow.c). Where memory is bounded nodes are encoded while levels
+ * are built, and what they were made of is given back meanwhile (early.c): no more than clip lines take. Where planes
+ * are looked for, 93 meanwhile and 4 more from then on; outlining them for an export takes 4, and each thread 60 MB and
+ * 20 a point of a plane. Each scalar adds the 1 to 8 of its type (those of LAS 4 in all), and while encoding 1.3. Each
+ * on a wire takes 60 more while wires are joined, and besides about 50 of pairs, or of the vertex that becomes of it
+ * and stays until the end. Stations have seen points, not panels: where there are both, the scan is written once more
+ * without panels.
  * All that grows with the points, but for tables of a byte a point and what joins wires, is in arrays that may lie on
  * disk (spill.h): where memory is bounded these are what is beyond. The same work is done on them, so that nothing
  * depends on the bound.
@@ -24,6 +26,7 @@
 #include "pack/bound.h"
 #include "pack/build_parts.h"
 #include "pack/check.h"
+#include "pack/early.h"
 #include "pack/export/export.h"
 #include "pack/eyes.h"
 #include "pack/job/part.h"
@@ -36,42 +39,46 @@
 #include "pack/up.h"
 
 /* Bytes a point in large arrays, at most: see above. */
-static const double bytes_bare = 54, bytes_surface = 70, bytes_planes = 100, bytes_normal = 12, bytes_scalar = 8;
+static const double bytes_bare = 42, bytes_surface = 50, bytes_planes = 88, bytes_doubles = 12, bytes_normal = 12;
+static const double bytes_scalar = 8, bytes_las[] = {2, 1, 1}; /* intensity and returns of LAS */
 static const double bytes_written = 16; /* a point, scalars apart: 8 of a wall, 12 of clusters, 15 on wires */
 
 static int median_radius(const struct spl_points *points, double *median, struct spl_error *err)
 {
     size_t sample = points->count < 65536 ? points->count : 65536;
-    float *radii = spl_alloc_raw(sample, sizeof *radii, err);
+    double *radii = spl_alloc_raw(sample, sizeof *radii, err);
     if (!radii)
         return SPL_E_NOMEM;
     for (size_t i = 0; i < sample; i++)
-        radii[i] = points->radius[i * points->count / sample];
-    *median = spl_median(radii, sample);
+        radii[i] = (double)points->radius[i * points->count / sample];
+    *median = spl_nth(radii, sample, sample / 2);
     free(radii);
     return 0;
 }
 
-static int write_dataset(struct spl_build *p, struct spl_error *err)
+/* What the dataset says of all points, before any is given up. */
+static int look_at_all(struct spl_build *p, struct spl_error *err)
 {
-    struct spl_default_view view;
-    double radius;
     int rc = SPL_OK;
     if (p->part)
-        spl_part_view(&p->points, &view);
+        spl_part_view(&p->points, &p->view);
     else if (!p->options->default_view)
-        rc = spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, p->stage->threads, &view, err);
+        rc = spl_default_view_find(&p->points, p->system.unit_m, p->sides_known, p->stage->threads, &p->view, err);
     if (p->options->default_view)
-        spl_said_view(p->options->default_view, p->points.up, &view);
-    if (!rc)
-        rc = median_radius(&p->points, &radius, err);
+        spl_said_view(p->options->default_view, p->points.up, &p->view);
+    return rc ? rc : median_radius(&p->points, &p->radius, err);
+}
+
+static int write_dataset(struct spl_build *p, struct spl_error *err)
+{
+    int rc = spl_stage_check(p->stage, err);
     if (!rc)
         rc = spl_emit(&p->tree, &p->points, &p->wires, &p->chunk, p->writer, p->stage, &p->emitted, err);
     if (rc)
         return rc;
     if ((rc = spl_stage_check(p->stage, err)))
         return rc;
-    json_t *meta = spl_build_describe(p, radius, &view);
+    json_t *meta = spl_build_describe(p, p->radius, &p->view);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory while describing the dataset");
     spl_stage_begin(p->stage, "writing", NULL, 0);
@@ -99,12 +106,13 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
         const char *name;
         double seconds;
         bool of_surface;
-    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},  {"wires", 0.25, false},
-                 {"normals and radii", 1, true}, {"clip lines", 0.15, true}, {"planes", 0.5, true},
-                 {"joining wires", 0.05, false}, {"outlines", 0.2, true},    {"panels", 0.3, true},
-                 {"levels", 0.2, false},         {"encoding", 0.25, false},  {"writing", 0.3, false}};
+        double early; /* more, where nodes are encoded while levels are built */
+    } parts[] = {{"reading", 0.4, false},        {"ordering", 0.15, false},        {"wires", 0.25, false},
+                 {"normals and radii", 1, true}, {"clip lines", 0.15, true},       {"planes", 0.5, true},
+                 {"joining wires", 0.05, false}, {"outlines", 0.2, true},          {"panels", 0.3, true},
+                 {"levels", 0.2, false, 0.2},    {"encoding", 0.25, false, -0.2}, {"writing", 0.3, false}};
     uint64_t points = 0;
-    bool twice = writes_twice(p, later);
+    bool twice = writes_twice(p, later), early = p->stage->spill && p->options->primitives == SPL_PRIMITIVES_OFF;
     for (size_t i = 0; i < p->scans.count; i++)
         points += p->scans.list[i].points_expected;
     uint64_t read = points; /* of which a part keeps some */
@@ -115,7 +123,8 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
              p->options->primitives != SPL_PRIMITIVES_OFF) &&
             (strcmp(parts[i].name, "outlines") || p->options->export_primitives))
             spl_stage_plan(p->stage, parts[i].name,
-                           (parts[i].seconds + (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
+                           (parts[i].seconds + (early ? parts[i].early : 0) +
+                            (twice && i + 1 == sizeof parts / sizeof *parts ? 0.75 : 0)) * 1e-6 *
                                (double)(i ? points : read),
                            i ? 0 : read);
     if (later && later->photographs.count)
@@ -127,10 +136,34 @@ static void plan(const struct spl_build *p, const struct spl_passes *later)
 
 static int check_disk(const struct spl_build *p, double points, double bytes, double written, struct spl_error *err)
 {
-    double beyond = points * bytes - (double)spl_spill_get_share(p->options->memory_bytes);
+    double beyond = points * bytes + SPL_SPILL_POOL - (double)spl_spill_get_share(p->options->memory_bytes);
     return beyond > 0
                ? spl_spill_check_disk(p->options->output, (uint64_t)beyond, (uint64_t)(points * written), err)
                : SPL_OK;
+}
+
+/* Bytes that a scan's scalars take a point. */
+static double count_scalars(const struct spl_scan *scan)
+{
+    const bool las = scan->coordinates.step[0] > 0;
+    double bytes = 0;
+    for (int s = 0; s < SPL_SCALAR_COUNT; s++)
+        if (scan->scalars >> s & 1)
+            bytes += las && s < SPL_SCALAR_KEPT ? bytes_las[s] : bytes_scalar;
+    return bytes;
+}
+
+/* Whether all coordinates are floats, or steps from one place, so that 32 bits keep them (narrow.c). */
+static bool keeps_narrow(const struct spl_scans *scans)
+{
+    const struct spl_cloud_coordinates *first = scans->count ? &scans->list[0].coordinates : NULL;
+    for (size_t i = 0; i < scans->count; i++) {
+        const struct spl_cloud_coordinates *c = &scans->list[i].coordinates;
+        if (c->floats != first->floats || (!c->floats && !(c->step[0] > 0)) ||
+            memcmp(c->step, first->step, sizeof c->step) || memcmp(c->first, first->first, sizeof c->first))
+            return false;
+    }
+    return true;
 }
 
 /* Where memory is bounded: what is beyond it goes to disk, of which there must be enough, for the dataset too. Where
@@ -139,8 +172,8 @@ static int check_disk(const struct spl_build *p, double points, double bytes, do
 static int begin_spill(struct spl_build *p, const struct spl_passes *later, struct spl_error *err)
 {
     const struct spl_pack_options *o = p->options;
-    double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
     double points = 0, least = 0, normals = 0, scalars = 0;
+    double bytes = o->points_only ? bytes_bare : o->primitives == SPL_PRIMITIVES_OFF ? bytes_surface : bytes_planes;
     struct spl_error why = {0};
     char text[400];
     for (size_t i = 0; i < p->scans.count; i++) {
@@ -149,14 +182,15 @@ static int begin_spill(struct spl_build *p, const struct spl_passes *later, stru
         points += own;
         least += scan->max_points || scan->counted ? own : own / 2;
         normals = scan->attributes & SPL_CLOUD_NORMAL ? bytes_normal : normals;
-        scalars = fmax(scalars, bytes_scalar * __builtin_popcount(scan->scalars));
+        scalars = fmax(scalars, count_scalars(scan));
     }
+    bytes += keeps_narrow(&p->scans) ? 0 : bytes_doubles;
     if (p->part) {
         points = (double)spl_part_get_expected(p->part);
         least = points / 2;
     }
     bytes += normals + scalars;
-    double beyond = points * bytes - (double)spl_spill_get_share(o->memory_bytes);
+    double beyond = points * bytes + SPL_SPILL_POOL - (double)spl_spill_get_share(o->memory_bytes);
     double written = (bytes_written + scalars) * (writes_twice(p, later) ? 2 : 1);
     if (beyond <= 0)
         return SPL_OK;
@@ -229,6 +263,9 @@ static int find_planes(struct spl_build *p, struct spl_error *err)
 static int build_tree(struct spl_build *p, struct spl_error *err)
 {
     int rc = spl_tree_build(&p->tree, &p->points, err);
+    if (!rc && p->stage->spill && !p->planes.count) /* points of panels are read on each level */
+        rc = spl_early_create(&p->tree, &p->points, &p->wires, &p->chunk, p->stage->threads, &p->emitted,
+                              &p->tree.early, err);
     if (!rc && p->planes.count) {
         p->tree.panels = &p->panels;
         rc = spl_panel_maker_init(&p->panels, &p->points, &p->planes, p->stage->threads, err);
@@ -375,6 +412,8 @@ static int build(struct spl_build *p, struct spl_build_outputs *out, struct spl_
     if (options->prune > 1)
         p->tree.pruned_to = p->points.count / options->prune + 1;
     if (!rc)
+        rc = look_at_all(p, err);
+    if (!rc)
         rc = build_tree(p, err);
     return rc ? rc : write_dataset(p, err);
 }
@@ -427,6 +466,7 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         report->seconds = (double)(spl_now_ns() - begin_ns) / 1e9;
     }
     spl_dataset_writer_destroy(p.writer);
+    spl_early_destroy(p.tree.early);
     spl_emitted_finish(&p.emitted);
     spl_tree_finish(&p.tree);
     if (!rc && out->points && p.planes.count) {

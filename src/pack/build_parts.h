@@ -27,6 +27,8 @@ struct spl_build {
     struct spl_planes planes; /* none unless options->primitives */
     struct spl_wires wires;
     struct spl_panel_maker panels;
+    struct spl_default_view view;
+    double radius; /* the median */
     struct spl_tree tree;
     struct spl_emitted emitted;
     struct spl_dataset_writer *writer;

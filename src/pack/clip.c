@@ -8,6 +8,10 @@
 #include "pack/clip.h"
 
 #include <math.h>
+#include <string.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -17,7 +21,7 @@ static const double coplanar = 0.25; /* slope within which a neighbour lies in t
 static const double at_border =
     0.5; /* spacings that the outermost neighbours lie beyond a point at the border, at most */
 static const double beyond_all = 0.5; /* spacings from the outermost neighbour to the line */
-enum { border_points = 8, directions = SPL_CLIP_DIRECTIONS };
+enum { border_points = 8, directions = SPL_CLIP_DIRECTIONS, lanes = 8 };
 
 struct lines {
     struct spl_points *points;
@@ -36,12 +40,74 @@ void spl_clip_turns_init(struct spl_clip_turns *turns)
     }
 }
 
+/* The first direction in which the outermost point lies least far off, if that is less than *least, which is set; else
+ * -1. Most directions are given up after few points. */
+static int find_turn_base(const double *x, const double *y, unsigned count, const struct spl_clip_turns *turns,
+                          double *least)
+{
+    int found = -1;
+    for (int k = 0; k < directions; k++) {
+        double most = 0;
+        for (unsigned a = 0; a < count && most < *least; a++) {
+            double out = turns->at[k][0] * x[a] + turns->at[k][1] * y[a];
+            most = out > most ? out : most;
+        }
+        if (most >= *least)
+            continue;
+        *least = most;
+        found = k;
+    }
+    return found;
+}
+
+#if defined(__x86_64__)
+/* The same, eight points at a time. */
+__attribute__((target("avx2"))) static int find_turn_avx2(const double *x, const double *y, unsigned count,
+                                                          const struct spl_clip_turns *turns, double *least)
+{
+    int found = -1;
+    for (int k = 0; k < directions; k++) {
+        const __m256d tx = _mm256_set1_pd(turns->at[k][0]), ty = _mm256_set1_pd(turns->at[k][1]);
+        const __m256d limit = _mm256_set1_pd(*least);
+        __m256d most = _mm256_setzero_pd();
+        unsigned a = 0;
+        for (; a < count; a += lanes) {
+            for (unsigned half = a; half < a + lanes; half += lanes / 2) {
+                __m256d out_x = _mm256_mul_pd(tx, _mm256_loadu_pd(x + half));
+                most = _mm256_max_pd(_mm256_add_pd(out_x, _mm256_mul_pd(ty, _mm256_loadu_pd(y + half))), most);
+            }
+            if (_mm256_movemask_pd(_mm256_cmp_pd(most, limit, _CMP_GE_OQ)))
+                break;
+        }
+        if (a < count)
+            continue;
+        double each[lanes / 2];
+        _mm256_storeu_pd(each, most);
+        *least = 0;
+        for (unsigned half = 0; half < lanes / 2; half++)
+            *least = each[half] > *least ? each[half] : *least;
+        found = k;
+    }
+    return found;
+}
+#endif
+
+static int find_turn(const double *x, const double *y, unsigned count, const struct spl_clip_turns *turns,
+                     double *least)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return find_turn_avx2(x, y, count, turns, least);
+#endif
+    return find_turn_base(x, y, count, turns, least);
+}
+
 bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl_nearest *near,
                           const struct spl_clip_turns *turns, bool of_plane, const float u[3], const float v[3],
                           double direction[2], double *end)
 {
     const float *n = p->normal[i];
-    double x[SPL_NEIGHBOURS_MAX], y[SPL_NEIGHBOURS_MAX], at[3], reach = 0, least = INFINITY;
+    double x[SPL_NEIGHBOURS_MAX + lanes], y[SPL_NEIGHBOURS_MAX + lanes], at[3], reach = 0;
     unsigned count = 0;
     spl_points_place(p, i, at);
     for (unsigned a = 0; a < near->count; a++) {
@@ -58,21 +124,16 @@ bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl
     }
     if (count < border_points)
         return false;
-    for (int k = 0; k < directions; k++) {
-        double most = 0;
-        for (unsigned a = 0; a < count && most < least; a++) {
-            double out = turns->at[k][0] * x[a] + turns->at[k][1] * y[a];
-            most = out > most ? out : most;
-        }
-        if (most >= least)
-            continue;
-        least = most;
-        direction[0] = turns->at[k][0];
-        direction[1] = turns->at[k][1];
-    }
-    double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
+    const double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
+    const double none = nextafter(at_border * spacing, INFINITY);
+    double least = none; /* a direction with more says nothing */
+    for (unsigned a = count; a % lanes; a++)
+        x[a] = y[a] = 0; /* never outermost */
+    const int k = find_turn(x, y, count, turns, &least);
+    if (k >= 0)
+        memcpy(direction, turns->at[k], sizeof turns->at[k]);
     *end = least + beyond_all * spacing;
-    return least <= at_border * spacing;
+    return least < none;
 }
 
 void spl_clip_set(struct spl_points *p, size_t i, const float u[3], const float v[3], const double direction[2],
@@ -98,7 +159,7 @@ static void find_lines(void *context, size_t begin, size_t end, unsigned worker)
         float u[3], v[3];
         if (i % 256 == 0)
             spl_spill_keep_bound(p->spill);
-        if (!l->candidate[i])
+        if (!(l->candidate[i / 8] >> i % 8 & 1))
             continue;
         spl_neighbours_find(l->neighbours, i, l->wide, &near);
         spl_tangent_frame(p->normal[i], u, v);

@@ -4,7 +4,7 @@
 
 #include "pack/neighbours.h"
 
-/* Finds the line of each point that `candidate` (a byte a point) marks, and writes points->clip. Reads settled normals
+/* Finds the line of each point that `candidate` (a bit a point) marks, and writes points->clip. Reads settled normals
  * and radii. `wide` neighbours of each candidate are asked. The result does not depend on the number of threads.
  * SPL_E_NOMEM. */
 int spl_clip_lines(struct spl_points *points, const struct spl_neighbours *neighbours, unsigned wide,

@@ -9,6 +9,7 @@
 #include "base/array.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/early.h"
 #include "pack/emit_node.h"
 
 enum { nodes_a_worker = 16 }; /* of a batch: few are waited for at its end, little lies in memory */
@@ -28,6 +29,8 @@ static void encode_nodes(void *context, size_t begin, size_t end, unsigned worke
 {
     struct emit *e = context;
     for (size_t i = begin; i < end; i++) {
+        if (e->tree->early && spl_early_get(e->tree->early, e->first + i))
+            continue;
         if (!spl_node_encode(&e->encoders[worker], &e->tree->nodes[e->first + i], &e->nodes[e->first + i],
                              &e->batch[i]))
             atomic_store(&e->failed, true);
@@ -98,6 +101,20 @@ static int write_node(struct emit *e, size_t index, struct spl_encoded_node *enc
     return 0;
 }
 
+/* Node `i` of the batch, encoded now or before. */
+static int write_made(struct emit *e, size_t i, struct spl_dataset_writer *writer, size_t *chunk_capacity,
+                      struct spl_emitted *out, struct spl_error *err)
+{
+    const size_t index = e->first + i;
+    struct spl_encoded_node *before = e->tree->early ? spl_early_get(e->tree->early, index) : NULL;
+    int rc = write_node(e, index, before ? before : &e->batch[i], writer, chunk_capacity, out, err);
+    if (before) {
+        spl_early_give(e->tree->early, index);
+        spl_stage_add(e->stage, e->tree->nodes[index].splat_count, 0);
+    }
+    return rc;
+}
+
 void spl_emitted_hold_box(struct spl_node *node, const struct spl_node *child)
 {
     for (int c = 0; c < 3; c++) {
@@ -124,7 +141,9 @@ static int allocate(struct emit *e, const struct spl_node_encoder *encoder, stru
         largest = e->tree->nodes[i].splat_count > largest ? e->tree->nodes[i].splat_count : largest;
     size_t chunks = (largest + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
     spl_assert(chunks <= SPL_NODE_CHUNKS_MAX);
-    e->nodes = out->nodes = spl_alloc(e->tree->count, sizeof *out->nodes, err);
+    if (!out->nodes)
+        out->nodes = spl_alloc(e->tree->count, sizeof *out->nodes, err);
+    e->nodes = out->nodes;
     e->batch = spl_alloc(e->batch_nodes, sizeof *e->batch, err);
     e->encoders = spl_alloc(e->stage->threads, sizeof *e->encoders, err);
     if (!e->nodes || !e->batch || !e->encoders)
@@ -154,7 +173,8 @@ int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struc
     for (uint32_t i = 0; i < tree->count; i++)
         splats += tree->nodes[i].splat_count;
     spl_stage_begin(stage, "encoding", "splats", splats);
-    spl_emitted_streams_init(&out->streams, points);
+    if (!tree->early)
+        spl_emitted_streams_init(&out->streams, points);
     int rc = allocate(&e, &encoder, out, err);
     for (e.first = 0; !rc && e.first < tree->count; e.first += e.batch_nodes) {
         size_t count = tree->count - e.first < e.batch_nodes ? tree->count - e.first : e.batch_nodes;
@@ -162,7 +182,7 @@ int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struc
         if (atomic_load(&e.failed))
             rc = spl_fail(err, SPL_E_NOMEM, "out of memory while encoding %zu splats", splats);
         for (size_t i = 0; !rc && i < count; i++)
-            rc = write_node(&e, e.first + i, &e.batch[i], writer, &chunk_capacity, out, err);
+            rc = write_made(&e, i, writer, &chunk_capacity, out, err);
         clear_batch(&e);
         if (!rc)
             rc = spl_stage_check(stage, err);

@@ -20,7 +20,8 @@ struct spl_emitted {
 };
 
 /* Encodes and writes every node, breadth first, its splats and then what it has of `wires`, and tells the writer of the
- * streams, which `out` keeps. A node's splats are dropped once they are encoded. On failure too, `out` is finished by
+ * streams, which `out` keeps. A node's splats are dropped once they are encoded;
+ * those that tree->early encoded before are only written. On failure too, `out` is finished by
  * the caller. */
 int spl_emit(struct spl_tree *tree, const struct spl_points *points, const struct spl_wires *wires,
              const struct spl_chunk_options *options, struct spl_dataset_writer *writer, struct spl_stage *stage,

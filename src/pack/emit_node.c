@@ -255,12 +255,26 @@ static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node 
     }
 }
 
+static bool reserve_splats(struct spl_node_encoder *w, size_t splats, struct spl_error *err)
+{
+    if (splats <= w->capacity)
+        return true;
+    free(w->items);
+    free(w->radii);
+    w->items = spl_alloc_raw(splats, sizeof *w->items, err);
+    w->radii = spl_alloc_raw(splats, sizeof *w->radii, err);
+    w->capacity = w->items && w->radii ? splats : 0;
+    return w->capacity;
+}
+
 bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *node, struct spl_node *header,
                      struct spl_encoded_node *out)
 {
     const struct spl_points *p = w->points;
     bool leaf = spl_tree_node_has_points(node);
     uint32_t count = node->splat_count;
+    if (!reserve_splats(w, count, NULL))
+        return false;
     for (int c = 0; c < 3; c++) {
         header->box_min[c] = INFINITY;
         header->box_max[c] = -INFINITY;
@@ -303,11 +317,10 @@ bool spl_node_encode(struct spl_node_encoder *w, const struct spl_tree_node *nod
 
 int spl_node_encoder_init(struct spl_node_encoder *w, size_t splats, struct spl_error *err)
 {
-    w->items = spl_alloc_raw(splats, sizeof *w->items, err);
-    w->radii = spl_alloc_raw(splats, sizeof *w->radii, err);
+    bool room = reserve_splats(w, splats, err);
     if (w->points->plane)
         w->weighted = spl_alloc_raw(spacing_sample + SPL_NODE_CHUNKS_MAX, sizeof *w->weighted, err);
-    return w->items && w->radii && (w->weighted || !w->points->plane) ? 0 : SPL_E_NOMEM;
+    return room && (w->weighted || !w->points->plane) ? 0 : SPL_E_NOMEM;
 }
 
 void spl_node_encoder_finish(struct spl_node_encoder *w)

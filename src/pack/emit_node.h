@@ -25,6 +25,7 @@ struct spl_node_encoder {
     const struct spl_chunk_options *options;
     const struct spl_emitted_streams *streams;
     struct spl_cut *items;
+    size_t capacity; /* of `items` and `radii` */
     uint32_t *words;
     size_t chunk_capacity; /* of `words` */
     float *radii;
@@ -32,8 +33,8 @@ struct spl_node_encoder {
     struct spl_node_lines lines;
 };
 
-/* Room for nodes of up to `splats` splats; the borrowed members are set. `encoder` is finished by the caller, on
- * failure too. SPL_E_NOMEM. */
+/* Room for nodes of up to `splats` splats, and for larger ones once there are any; the borrowed members are set.
+ * `encoder` is finished by the caller, on failure too. SPL_E_NOMEM. */
 int spl_node_encoder_init(struct spl_node_encoder *encoder, size_t splats, struct spl_error *err);
 void spl_node_encoder_finish(struct spl_node_encoder *encoder);
 

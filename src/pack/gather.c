@@ -56,7 +56,7 @@ static int reserve(struct spl_points *p, size_t more, uint32_t attributes, struc
     bool had_station = p->station, had_normal = p->normal;
     if (capacity > p->capacity) {
         for (int c = 0; c < 3 && !rc; c++)
-            rc = grow(p->spill, (void **)&p->axis[c], capacity, sizeof(double), err);
+            rc = grow(p->spill, (void **)&p->axis[c], capacity, spl_points_axis_bytes(p), err);
         if (!rc)
             rc = grow(p->spill, (void **)&p->color_class, capacity, sizeof *p->color_class, err);
     }
@@ -103,12 +103,12 @@ static int append(struct spl_points *p, const struct spl_point_batch *batch, con
     int rc = reserve(p, batch->count, attributes, err);
     if (!rc)
         rc = append_scalars(p, batch, info->scalars, scan, err);
+    if (!rc)
+        rc = spl_points_put(p, (const double(*)[3])batch->position, batch->count, err);
     if (rc)
         return rc;
     size_t at = p->count;
     for (size_t i = 0; i < batch->count; i++, at++) {
-        for (int c = 0; c < 3; c++)
-            p->axis[c][at] = spl_points_coordinate(batch->position[i][c]);
         uint32_t color = grey;
         if (attributes & SPL_CLOUD_COLOR)
             color = batch->color[i][0] | (uint32_t)batch->color[i][1] << 8 | (uint32_t)batch->color[i][2] << 16;
@@ -294,6 +294,7 @@ static void begin_points(struct spl_points *points, const struct spl_scans *scan
 {
     points->keep = scans->how.keep;
     points->spill = stage->spill;
+    spl_points_begin_narrow(points, scans->count ? &scans->list[0].coordinates : NULL);
     points->has_halo = scans->rules != NULL;
     points->cells = scans->rules ? scans->rules->cells : 0;
     points->has_class = scans->rules && scans->rules->has_class;

@@ -26,6 +26,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "pack/early.h"
 #include "pack/level_scalars.h"
 #include "pack/median.h"
 #include "pack/prune.h"
@@ -401,7 +402,8 @@ static void build_nodes(void *context, size_t begin, size_t end, unsigned worker
     struct levels *l = context;
     for (size_t i = begin; i < end; i++) {
         struct spl_tree_node *node = &l->tree->nodes[l->order[i]];
-        if (!build_node(l, worker, node))
+        if (!build_node(l, worker, node) ||
+            (l->tree->early && !spl_early_encode_children(l->tree->early, node, worker)))
             atomic_store(&l->failed, true);
         if (atomic_load(&l->failed) || spl_stage_is_cancelled(l->stage))
             return;

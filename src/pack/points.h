@@ -30,7 +30,7 @@ struct spl_points {
     struct spl_spill *spill;     /* where the arrays lie, borrowed; NULL: in memory */
     size_t count, capacity;      /* arrays have room for capacity + SPL_POINTS_PAD elements */
     union {                      /* x, y, z; sorted in Morton order by spl_points_order() */
-        double *axis[3];         /* SPL_POINTS_DOUBLES, until spl_points_narrow() */
+        double *axis[3];         /* SPL_POINTS_DOUBLES */
         float *floats[3];        /* SPL_POINTS_FLOATS */
         int32_t *steps[3];       /* SPL_POINTS_STEPS: as many of `step` from `first` on */
     };
@@ -126,8 +126,16 @@ unsigned spl_points_list_scalars(const struct spl_points *points, int list[SPL_P
  * have alone, so that the result is the same in whatever order points were read. */
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err);
 
-/* Keeps coordinates as floats, or as the steps of `steps` (NULL: of none), where all are exactly that. Nobody sees a
- * difference who reads them by spl_points_at(). */
+/* Of no points yet: those that spl_points_put() adds are kept as floats or, where the scan counts so, as the steps of
+ * `steps` (NULL: of none), as long as all are exactly that. */
+void spl_points_begin_narrow(struct spl_points *points, const struct spl_cloud_coordinates *steps);
+
+/* Writes the coordinates of `more` points behind the others, for which there is room; `count` stays. All become doubles
+ * with the first that is not as it is to be kept. SPL_E_NOMEM. */
+int spl_points_put(struct spl_points *points, const double (*position)[3], size_t more, struct spl_error *err);
+
+/* Of doubles the same afterwards: keeps them as floats, or as the steps of `steps`, where all are exactly that. Nobody
+ * sees a difference who reads them by spl_points_at(). */
 int spl_points_narrow(struct spl_points *points, const struct spl_cloud_coordinates *steps, struct spl_stage *stage,
                       struct spl_error *err);
 

@@ -17,6 +17,7 @@ enum { decimals_max = 6, halvings_max = 20, digit_bits = 16, digits = 1 << digit
 static const double most_steps = 4294967290.0; /* below SPL_STREAM_NONE, with room for rounding */
 static const double most_whole = 0x1p52;       /* where steps are counted exactly */
 static const double largest = 0x1p900;         /* of a value, so that those that come back are finite */
+static const double small_whole = 1 << 22; /* times the finest steps it is exact */
 static const double powers[decimals_max + 1] = {1, 10, 100, 1e3, 1e4, 1e5, 1e6};
 
 size_t spl_scalar_bytes(const struct spl_scalar_values *scalar)
@@ -96,8 +97,10 @@ static void look(struct spl_scalar_values *s, double v)
         s->missing = true;
         return;
     }
-    s->min = fmin(s->min, v);
-    s->max = fmax(s->max, v);
+    s->min = v < s->min ? v : s->min;
+    s->max = v > s->max ? v : s->max;
+    if (fabs(v) < small_whole && v == (double)(int32_t)v)
+        return; /* a multiple of all steps, and a float */
     s->floats &= (double)(float)v == v;
     double size = fmax(fabs(s->min), fabs(s->max));
     while (s->decimals <= decimals_max && !is_multiple(v, powers[s->decimals], size))

@@ -59,6 +59,7 @@ int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_
     unsettled->neighbours = spl_spill_take(block->points->spill, count, k * sizeof *unsettled->neighbours, NULL);
     if (!unsettled->points || !unsettled->neighbours)
         return SPL_E_NOMEM;
+    unsettled->neighbour_bytes = count * k * sizeof *unsettled->neighbours;
     for (size_t i = 0; i < points; i++) {
         const uint32_t *list = block->neighbours + i * k;
         if (!waits(block, list))
@@ -72,6 +73,8 @@ int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_
 
 void spl_unsettled_finish(struct spl_unsettled *unsettled)
 {
+    spl_spill_discard(unsettled->spill, unsettled->points, unsettled->count * sizeof *unsettled->points);
+    spl_spill_discard(unsettled->spill, unsettled->neighbours, unsettled->neighbour_bytes);
     spl_spill_give(unsettled->spill, unsettled->points);
     spl_spill_give(unsettled->spill, unsettled->neighbours);
     *unsettled = (struct spl_unsettled){0};

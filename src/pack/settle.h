@@ -23,7 +23,7 @@ struct spl_unsettled {
         float radius, uncertainty;
     } * points;
     uint32_t *neighbours; /* k a point */
-    size_t count;
+    size_t count, neighbour_bytes;
 };
 
 /* Makes limit[] radii, and lists who waits. SPL_E_NOMEM; finish it in any case. */

@@ -17,7 +17,7 @@
 #include "base/memory.h"
 #include "pack/spill_parts.h"
 
-enum { large = 1 << 20, pool_least = 32 << 20, pools_a_spill = 64 };
+enum { large = 1 << 20, pool_least = SPL_SPILL_POOL, pools_a_spill = 64 };
 static const double in_memory = 0.35; /* of the bound */
 
 static atomic_size_t forced;
@@ -63,7 +63,8 @@ static void drop(struct spl_spill *s, size_t index)
     } else {
         munmap(p->at, p->bytes);
         close(p->fd);
-        s->on_disk -= p->bytes;
+        s->on_disk -= p->bytes - p->holes;
+        s->mapped -= p->bytes;
     }
     *p = s->pieces[--s->count];
 }
@@ -103,7 +104,7 @@ static void *add_piece(struct spl_spill *s, size_t bytes, bool zeroed, struct sp
         return spl_spill_map_file(s, bytes, err);
     void *at = zeroed ? spl_alloc(1, bytes, err) : spl_alloc_raw(1, bytes, err);
     if (at) {
-        s->pieces[s->count++] = (struct spl_spill_piece){at, bytes, -1};
+        s->pieces[s->count++] = (struct spl_spill_piece){.at = at, .bytes = bytes, .fd = -1};
         s->on_heap += bytes;
     }
     return at;
@@ -169,7 +170,7 @@ void *spl_spill_realloc(struct spl_spill *s, void *old, size_t count, size_t siz
         at = spl_spill_grow_file(s, &s->pieces[i], bytes, err);
     } else if (s->on_heap - before + bytes <= spl_spill_get_share(s->memory)) {
         if ((at = spl_realloc(old, count, size, err))) {
-            s->pieces[i] = (struct spl_spill_piece){at, bytes, -1};
+            s->pieces[i] = (struct spl_spill_piece){.at = at, .bytes = bytes, .fd = -1};
             s->on_heap += bytes - before;
         }
     } else if ((at = add_piece(s, bytes, false, err))) {
@@ -194,6 +195,19 @@ void spl_spill_free(struct spl_spill *s, void *array)
     pthread_mutex_unlock(&s->lock);
     if (!is_piece)
         free(array);
+}
+
+void spl_spill_discard(struct spl_spill *s, void *from, size_t bytes)
+{
+    if (!s || !from)
+        return;
+    pthread_mutex_lock(&s->lock);
+    for (size_t i = 0; i < s->count; i++) {
+        struct spl_spill_piece *p = &s->pieces[i];
+        if (p->fd >= 0 && (uintptr_t)from - (uintptr_t)p->at < p->bytes)
+            spl_spill_punch(s, p, from, bytes);
+    }
+    pthread_mutex_unlock(&s->lock);
 }
 
 void *spl_spill_take(struct spl_spill *s, size_t count, size_t size, struct spl_error *err)

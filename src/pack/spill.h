@@ -23,6 +23,11 @@ void *spl_spill_alloc_raw(struct spl_spill *spill, size_t count, size_t size, st
 void *spl_spill_realloc(struct spl_spill *spill, void *old, size_t count, size_t size, struct spl_error *err);
 void spl_spill_free(struct spl_spill *spill, void *array);
 
+/* Nobody reads these bytes again, which are of such an array: what they take on disk is given back. Any thread. */
+void spl_spill_discard(struct spl_spill *spill, void *from, size_t bytes);
+
+enum { SPL_SPILL_POOL = 8 << 20 }; /* bytes that such small ones are had of at a time, at least */
+
 /* Many small ones, which come back only when the spill is destroyed. Where `spill` is NULL as spl_alloc_raw(),
  * free(). */
 void *spl_spill_take(struct spl_spill *spill, size_t count, size_t size, struct spl_error *err);

@@ -59,7 +59,7 @@ static void let_go(struct spl_spill *s)
     uint64_t wanted = (uint64_t)(low * (double)get_most(s)), steps = 0;
     pthread_mutex_lock(&s->lock);
     atomic_store(&s->at_work, true);
-    uint64_t left = s->on_disk;
+    uint64_t left = s->mapped;
     for (size_t turns = 0; left > 0 && turns <= s->count; steps++) {
         if (s->hand >= s->count || s->pieces[s->hand].fd < 0 || s->hand_at >= s->pieces[s->hand].bytes) {
             s->hand = s->hand + 1 < s->count ? s->hand + 1 : 0;

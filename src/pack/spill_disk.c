@@ -1,6 +1,6 @@
 /* Files without a name, one an array, all of their blocks reserved before they are mapped, so that a full disk is an
  * error and no signal. Mapped shared: a page that is let go of is in the file, and comes back when it is next
- * touched. */
+ * touched. What nobody reads again is punched out of its file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/magic.h>
@@ -110,8 +110,9 @@ static void *map_nameless(struct spl_spill *s, size_t bytes)
         return NULL;
     }
     madvise(at, bytes, MADV_NOHUGEPAGE); /* less comes at a touch */
-    s->pieces[s->count++] = (struct spl_spill_piece){at, bytes, fd};
+    s->pieces[s->count++] = (struct spl_spill_piece){.at = at, .bytes = bytes, .fd = fd};
     s->on_disk += bytes;
+    s->mapped += bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;
     return at;
 }
@@ -138,10 +139,22 @@ void *spl_spill_grow_file(struct spl_spill *s, struct spl_spill_piece *p, size_t
         return fail_piece(s, err);
     }
     s->on_disk += bytes - p->bytes;
+    s->mapped += bytes - p->bytes;
     s->disk_most = s->on_disk > s->disk_most ? s->on_disk : s->disk_most;
     p->at = at;
     p->bytes = bytes;
     return at;
+}
+
+void spl_spill_punch(struct spl_spill *s, struct spl_spill_piece *p, char *from, size_t bytes)
+{
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE), at = (size_t)(from - p->at), last = at + bytes;
+    const size_t begin = (at + page - 1) & ~(page - 1), end = last < p->bytes ? last & ~(page - 1) : p->bytes;
+    const int how = FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE;
+    if (end <= begin || fallocate(p->fd, how, (off_t)begin, (off_t)(end - begin)))
+        return; /* where the file system knows no holes they stay */
+    p->holes += end - begin;
+    s->on_disk -= end - begin;
 }
 
 void spl_spill_copy_to_file(char *to, const char *from, size_t bytes)

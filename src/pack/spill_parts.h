@@ -13,12 +13,13 @@ enum { SPL_SPILL_STEP = 2 << 20 }; /* bytes that are let go of at a time */
 struct spl_spill_piece {
     char *at;
     size_t bytes;
-    int fd; /* -1: on the heap */
+    int fd;       /* -1: on the heap */
+    size_t holes; /* bytes of the file that were given back */
 };
 
 struct spl_spill {
     char *folder;
-    uint64_t memory, on_heap, on_disk, disk_most;
+    uint64_t memory, on_heap, on_disk, disk_most, mapped; /* the last: of files, holes included */
     atomic_uint_fast64_t memory_most, checked_ns;
     pthread_mutex_t lock;
     struct spl_spill_piece *pieces;
@@ -51,6 +52,9 @@ char *spl_spill_find_folder(const char *beside);
 /* Under the lock: another piece, for which the list has room; a piece grown in its file. NULL: *err says why. */
 void *spl_spill_map_file(struct spl_spill *spill, size_t bytes, struct spl_error *err);
 void *spl_spill_grow_file(struct spl_spill *spill, struct spl_spill_piece *piece, size_t bytes, struct spl_error *err);
+
+/* Under the lock: gives back what whole pages of a piece take. */
+void spl_spill_punch(struct spl_spill *spill, struct spl_spill_piece *piece, char *from, size_t bytes);
 
 /* A part at a time, each let go of: nobody else can meanwhile. */
 void spl_spill_copy_to_file(char *to, const char *from, size_t bytes);

@@ -8,15 +8,10 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "pack/median.h"
 
 enum { sample_most = 1 << 16, points_least = 2000 };
 static const double left_out = 1e-3, far_ratio = 50;
-
-static int compare(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
 {
@@ -32,9 +27,8 @@ bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
                 spl_spill_keep_bound(p->spill);
             sample[i] = spl_points_at(p, c, i * p->count / count);
         }
-        qsort(sample, count, sizeof *sample, compare);
-        low[c] = sample[outer];
-        high[c] = sample[count - 1 - outer];
+        low[c] = spl_nth(sample, count, outer);
+        high[c] = spl_nth(sample + outer, count - outer, count - 1 - 2 * outer);
         most += (high[c] - low[c]) * (high[c] - low[c]);
         all += (p->bounds_max[c] - p->bounds_min[c]) * (p->bounds_max[c] - p->bounds_min[c]);
     }

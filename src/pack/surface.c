@@ -50,7 +50,7 @@ struct surface {
     struct scratch *scratch;
     struct block *blocks;
     size_t block_count;
-    uint8_t *edge;   /* of each point, whether its surface may end there; NULL: no clip lines */
+    uint8_t *edge;   /* a bit of each point: its surface may end there; NULL: no clip lines */
     uint16_t *label; /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
     unsigned k, wide;
@@ -131,8 +131,9 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                 spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
             w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at],
                                                      &near, &w->limit[i - begin], &edge);
-            if (s->edge)
-                s->edge[i] = edge;
+            const bool kept = !s->points->halo || !s->points->halo[i]; /* of others nobody asks for lines */
+            if (edge && kept && s->edge)
+                s->edge[i / 8] |= (uint8_t)(1 << i % 8); /* blocks share no byte */
         }
         const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, &vicinity, w->limit};
         if (spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
@@ -304,7 +305,8 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
     spl_stage_begin(stage, "normals and radii", "points", points->count);
     int rc = allocate(&s, err);
-    if (!rc && clip_lines && points->count > 1 && !(s.edge = spl_spill_alloc_raw(points->spill, points->count, 1, err)))
+    if (!rc && clip_lines && points->count > 1 &&
+        !(s.edge = spl_spill_alloc(points->spill, points->count / 8 + 1, 1, err)))
         rc = SPL_E_NOMEM;
     if (rc)
         goto done;

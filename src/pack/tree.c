@@ -147,10 +147,13 @@ int spl_tree_build(struct spl_tree *tree, const struct spl_points *points, struc
 
 void spl_tree_drop_splats(struct spl_tree *tree, uint32_t node)
 {
-    spl_spill_give(tree->spill, tree->nodes[node].splats);
-    spl_spill_give(tree->spill, tree->nodes[node].numbers);
-    tree->nodes[node].splats = NULL;
-    tree->nodes[node].numbers = NULL;
+    struct spl_tree_node *n = &tree->nodes[node];
+    if (n->splats)
+        spl_spill_discard(tree->spill, n->splats, n->splat_count * sizeof *n->splats);
+    spl_spill_give(tree->spill, n->splats);
+    spl_spill_give(tree->spill, n->numbers);
+    n->splats = NULL;
+    n->numbers = NULL;
 }
 
 void spl_tree_finish(struct spl_tree *tree)

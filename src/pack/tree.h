@@ -7,6 +7,8 @@
 #include "pack/panels/panels.h"
 #include "pack/points.h"
 
+struct spl_early;
+
 /* Most points of a leaf, and of one where nodes are what pruning chooses among: there are enough of them to choose. */
 enum { SPL_LEAF_POINTS = 8192, SPL_PRUNED_LEAF_POINTS = 512, SPL_PRUNED_LEAF_LEAST = 32 };
 
@@ -59,6 +61,7 @@ struct spl_tree {
     uint32_t count, levels;
     size_t pruned_to; /* said before it is built: about so many splats are to be left of it, and inner nodes are drawn
                          for good, see levels.c; 0: nothing is pruned */
+    struct spl_early *early; /* encodes the nodes whose parents are built, borrowed; NULL: they are once all are */
     struct spl_panel_maker *panels; /* of points on planes, borrowed while levels are built; NULL: none are made */
 };
 

@@ -34,6 +34,26 @@ static void few_are_exact(void **state)
     spl_values_finish(&values);
 }
 
+/* Of either sign, fractions, as large and as small as there are: by their values, not by their bits. */
+static void all_kinds_of_numbers_are_in_order(void **state)
+{
+    struct spl_values values = {0};
+    struct spl_stream_values out;
+    (void)state;
+    for (int i = 0; i < 640; i++) {
+        int n = i * 37 % 640 - 320; /* -320..319 */
+        double value = n < -160 ? -ldexp(1, -160 - n) : n < 0 ? n / 1024.0 : n < 160 ? ldexp(n, -1060) : n;
+        assert_int_equal(spl_values_add(&values, value, 1, NULL), 0);
+    }
+    spl_values_sum_up(&values, &out);
+    for (int q = 0; q < SPL_VALUES_QUANTILES; q++) {
+        int n = 10 * q - 320;
+        assert_true(out.quantiles[q] ==
+                    (n < -160 ? -ldexp(1, -160 - n) : n < 0 ? n / 1024.0 : n < 160 ? ldexp(n, -1060) : n));
+    }
+    spl_values_finish(&values);
+}
+
 static void many_are_near(void **state)
 {
     enum { count = 3000000 };
@@ -180,9 +200,8 @@ static void datasets_have_theirs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(few_are_exact),           cmocka_unit_test(many_are_near),
-        cmocka_unit_test(kinds_have_weights),      cmocka_unit_test(forged_ones_are_refused),
-        cmocka_unit_test(datasets_have_theirs),
-    };
+        cmocka_unit_test(few_are_exact), cmocka_unit_test(all_kinds_of_numbers_are_in_order),
+        cmocka_unit_test(many_are_near), cmocka_unit_test(kinds_have_weights),
+        cmocka_unit_test(forged_ones_are_refused), cmocka_unit_test(datasets_have_theirs)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

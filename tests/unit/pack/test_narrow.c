@@ -104,9 +104,42 @@ static void test_one_that_differs_keeps_all(void **state)
     }
 }
 
+/* As they are read, batch by batch: narrow until a coordinate is something else, then all of them are doubles. */
+static void test_read_narrow_until_one_differs(void **state)
+{
+    (void)state;
+    enum { count = 1000, batch = 300 };
+    for (int kind = SPL_POINTS_FLOATS; kind <= SPL_POINTS_STEPS; kind++)
+        for (size_t odd = 0; odd <= count; odd += 250) { /* the first one, some, and none */
+            double(*position)[3] = shape_points(SHAPE_PLANE, count, 7);
+            round_to((enum spl_points_kind)kind, position, count);
+            position[1][0] = -0.0;
+            if (odd < count)
+                position[odd][2] = 0.5 + 1e-9;
+            struct spl_points p = {.capacity = count};
+            spl_points_begin_narrow(&p, kind == SPL_POINTS_STEPS ? &millimetres : NULL);
+            assert_int_equal(p.kind, kind);
+            for (int c = 0; c < 3; c++)
+                p.floats[c] = malloc((count + SPL_POINTS_PAD) * sizeof(float));
+            for (size_t i = 0, some; i < count; i += some) {
+                some = count - i < batch ? count - i : batch;
+                assert_int_equal(spl_points_put(&p, (const double(*)[3])position + i, some, NULL), SPL_OK);
+                p.count += some;
+                assert_int_equal(p.kind, odd < i + some ? SPL_POINTS_DOUBLES : kind);
+            }
+            for (size_t i = 0; i < count; i++)
+                for (int c = 0; c < 3; c++)
+                    assert_true(spl_points_at(&p, c, i) == position[i][c]);
+            assert_false(signbit(spl_points_at(&p, 0, 1)));
+            spl_points_finish(&p);
+            free(position);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_narrow_is_the_same),
-                                       cmocka_unit_test(test_one_that_differs_keeps_all)};
+                                       cmocka_unit_test(test_one_that_differs_keeps_all),
+                                       cmocka_unit_test(test_read_narrow_until_one_differs)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

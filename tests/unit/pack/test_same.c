@@ -316,7 +316,7 @@ static void warn_of(const char *output)
     assert_int_equal(pack_hollow(500000, false, SPL_PACK_MEMORY_MIN, output, &err), SPL_E_CANCELLED);
 }
 
-/* A million points: 100 bytes each less what is in memory, and 16 of the dataset. */
+/* A million points: 88 bytes each less what is in memory, and 16 of the dataset. */
 static void what_the_disk_needs_is_said(void **state)
 {
     char *in_memory = spl_spill_find_memory_folder(in_folder("none.spld"));

@@ -113,6 +113,46 @@ static void what_was_small_grows_into_a_file(void **state)
     spl_spill_destroy(spill);
 }
 
+/* What is discarded takes no room, and nothing beside it is lost: arrays of a file each, and small ones of one. */
+static void what_is_discarded_takes_no_room(void **state)
+{
+    enum { bytes = 40 << 20, begin = (5 << 20) + 100, end = bytes - 3 };
+    (void)state;
+    struct spl_spill *spill = create(64 << 20);
+    spl_spill_force(1 << 20);
+    uint8_t *at = spl_spill_alloc(spill, bytes, 1, NULL), *small = spl_spill_take(spill, 1 << 20, 1, NULL);
+    uint8_t *after = spl_spill_take(spill, 100, 1, NULL);
+    assert_true(at && small && after);
+    memset(at, 7, bytes);
+    memset(small, 8, 1 << 20);
+    memset(after, 9, 100);
+    const uint64_t most = spl_spill_disk_most(spill);
+    spl_spill_discard(spill, at + begin, end - begin);
+    spl_spill_discard(spill, small, 1 << 20);
+    spl_spill_discard(spill, NULL, 0);
+    spl_spill_discard(NULL, at, 1);
+    for (size_t i = 0; i < begin; i++)
+        assert_int_equal(at[i], 7);
+    for (size_t i = end; i < bytes; i++)
+        assert_int_equal(at[i], 7);
+    for (size_t i = 0; i < 100; i++)
+        assert_int_equal(after[i], 9);
+    if (at[begin + 8192] != 7) { /* this file system knows holes */
+        uint8_t *more = spl_spill_alloc(spill, end - begin - 16384, 1, NULL); /* in their room */
+        assert_non_null(more);
+        assert_true(spl_spill_disk_most(spill) == most);
+        spl_spill_free(spill, more);
+    }
+    spl_spill_free(spill, at);
+    at = spl_spill_alloc(spill, bytes + (bytes >> 1), 1, NULL); /* holes are not given back twice */
+    assert_non_null(at);
+    if (spl_spill_disk_most(spill) < most + (bytes >> 2)) /* some of its holes may be in use again */
+        fail_msg("%llu of %llu", (unsigned long long)spl_spill_disk_most(spill), (unsigned long long)most);
+    spl_spill_free(spill, at);
+    spl_spill_force(0);
+    spl_spill_destroy(spill);
+}
+
 static void without_a_bound_it_is_the_heap(void **state)
 {
     (void)state;
@@ -188,6 +228,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(arrays_beyond_the_bound_keep_their_values), cmocka_unit_test(small_ones_lie_beside_each_other),
         cmocka_unit_test(what_was_small_grows_into_a_file),
+        cmocka_unit_test(what_is_discarded_takes_no_room),
         cmocka_unit_test(the_most_is_that_of_every_moment), cmocka_unit_test(without_a_bound_it_is_the_heap),
         cmocka_unit_test(a_disk_without_room_is_an_error)};
     return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
