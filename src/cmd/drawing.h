@@ -12,14 +12,14 @@
 
 /* First member of the arguments of a command that has the rows below. */
 struct spl_cmd_drawing {
-    uint32_t size[2];                    /* of --size; else what it was before */
-    int format, layer;                   /* enum; format: -1 = not given */
-    bool no_verify, has_background;      /* the latter: --background was given */
-    const char *output;                  /* argument of -o; NULL = not given */
-    char soft_option[24];                /* the last of those that say how what is soft is drawn; "" = none */
-    char ramp_option[16];                /* the last of those that say what values look like; "" = none */
-    struct spl_view view;                /* all but the camera */
-    struct spl_encode_options encode;    /* all but the format */
+    uint32_t size[2];                 /* of --size; else what it was before */
+    int format, layer;                /* enum; format: -1 = not given */
+    bool no_verify, has_background;   /* the latter: --background was given */
+    const char *output;               /* argument of -o; NULL = not given */
+    char soft_option[24];             /* the last of those that say how what is soft is drawn; "" = none */
+    char ramp_option[16];             /* the last of those that say what values look like; "" = none */
+    struct spl_view view;             /* all but the camera */
+    struct spl_encode_options encode; /* all but the format */
     struct spl_renderer_options renderer;
 };
 
@@ -59,14 +59,13 @@ void spl_cmd_print_methods(FILE *out, size_t column);
 #define SPL_CMD_DRAWING_ROWS                                                                                           \
     {"lod", "L", "wanted spacing of splats in pixels; 0 = every splat", .otherwise = "1",                              \
      SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
-        {"supersample", "N", "samples per pixel side: 1, 1.25, 1.5, 2, 4; 0.5, 0.25 render coarsely and enlarge",                 \
-         .otherwise = "1", SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                           \
+        {"supersample", "N", "samples per pixel side: 1, 1.25, 1.5, 2, 4; 0.5, 0.25 are enlarged", .otherwise = "1",   \
+         SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                                             \
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent",                              \
          .otherwise = "black, of a GeoTIFF transparent", .take = spl_cmd_take_background},                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \
         {.help = "What is drawn at all, with any method:", .print = spl_cmd_print_clip},                               \
-        {"clip", "TERMS", NULL, .take = spl_cmd_take_clip},                                                            \
-        {"class", "LIST", NULL, .take = spl_cmd_take_class},                                                           \
+        {"clip", "TERMS", NULL, .take = spl_cmd_take_clip}, {"class", "LIST", NULL, .take = spl_cmd_take_class},       \
         {.help = "Colours and their shading, with any method:", .print = spl_cmd_print_colors},                        \
         {"color-by", "WHAT", NULL, .take = spl_cmd_take_color},                                                        \
         {"range", "LOW..HIGH", NULL, .take = spl_cmd_take_range},                                                      \
@@ -74,17 +73,19 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"edl-strength", "X", NULL, .take = spl_cmd_take_param}, /* these as other options, and as over HTTP: */       \
         {"edl-radius", "N", NULL, .take = spl_cmd_take_param},                                                         \
         {.help = "Soft transparency, with any method:", .print = spl_cmd_print_soft},                                  \
-        {"soft", "TERMS", NULL, .take = spl_cmd_take_soft},                                                            \
-        {"soft-model", "NAME", NULL, .take = spl_cmd_take_param},                                                      \
+        {"soft", "TERMS", NULL, .take = spl_cmd_take_soft}, {"soft-model", "NAME", NULL, .take = spl_cmd_take_param},  \
         {"soft-opacity", "X", NULL, .take = spl_cmd_take_param},                                                       \
-        {"soft-cover", "X", NULL, .take = spl_cmd_take_param},                                                         \
-        {"soft-blend", "X", NULL, .take = spl_cmd_take_param},                                                         \
+        {"soft-cover", "X", NULL, .take = spl_cmd_take_param}, {"soft-blend", "X", NULL, .take = spl_cmd_take_param},  \
         SPL_METHOD_PARAMS(SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW, SPL_CMD_PARAM_ROW)                                     \
-        {"method", "NAME", NULL, .take = spl_cmd_take_method}
+    {                                                                                                                  \
+        "method", "NAME", NULL, .take = spl_cmd_take_method                                                            \
+    }
 #define SPL_CMD_ENCODING_ROWS                                                                                          \
     {"quality", "Q", "of a JPEG, 1 to 100", .otherwise = "90", .take = spl_cmd_take_quality},                          \
-        {"depth-scale", "S", "steps per unit of a depth PNG", .otherwise = "1000",                                     \
-         SPL_CMD_REAL(struct spl_cmd_drawing, encode.depth_scale, 1e-6, 1e9)}
+    {                                                                                                                  \
+        "depth-scale", "S", "steps per unit of a depth PNG",                                                           \
+            .otherwise = "1000", SPL_CMD_REAL(struct spl_cmd_drawing, encode.depth_scale, 1e-6, 1e9)                   \
+    }
 #define SPL_CMD_MACHINE_ROWS                                                                                           \
     {.help = "Machine:"},                                                                                              \
         {"device", "NAME", "'vulkan', 'egl', 'vulkan:1', a UUID or part of a name; see 'splatd devices'",              \
@@ -92,6 +93,8 @@ void spl_cmd_print_methods(FILE *out, size_t column);
         {"require-gpu", NULL, "refuse software devices", SPL_CMD_FLAG(struct spl_cmd_drawing, renderer.require_gpu)},  \
         {"memory-limit", "BYTES", "of device memory; 2G and such, too",                                                \
          SPL_CMD_BYTES(struct spl_cmd_drawing, renderer.memory_limit, 1, UINT64_MAX)},                                 \
-        {"no-verify", NULL, "trust the file's checksums", SPL_CMD_FLAG(struct spl_cmd_drawing, no_verify)}
+    {                                                                                                                  \
+        "no-verify", NULL, "trust the file's checksums", SPL_CMD_FLAG(struct spl_cmd_drawing, no_verify)               \
+    }
 
 #endif
