@@ -225,7 +225,7 @@ static const struct spl_cmd_option options[] = {
      "writes them",
      .otherwise = "the dataset's own render with every splat and 4x4 samples a pixel", .take = take_reference},
     {"photographs", NULL, "the views' photographs are the reference", .take = take_reference},
-    {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,1.25,1.5,2,4", .otherwise = "0.25,0.5,1,2",
+    {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,1.25,1.5,2,4", .otherwise = "0.25,0.5,1,1.25,2",
      .take = take_supersamples},
     {"atoms", "LIST", "of a splat's texture at most, where the dataset has textures", .otherwise = "0,2,8",
      .take = take_atom_counts},
@@ -285,8 +285,9 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
         a->supersamples[0] = 0.25;
         a->supersamples[1] = 0.5;
         a->supersamples[2] = 1;
-        a->supersamples[3] = 2;
-        a->supersample_count = 4;
+        a->supersamples[3] = 1.25;
+        a->supersamples[4] = 2;
+        a->supersample_count = 5;
     }
     if (!a->listed[3]) {
         a->atoms[0] = 0;

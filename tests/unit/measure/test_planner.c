@@ -164,7 +164,10 @@ static void test_settings_that_cost_too_much_are_not_chosen(void **state)
     assert_true(choice.setting.supersample == 2);
     wanted.samples_max--;
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
-    assert_true(choice.setting.supersample == 1);
+    assert_true(choice.setting.supersample == 1.5);
+    wanted.samples_max = 2 * megapixel * megapixel;
+    assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
+    assert_true(choice.setting.supersample == 1.25);
     wanted.samples_max = megapixel * megapixel - 1; // coarser ones have as many pixels
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, &err), SPL_E_INPUT);
     assert_string_equal(err.field, "width");
@@ -236,7 +239,8 @@ static void test_without_a_profile_nothing_is_promised(void **state)
     } more[] = {{60, SPL_METHOD_FILL, 0.25},
                 {110, SPL_METHOD_FILL, 0.5},
                 {230, SPL_METHOD_NEAREST, 1},
-                {400, SPL_METHOD_SPLAT, 1}}; // fill and nearest lie between points and splat
+                {300, SPL_METHOD_NEAREST, 1.25},
+                {400, SPL_METHOD_NEAREST, 1.5}}; // fill and nearest lie between points and splat
     for (size_t i = 0; i < sizeof more / sizeof *more; i++) {
         wanted = demand(more[i].budget_ms, NAN);
         assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);
