@@ -11,8 +11,10 @@
 
 #include <splatd/render.h>
 
-#include "render/fault.h"
 #include "base/memory.h"
+#include "geom/size.h"
+#include "image/resample.h"
+#include "render/fault.h"
 #include "support/make_dataset.h"
 #include "support/sanitised.h"
 
@@ -60,9 +62,11 @@ static struct spl_view looking(double distance, uint32_t width, uint32_t height)
 static struct spl_renderer *open_renderer(uint64_t memory_limit)
 {
     struct spl_renderer *renderer = NULL;
-    struct spl_renderer_options options = {
-        .size = sizeof options,
-        .device = device, .memory_limit = memory_limit, .scratch_samples = 160 * 160, .debug = true};
+    struct spl_renderer_options options = {.size = sizeof options,
+                                           .device = device,
+                                           .memory_limit = memory_limit,
+                                           .scratch_samples = 160 * 160,
+                                           .debug = true};
     struct spl_error err = {0};
     if (spl_renderer_create(&options, &renderer, &err))
         fprintf(stderr, "%s\n", err.message);
@@ -243,6 +247,37 @@ static void a_tile_that_fails_leaves_the_device_usable(void **state)
     spl_dataset_close(dataset);
 }
 
+/* Samples a side that are no whole number: an image of that size, resampled. */
+static void other_sizes_are_resampled(void **state)
+{
+    (void)state;
+    static const double sides[] = {0.5, 1.25, 1.5};
+    struct spl_renderer *renderer = open_renderer(0);
+    struct spl_dataset *dataset = cube();
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
+        struct spl_view view = looking(3, 83, 61), drawn = view; /* which none of them divides */
+        struct spl_frame frame, whole;
+        view.supersample = sides[i];
+        spl_camera_coarsen(&drawn.camera, sides[i]);
+        assert_int_equal(spl_view_get_samples(&view), (uint64_t)(83 * 61 * (sides[i] < 1 ? 1 : sides[i] * sides[i])));
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+        assert_int_equal(spl_renderer_render(renderer, dataset, &drawn, &whole, NULL), SPL_OK);
+        for (int layer = 0; layer < SPL_LAYER_COUNT; layer++) {
+            struct spl_image *image = &frame.images[layer], wanted = *image;
+            const size_t bytes = 83 * 61 * spl_pixel_bytes(image->type);
+            assert_non_null(wanted.pixels = malloc(bytes));
+            spl_image_resample(&whole.images[layer], sides[i], &wanted, 0, 61);
+            assert_memory_equal(wanted.pixels, image->pixels, bytes);
+            free(wanted.pixels);
+        }
+        spl_frame_finish(&frame);
+        spl_frame_finish(&whole);
+    }
+    spl_renderer_destroy(renderer);
+    spl_dataset_close(dataset);
+}
+
 int main(int argc, char **argv)
 {
     device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
@@ -255,6 +290,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(pages_driven_out_between_tiles_come_back),
         cmocka_unit_test(a_frame_may_be_given_up_between_tiles),
         cmocka_unit_test(a_tile_that_fails_leaves_the_device_usable),
+        cmocka_unit_test(other_sizes_are_resampled),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
