@@ -13,7 +13,18 @@
 #include "base/memory.h"
 #include "measure/markup.h"
 
-enum { WIDTH = 720, HEIGHT = 476, LEFT = 56, RIGHT = 20, TOP = 82, BOTTOM = 52, COLORS = 6, DASHES = 4 };
+enum {
+    WIDTH = 720,
+    HEIGHT = 476,
+    LEFT = 56,
+    RIGHT = 20,
+    TOP = 82,
+    BOTTOM = 52,
+    COLORS = 6,
+    DASHES = 7,
+    LEGEND_ROW = 17,
+    LEGEND_ROWS = 6
+};
 
 struct box {
     double x, y, w, h;
@@ -56,7 +67,7 @@ static const char style[] =
     ".f5{fill:#b5b5b5}\n"
     "}\n</style>\n";
 
-static const char *const dashes[DASHES] = {"none", "6 3", "2 3", "8 3 2 3"};
+static const char *const dashes[DASHES] = {"none", "6 3", "2 3", "8 3 2 3", "12 3", "1 5", "8 3 2 3 2 3"};
 
 static bool drawable(const struct spl_chart_point *p)
 {
@@ -233,54 +244,70 @@ static void write_labels(struct layout *l)
                 write_label(l, &l->places[i]);
 }
 
-/* The curves' names in two rows under the title, those that are not dashed first; what does not fit stays in the
- * points' own texts. */
-static void write_legend(const struct layout *l, const struct spl_chart *chart)
+/* The curves' names in rows under the title, those that are not dashed first; what does not fit stays in the points'
+ * own texts. Returns how many rows; `out` NULL: that alone. */
+static int write_legend(FILE *out, const struct spl_chart *chart)
 {
-    double x = LEFT, y = 54;
+    double x = LEFT;
+    int row = 0;
     for (size_t i = 0; i < 2 * chart->curve_count; i++) {
         const struct spl_chart_curve *curve = &chart->curves[i % chart->curve_count];
         if ((curve->dash % DASHES != 0) != (i >= chart->curve_count))
             continue;
         double w = 34 + 6.8 * (double)strlen(curve->name) + 14;
-        if (x + w > WIDTH && y > 54)
+        if (x + w > WIDTH && row + 1 == LEGEND_ROWS)
             break;
         if (x + w > WIDTH) {
             x = LEFT;
-            y = 71;
+            row++;
         }
-        fprintf(l->out,
-                "<path class=\"curve s%u\" stroke-dasharray=\"%s\"%s d=\"M%.1f %.0fh26\"/><text x=\"%.1f\" y=\"%.0f\">",
-                curve->color % COLORS, dashes[curve->dash % DASHES], fading(curve).text, x, y - 4, x + 32, y);
-        spl_markup_text(l->out, curve->name);
-        fputs("</text>\n", l->out);
+        if (out) {
+            int y = 54 + LEGEND_ROW * row;
+            fprintf(out,
+                    "<path class=\"curve s%u\" stroke-dasharray=\"%s\"%s d=\"M%.1f %dh26\"/><text x=\"%.1f\" "
+                    "y=\"%d\">",
+                    curve->color % COLORS, dashes[curve->dash % DASHES], fading(curve).text, x, y - 4, x + 32, y);
+            spl_markup_text(out, curve->name);
+            fputs("</text>\n", out);
+        }
         x += w;
     }
-    fprintf(l->out, "<text class=\"soft\" x=\"%d\" y=\"%d\">", LEFT, HEIGHT - BOTTOM + 38);
+    return row + 1;
+}
+
+/* Beneath the legend, which is given room for two rows. */
+static void write_plot(struct layout *l, const struct spl_chart *chart, int shift)
+{
+    fprintf(l->out, "<g transform=\"translate(0 %d)\">\n<text class=\"soft\" x=\"%d\" y=\"%d\">", shift, LEFT,
+            HEIGHT - BOTTOM + 38);
     spl_markup_text(l->out, chart->note ? chart->note : "labels: lod; filled: on the front");
     fputs("</text>\n", l->out);
+    write_axes(l, chart);
+    write_curves(l);
+    write_labels(l);
+    write_points(l, chart);
+    fputs("</g>\n", l->out);
 }
 
 static void write_chart(struct layout *l, const struct spl_chart *chart)
 {
+    const int rows = write_legend(NULL, chart), shift = rows > 2 ? (rows - 2) * LEGEND_ROW : 0;
     fprintf(l->out,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"spl-chart\" viewBox=\"0 0 %d %d\" role=\"img\" "
             "font-family=\"system-ui, sans-serif\" font-size=\"12\" data-plot=\"%d %d %d %d\" data-ms=\"%.9g %.9g\" "
             "data-psnr=\"%.9g %.9g\">\n<title>",
-            WIDTH, HEIGHT, LEFT, TOP, WIDTH - RIGHT, HEIGHT - BOTTOM, l->ms_low, l->ms_high, l->psnr_low, l->psnr_high);
+            WIDTH, HEIGHT + shift, LEFT, TOP + shift, WIDTH - RIGHT, HEIGHT - BOTTOM + shift, l->ms_low, l->ms_high,
+            l->psnr_low, l->psnr_high);
     spl_markup_text(l->out, chart->title);
-    fprintf(l->out, "</title>\n%s<rect class=\"ground\" width=\"%d\" height=\"%d\"/>\n", style, WIDTH, HEIGHT);
+    fprintf(l->out, "</title>\n%s<rect class=\"ground\" width=\"%d\" height=\"%d\"/>\n", style, WIDTH, HEIGHT + shift);
     fprintf(l->out, "<text x=\"%d\" y=\"20\" font-size=\"15\" font-weight=\"600\">", LEFT);
     spl_markup_text(l->out, chart->title);
     double fits = (WIDTH - LEFT - RIGHT) / (0.55 * (double)(strlen(chart->subtitle) + 1));
     fprintf(l->out, "</text>\n<text class=\"soft\" x=\"%d\" y=\"37\" font-size=\"%.1f\">", LEFT, fits < 11 ? fits : 11);
     spl_markup_text(l->out, chart->subtitle);
     fputs("</text>\n", l->out);
-    write_legend(l, chart);
-    write_axes(l, chart);
-    write_curves(l);
-    write_labels(l);
-    write_points(l, chart);
+    write_legend(l->out, chart);
+    write_plot(l, chart, shift);
     fputs("</svg>\n", l->out);
 }
 

@@ -10,7 +10,7 @@
 #include "measure/report.h"
 #include "shared.h"
 
-static const double supersamples[] = {1, 2, 4, 0.5, 0.25, 1.25, 1.5};
+static const double supersamples[] = {1, 1.25, 1.5, 2, 4, 0.5, 0.25};
 enum { SUPERSAMPLES = sizeof supersamples / sizeof *supersamples, ALL = SPL_TEXTURE_ATOMS, DASHES = 3 };
 
 struct build {
