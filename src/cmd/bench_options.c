@@ -146,8 +146,8 @@ static const char *name_of_model(int model)
 static int take_soft_model(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
 {
     int model = 0;
-    int status = spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model,
-                                   SPL_SOFT_MODEL_COUNT, &model, err);
+    int status = spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model, SPL_SOFT_MODEL_COUNT,
+                                   &model, err);
     for (size_t i = 0; !status && i < a->soft_model_count; i++)
         if (a->soft_models[i] == (enum spl_soft_model)model)
             status = spl_fail(err, SPL_E_USAGE, "--soft-model has '%s' twice", text);
@@ -181,8 +181,8 @@ static int take_reference(void *arguments, const char *option, char *text, struc
 {
     (void)option, (void)err;
     struct spl_sweep_options *sweep = &((struct spl_cmd_bench_arguments *)arguments)->sweep.sweep;
-    sweep->reference = (struct spl_reference){.kind = text ? SPL_REFERENCE_EXACT : SPL_REFERENCE_PHOTOGRAPHS,
-                                              .folder = text};
+    sweep->reference =
+        (struct spl_reference){.kind = text ? SPL_REFERENCE_EXACT : SPL_REFERENCE_PHOTOGRAPHS, .folder = text};
     return SPL_OK;
 }
 
@@ -249,7 +249,9 @@ const struct spl_cmd_table spl_cmd_bench_table = {
         "threads); 'units' are multiples of its time, which compare between machines and days, milliseconds do not.\n\n"
         "With -o, accuracy against time: every view under every setting of one dataset, compared with a reference and\n"
         "timed in turn. OUT gets bench.json, bench.csv, chart.svg, index.html (open it in a browser) and state.jsonl,\n"
-        "from which the same command goes on when it was stopped.\n\n"
+        "from which the same command goes on when it was stopped. Without --reference or --photographs it is the "
+        "dataset's own\n"
+        "render of every splat by splat, which favours that method: where there is a truth, measure against it.\n\n"
         "  splatd bench hall.spld\n"
         "  splatd bench hall.spld --device vulkan,egl --method splat,points --lod 1,2\n"
         "  splatd bench hall.spld hall-1m.spld --views cameras.json --set hall --json > hall.json\n"
@@ -369,7 +371,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);
     a->bench.height = (uint32_t)fmin(size[1], UINT32_MAX);
     if (!status && optind == argc)
-        status = spl_fail(err, SPL_E_USAGE, 
+        status = spl_fail(err, SPL_E_USAGE,
                           "bench needs at least one dataset: splatd bench hall.spld; 'splatd bench --help' shows more");
     if (!status && argc - optind > LIST_MAX)
         status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);

@@ -133,7 +133,7 @@ int spl_report_chart(const struct spl_profile *profile, uint64_t splats, double 
     static const struct {
         const char *name, *text;
     } references[] = {
-        {"self", "its own 4×4 supersampled render"}, {"exact", "exact images"}, {"photographs", "photographs"}};
+        {"self", "its own render by splat, 4×4 samples"}, {"exact", "exact images"}, {"photographs", "photographs"}};
     const char *against = profile->reference;
     for (size_t i = 0; i < sizeof references / sizeof *references; i++)
         if (!strcmp(references[i].name, profile->reference))

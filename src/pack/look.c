@@ -7,7 +7,7 @@
 
 /* Of leaves, levels and headers together. */
 static const double dataset_bytes_a_point = 10;
-static const double memory_bytes_a_point = 80, memory_bytes_least = 30e6;
+static const double memory_bytes_a_point = 60, memory_bytes_least = 30e6;
 
 int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool read, struct spl_point_batch *batch,
                   struct spl_stage *stage, struct spl_cloud **out, struct spl_error *err)
