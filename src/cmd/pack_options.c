@@ -309,8 +309,8 @@ static const struct spl_cmd_table table = {
         "  for k in 0 1 2 3 4 5 6 7; do splatd pack --part $k job; done && splatd pack --join job -o job/street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
-    .after = "\nAbout 56 bytes of memory a point (80 of a text with many digits, 180 on a wire), or --memory. Progress "
-             "and the summary go to stderr.\n",
+    .after = "\nAbout 56 bytes of memory a point (80 of a text with many digits, 180 on a wire), or --memory.\n"
+             "Progress and the summary go to stderr.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };
