@@ -148,7 +148,7 @@ static struct spl_dataset_source open_with(struct server *s, const struct spl_re
     return source;
 }
 
-static const struct spl_remote_how patient = {.deadline_ms = 5000}, hasty = {.deadline_ms = 400};
+static const struct spl_remote_how patient = {.deadline_ms = 5000}, hasty = {.deadline_ms = 1500};
 
 static int read_range(struct spl_dataset_source *source, const struct server *s, uint64_t offset, size_t bytes,
                       struct spl_error *err)
