@@ -157,6 +157,8 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
 {
     bool letters = has_letters(fields);
     for (int pass = 0; pass < PASSES; pass++) {
+        if (pass == PASS_WORDS)
+            layout->letters = spl_layout_has(layout, SPL_COLUMN_X) && spl_layout_has(layout, SPL_COLUMN_Y);
         struct spl_fields again = fields;
         const char *name;
         size_t length;

@@ -32,9 +32,8 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
     if (text[0])
         add(text, sizeof text, "%s", "--columns says otherwise");
     if (info->north_first)
-        add(text, sizeof text, "%s",
-            "x has seven digits and y six, as where the north comes before the east: then y and "
-            "x change places in --columns");
+        add(text, sizeof text, "%s, as where the north comes before the east: then y and x change places in --columns",
+            info->north_first);
     if (info->surveyors)
         add(text, sizeof text, "%s", "Y is the east and X the north, as surveyors have it: x and y here");
     if (info->unused[0])

@@ -490,6 +490,50 @@ static void surveyors_y_is_the_east(void **state)
     loaded_finish(&l);
 }
 
+/* What the east would be before the north is not told. */
+static void a_north_before_the_east_is_told(void **state)
+{
+    static const char seven[] = "x has seven digits and y six", swiss[] = "(Swiss LV95)", zone[] = "its zone in front";
+    static const struct {
+        const char *text, *said;
+    } rows[] = {
+        {"1,1200210.0,2600100.6,438.9,EP\n2,1200211,2600101,438,EP\n", swiss},
+        {"1;1060000;2849999;4\n2;1309999;2470000;4\n", swiss},
+        {"1;1060000;2849999;4\n2;1310000;2470000;4\n", NULL}, /* one lies elsewhere */
+        {"1;nan;2849999;4\n2;1200000;2470000;4\n", swiss},
+        {"1,2600100.6,1200210.0,438.9,EP\n2,2600101,1200211,438,EP\n", NULL},
+        {"1 5300210 500100.5 43.5\n2 5300211 500101 44\n", seven},
+        {"1 500100.5 5300210 43.5\n2 500101 5300211 44\n", NULL},
+        {"P1\t200210\t600100.5\t438\n", NULL}, /* Bern, or Scotland in its order */
+        {"\xe2\x84\x96;X;Y;H\n1;1200210;2600100.6;438.9\n", swiss},
+        {"Nr;X;Y;H\n1;2600100;1200210.6;438.9\n", NULL},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;412000.5;120\n", seven},
+        {"X [m];Y [m];Z [m]\n5300000;412000.5;120\n", seven},
+        {"x,y,z\n1005000,205000,10\n", NULL}, /* feet of New York */
+        {"1005000,205000.5,10\n", seven},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;7412000.5;120\n", zone},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;12612000.5;120\n", zone},
+        {"Nr;X;Y;H\n1;7412000.5;6180000;120\n", NULL},
+        {"Nr;X;Y;H\n1;5333000;4468000.5;520\n", zone},
+        {"1 4468000.5 5333000 520.5\n2 4468001 5333001 520\n", NULL},
+        {"Nr;X;Y;H\n1;5420000;5811000;34\n", NULL}, /* Berlin in its order */
+        {"Easting;Northing;Z\n1200210;2600100;438\n", NULL},
+        {"Nr Y X H\nP1 1200210 2600100 438\n", swiss},
+        {"Nr Y X H\nP1 2600100 1200210 438\n", NULL},
+    };
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        load_text(rows[i].text, NULL, &l);
+        if (!l.north != !rows[i].said || (l.north && !strstr(l.north, rows[i].said)))
+            fail_msg("row %zu: \"%s\"", i, l.north ? l.north : "");
+        loaded_finish(&l);
+    }
+    load_text(rows[0].text, "-,x,y,z,-", &l); /* who says so is believed */
+    assert_null(l.north);
+    loaded_finish(&l);
+}
+
 static void white_is_that_of_the_bits_in_use(void **state)
 {
     static const struct {
@@ -528,6 +572,7 @@ int main(void)
         cmocka_unit_test(headings_in_other_words),
         cmocka_unit_test(many_headings_are_cut),
         cmocka_unit_test(surveyors_y_is_the_east),
+        cmocka_unit_test(a_north_before_the_east_is_told),
         cmocka_unit_test(white_is_that_of_the_bits_in_use),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
