@@ -424,6 +424,20 @@ static void headings_in_other_words(void **state)
         {"Easting (m);Northing (m);Ellipsoidal Height;a;b;c", "a, b, c", 0},
         {"Easting;Northing;Ellipsoidal Height;Height;a;b", "Ellipsoidal Height, a, b", 0},
         {"Points:0,Points:1,Points:2,a,b,c", "a, b, c", 0},
+        {"Rechtswert;Hochwert;H\xc3\xb6he \xc3\xbc. NN;a;b;c", "a, b, c", 0},
+        {"Rechtswert;Hochwert;H\xf6he \xfc. NN;Gr\xf6\xdf"
+         "e;b;c",
+         "Gr\xc3\xb6\xc3\x9f"
+         "e, b, c",
+         0},
+        {"Ost;Nord;HOEHE UEBER NHN [m];a;b;c", "a, b, c", 0},
+        {"Ost;Nord;H\xc3\xb6he \xc3\xbc.M.;a;b;c", "a, b, c", 0},
+        {"Ost;Nord;NHN-H\xc3\xb6he;a;b;c", "a, b, c", 0},
+        {"E;N;H m a.s.l.;a;b;c", "a, b, c", 0},
+        {"East;North;Elevation above mean sea level;a;b;c", "a, b, c", 0},
+        {"Est;Nord;Altitude NGF (m);a;b;c", "a, b, c", 0},
+        {"Ost;Nord;Z_NN;H\xc3\xb6he NN;b;c", "H\xc3\xb6he NN, b, c", 0},
+        {"Ost;Nord;Z;H\xc3\xb6he NN;b;c", "H\xc3\xb6he NN, b, c", 0},
         {"X-Wert;Y-Wert;Z-Wert;Int;xm;h", "xm, h", SPL_CLOUD_COLOR},
         {"X-co\xc3\xb6rdinaat;Y-co\xc3\xb6rdinaat;Hoogte;Rood;Groen;Blauw", "", SPL_CLOUD_COLOR},
     };
@@ -446,6 +460,8 @@ static void headings_in_other_words(void **state)
         assert_false(l.surveyors);
         loaded_finish(&l);
     }
+    refused_text("Ost;Nord;H\xf6he Instrument\n1;2;3\n", SPL_E_INPUT, "z", "\"Ost;Nord;H\xc3\xb6he Instrument\"");
+    refused_text("Ost;Nord;NN\n1;2;3\n", SPL_E_INPUT, "z", "no column has this name");
     refused_text("E Y H\n1 2 3\n", SPL_E_INPUT, "x", "no column has this name");
     refused_text("X N H\n1 2 3\n", SPL_E_INPUT, "y", "no column has this name");
     refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
@@ -469,11 +485,18 @@ static void many_headings_are_cut(void **state)
 
 static void surveyors_y_is_the_east(void **state)
 {
-    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n",           "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
-                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n",
-                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n",         "Nr;Y-Wert;X-Wert;H\xc3\xb6he\n7;1;2;3\n"};
+    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n",
+                                        "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
+                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n",
+                                        "# Punktnummer Y X Hoehe\n7 1 2 3\n",
+                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n",
+                                        "Nr;Y-Wert;X-Wert;H\xc3\xb6he\n7;1;2;3\n",
+                                        "PktNr;Y;X;Z\nP1;1;2;3\n",
+                                        "Nummer;Y-Koordinate;X-Koordinate;H\xc3\xb6he\n1;1;2;3\n",
+                                        "Nr;Code;Y;X;H\xf6he \xfc. NN\n1;a;1;2;3\n",
+                                        "Nr;Y [m];X [m];Z [m]\n1;1;2;3\n"};
     static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n",
-                                           "PtNr Y X Z\nP1 1 2 3\n", "Y-Koordinate;X-Koordinate;H\n1;2;3\n"};
+                                           "Y;X;H\xc3\xb6he NN\n1;2;3\n", "Y-Koordinate;X-Koordinate;H\n1;2;3\n"};
     struct loaded l;
     (void)state;
     for (size_t i = 0; i < sizeof meant / sizeof *meant; i++) {
