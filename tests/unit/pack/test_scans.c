@@ -455,7 +455,7 @@ static void test_coordinate_systems(void **state)
         {{GRID, 2994, 0, NULL, REST}, {0}, "m", NULL, "m | null", "EPSG:2994, is in ft and left out"},
         {{GRID, 0, 0, degrees, REST}, {0}, "m", NULL, "m | null", "EPSG:4326, is in degrees and left out"},
         /* what users get wrong */
-        {{GRID, 0, 0, NULL, REST}, {0}, "metre", NULL, "-", "--unit takes m, ft, us-ft"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "Metre", NULL, "-", "--unit takes m, ft, us-ft"},
         {{GRID, 0, 0, NULL, REST}, {0}, NULL, "25832", "-", "--crs takes EPSG and a number"},
         {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", "EPSG:25832", "-", "--unit 0.2 m contradicts --crs EPSG:25832"},
         {{GRID, 0, 0, NULL, REST}, {0}, "m", "EPSG:4326", "-", "EPSG:4326, which is in degrees"},
