@@ -154,15 +154,19 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
     char latin[SHOWN_LINE];
     bool degrees = spl_text_names_degrees(line, length);
     line = show_latin(line, &length, latin);
+    const int cut = length < shown ? (int)length : shown;
+    const char *more = length < shown ? "" : "…";
+    if (degrees)
+        return spl_source_fail_line(&cloud->source, cloud->source.line, lacks, err,
+                                    "no column has this name; there are \"%.*s%s\": longitudes and latitudes, in "
+                                    "degrees, are no coordinates here and have to be projected first (cs2cs, QGIS)",
+                                    cut, line, more);
     return spl_source_fail_line(
         &cloud->source, cloud->source.line, lacks, err,
         "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
         "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
-        "with --columns, '-' for one that is none of them%s",
-        length < shown ? (int)length : shown, line, length < shown ? "" : "…",
-        degrees ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
-                  "first"
-                : "");
+        "with --columns, '-' for one that is none of them",
+        cut, line, more);
 }
 
 /* A line of units below headings: "m;m;m;0-255", "[m] [m] [m]". */

@@ -130,7 +130,7 @@ static void a_header_without_names_asks_for_columns(void **state)
     (void)state;
     refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "there are \"left back up\", and known are x y z");
     refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "with --columns");
-    refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+    refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees, are no coordinates");
     refused_text("x,lat,z\n7,47,3\n", SPL_E_INPUT, "y", "projected first");
 }
 

@@ -464,7 +464,34 @@ static void headings_in_other_words(void **state)
     refused_text("Ost;Nord;NN\n1;2;3\n", SPL_E_INPUT, "z", "no column has this name");
     refused_text("E Y H\n1 2 3\n", SPL_E_INPUT, "x", "no column has this name");
     refused_text("X N H\n1 2 3\n", SPL_E_INPUT, "y", "no column has this name");
-    refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+    refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees, are no coordinates");
+}
+
+/* However long the path and the headings are, a message goes on to its end: that says what to do. */
+static void messages_end_with_what_to_do(void **state)
+{
+    static const char *const texts[] = {
+        "Name,Latitude,Longitude,Ellipsoidal Height,and many a column more that makes the line a long one to show,b\n"
+        "P1,2,3,4,5,6\n",
+        "Name,Down,Right,Ellipsoidal Height,and many a column more that makes the line a long one to show as it is,b\n"
+        "P1,2,3,4,5,6\n",
+    };
+    static const char *const ends[] = {"have to be projected first (cs2cs, QGIS)", "'-' for one that is none of them"};
+    (void)state;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        struct loaded l;
+        char path[400] = "/tmp/", *end = path + 5;
+        write_scratch(texts[i], strlen(texts[i]));
+        while (end < path + 300)
+            end = stpcpy(end, "./");
+        stpcpy(end, scratch_path() + 5);
+        load_path(path, NULL, 7, &l);
+        size_t length = strlen(l.err.message), size = strlen(ends[i]);
+        if (length < size || strcmp(l.err.message + length - size, ends[i]) != 0)
+            fail_msg("\"%s\"", l.err.message);
+        assert_non_null(strstr(l.err.message, scratch_path() + 5));
+        loaded_finish(&l);
+    }
 }
 
 static void many_headings_are_cut(void **state)
@@ -593,6 +620,7 @@ int main(void)
         cmocka_unit_test(decimal_commas_hold_for_all_lines),
         cmocka_unit_test(commas_that_are_both_are_refused),
         cmocka_unit_test(headings_in_other_words),
+        cmocka_unit_test(messages_end_with_what_to_do),
         cmocka_unit_test(many_headings_are_cut),
         cmocka_unit_test(surveyors_y_is_the_east),
         cmocka_unit_test(a_north_before_the_east_is_told),
