@@ -83,9 +83,7 @@ int spl_text_check_count(const struct spl_source *source, uint64_t count, struct
     return SPL_OK;
 }
 
-/* Headings of old systems are in Latin-1, and shown in UTF-8. Returns `line`, or `out` with its length. */
-enum { SHOWN_LINE = 4096 };
-static const char *show_latin(const char *line, size_t *length, char out[SHOWN_LINE])
+const char *spl_text_show_latin(const char *line, size_t *length, char out[SPL_TEXT_SHOWN])
 {
     size_t used = 0, bytes;
     bool latin = false;
@@ -93,7 +91,7 @@ static const char *show_latin(const char *line, size_t *length, char out[SHOWN_L
         unsigned char c = (unsigned char)line[i];
         bool printable;
         bytes = spl_text_next(line + i, &printable);
-        if (!bytes || i + bytes > *length || used + bytes + 3 > SHOWN_LINE)
+        if (!bytes || i + bytes > *length || used + bytes + 3 > SPL_TEXT_SHOWN)
             return line;
         bool alone = !printable && c >= 0xa0 && bytes == 1;
         if (alone) {
@@ -112,8 +110,8 @@ static const char *show_latin(const char *line, size_t *length, char out[SHOWN_L
 /* The names that columns are found by. */
 static void name_fields(struct spl_cloud *cloud, const struct spl_layout *layout, const char *line, size_t length)
 {
-    char shown[SHOWN_LINE];
-    line = show_latin(line, &length, shown);
+    char shown[SPL_TEXT_SHOWN];
+    line = spl_text_show_latin(line, &length, shown);
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
     size_t name;
     cloud->fields[0] = 0;
@@ -151,9 +149,9 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
     const struct spl_text *text = cloud->state;
     const char *lacks = spl_column_name(spl_layout_lacks(&text->layout));
     enum { shown = 100 };
-    char latin[SHOWN_LINE];
+    char latin[SPL_TEXT_SHOWN];
     bool degrees = spl_text_names_degrees(line, length);
-    line = show_latin(line, &length, latin);
+    line = spl_text_show_latin(line, &length, latin);
     const int cut = length < shown ? (int)length : shown;
     const char *more = length < shown ? "" : "…";
     if (degrees)

@@ -331,6 +331,61 @@ static void what_stands_before_the_numbers_is_passed_over(void **state)
     refused_text(prose, SPL_E_INPUT, "x", "line 1: x: no column has this name");
 }
 
+/* Of 3000 points, so that not all lines decide. */
+static void words_at_the_end_are_left_out(void **state)
+{
+    static const struct {
+        const char *heading, *row, *end, *said, *error; /* said: "" = nothing is left out */
+    } rows[] = {
+        {"Nr;Ost;Nord;H\n", "%d;%d.5;2;3\n", "Anzahl Punkte: 3000\n",
+         "line is no point and left out: \"Anzahl Punkte: 3000\"", ""},
+        {"Nr;Ost;Nord;H\n", "%d;%d.5;2;3\n", "Anzahl Punkte: 3000", "\"Anzahl Punkte: 3000\"", ""},
+        {"", "%d;%d.5;2;3\n", "END\n", "\"END\"", ""},
+        {"x y z\n", "%d %d.5 3\n", "\n\n# that was it\nTotal: 3000\nEnd of file\n\n",
+         "the last 2 lines are no points and left out, from \"Total: 3000\" on", ""},
+        {"x,y,z\r\n", "%d,%d.5,3\r\n",
+         "*** End ***\r\nTotal,3000\r\nGr\xfc\xdf"
+         "e\r\n",
+         "the last 3 lines are no points and left out, from \"*** End ***\"", ""},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "END\n", "\"END\"", ""},
+        {"x y z\n", "%d %d.5 3\n", "", "", ""},
+        {"Name x y z\n", "P%d %d.5 2 3\n", "P - - -\n", "", ""}, /* a point without a place */
+        /* more of them, cut off rows, and words between points */
+        {"x y z\n", "%d %d.5 3\n", "One\nTwo\nThree\nFour\n", NULL,
+         "line 3002: x: \"One\" in column 1 is not a number: correct the line, or delete it"},
+        {"x y z\n", "%d %d.5 3\n", "END\n1 2 3\n", NULL, "line 3002"},
+        {"x y z\n", "%d %d.5 3\n", "7 8", NULL, "column 3 of 3 is missing: correct the line, or delete it"},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "P3000,45", NULL, "is missing"},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "P3000,45,2\n", NULL, "is missing"},
+        {"x y z\n", "%d %d.5 3\n", "min 1 2\n", NULL, "\"min\" in column 1"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct loaded l;
+        FILE *f = fopen(scratch_path(), "w");
+        assert_non_null(f);
+        fputs(rows[i].heading, f);
+        for (int k = 0; k < 3000; k++)
+            fprintf(f, rows[i].row, k, k % 7);
+        fputs(rows[i].end, f);
+        fclose(f);
+        load_path(scratch_path(), NULL, 100, &l);
+        bool right = rows[i].said ? l.code == 0 && l.points == 3000 && strstr(l.footer, rows[i].said) &&
+                                        !l.footer[0] == !rows[i].said[0]
+                                  : l.code == SPL_E_INPUT && strstr(l.err.message, rows[i].error);
+        if (!right)
+            fail_msg("row %zu: %llu points, \"%s\", \"%s\"", i, (unsigned long long)l.points, l.footer, l.err.message);
+        loaded_finish(&l);
+    }
+    static const struct guess few[] = {
+        {"1;2;3\n4;5;6\nEND\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"x y z\n1 2 3\n4 5 6\nPoints: 2\n", "", {1, 2, 3}, {4, 5, 6}},
+        {"2\n1 2 3\n4 5 6\nEnd\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"P1\t1,5\t2,5\t3,5\nP2\t4,5\t5\t6\nAnzahl:\t2\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
+    };
+    CHECK(few);
+}
+
 /* Beyond the lines that decide. */
 static void decimal_commas_hold_for_all_lines(void **state)
 {
@@ -617,6 +672,7 @@ int main(void)
         cmocka_unit_test(numbers_are_read_as_people_write_them),
         cmocka_unit_test(tabs_keep_empty_cells_and_blanks),
         cmocka_unit_test(what_stands_before_the_numbers_is_passed_over),
+        cmocka_unit_test(words_at_the_end_are_left_out),
         cmocka_unit_test(decimal_commas_hold_for_all_lines),
         cmocka_unit_test(commas_that_are_both_are_refused),
         cmocka_unit_test(headings_in_other_words),
