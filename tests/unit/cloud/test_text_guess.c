@@ -2,6 +2,8 @@
  * the words of surveyors and other languages, the white of colours. */
 #include "cloud_test.h"
 
+#include "cloud/source.h"
+
 /* A text, what its columns are taken for, and its first and last point. */
 struct guess {
     const char *text, *columns;
@@ -547,6 +549,16 @@ static void messages_end_with_what_to_do(void **state)
         assert_non_null(strstr(l.err.message, scratch_path() + 5));
         loaded_finish(&l);
     }
+    char name[300] = "", why[441] = "";
+    struct spl_source source;
+    struct spl_error err = {0};
+    memset(name, 'n', sizeof name - 1);
+    memset(why, 'w', sizeof why - 1);
+    assert_int_equal(spl_source_open_bytes(&source, name, "x", 1, NULL), 0);
+    spl_source_fail_line(&source, 7, "x", &err, "%send", why);
+    assert_string_equal(err.message + strlen(err.message) - 4, "wend");
+    assert_non_null(strstr(err.message, "nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn: line 7: x: www"));
+    spl_source_close(&source);
 }
 
 static void many_headings_are_cut(void **state)
