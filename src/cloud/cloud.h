@@ -96,7 +96,10 @@ struct spl_cloud_info {
      * first numbers or names the points. */
     char guessed[192];
     char unused[200]; /* headings of a text whose columns fill nothing, as "Code, Dist"; "" = none */
-    bool north_first; /* a text whose columns nothing names has an x of seven digits, and a y of six: it may be north */
+    /* Of a text whose columns nothing names, or the letters X and Y: what is odd about them where x may be the north,
+     * "x has seven digits and y six"; static, NULL = nothing */
+    const char *north_first; // may be NULL
+    char footer[192]; /* of a text that ends in words: which lines are left out; "" = none */
     bool surveyors;   /* a text's headings Y and X were taken for east and north, x and y here */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */

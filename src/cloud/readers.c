@@ -144,6 +144,28 @@ static bool is_obj(const uint8_t *bytes, size_t available)
     return false;
 }
 
+/* "*110001+0000000000000001 ": two digits of what a word is, four of how, a sign, 8 or 16 characters. */
+static bool is_gsi(const uint8_t *bytes, size_t available)
+{
+    const char *p = (const char *)bytes, *end = p + available;
+    p += p < end && *p == '*';
+    for (int word = 0; word < 2; word++) {
+        size_t size = 0;
+        bool head = end - p > 7 && p[0] && strchr("0123456789", p[0]) && p[1] && strchr("0123456789", p[1]);
+        for (int k = 2; head && k < 6; k++)
+            head = p[k] && strchr("0123456789.", p[k]);
+        if (!head || (p[6] != '+' && p[6] != '-'))
+            return false;
+        for (p += 7; p < end && (unsigned char)*p > ' '; p++)
+            size++;
+        if ((size != 8 && size != 16) || p == end || *p != ' ')
+            return word && (size == 8 || size == 16);
+        while (p < end && *p == ' ')
+            p++;
+    }
+    return true;
+}
+
 /* NULL: none that is known. */
 static const char *find_stranger(const uint8_t *bytes, size_t available)
 {
@@ -155,6 +177,8 @@ static const char *find_stranger(const uint8_t *bytes, size_t available)
         return "is COLMAP's list of cameras or images and no scan: --cameras takes its folder";
     if (available >= 4 && bytes[0] && !bytes[1] && bytes[2] && !bytes[3])
         return "may be text in UTF-16, and is none known here: write it as UTF-8 first (iconv -f UTF-16 -t UTF-8)";
+    if (is_gsi(bytes, available))
+        return "is a list of Leica's in GSI, which is not read here: export its points as text (CSV), LAS or E57";
     return is_obj(bytes, available)
                ? "is a model of Wavefront's (OBJ) and no scan: write its vertices as PLY or as text first"
                : NULL;

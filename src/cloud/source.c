@@ -173,17 +173,20 @@ int spl_source_line(struct spl_source *source, const char **line, size_t *length
     return 1;
 }
 
-/* The end of a long path names the file; the reason must still fit. */
+/* The end of a long path names the file; the reason must still fit, and has what to do at its end. */
 static int fail(const struct spl_source *source, int code, const char *place, uint64_t at, const char *field,
                 struct spl_error *err, const char *format, va_list args)
 {
-    char reason[320], where[48] = "";
-    size_t length = strlen(source->path);
-    const char *path = length > 120 ? source->path + length - 120 : source->path;
+    enum { least = 40, most = 120 };
+    char reason[sizeof err->message], where[48] = "";
 
     vsnprintf(reason, sizeof reason, format, args);
     if (place)
         snprintf(where, sizeof where, ": %s %llu", place, (unsigned long long)at);
+    size_t length = strlen(source->path), others = strlen(where) + strlen(field) + strlen(reason) + sizeof ": : ";
+    size_t room = others + least < sizeof err->message ? sizeof err->message - others : least;
+    room = room < most ? room : most;
+    const char *path = length > room ? source->path + length - room : source->path;
     return spl_fail_field(err, code, field, "%s%s%s%s: %s", path, where, *field ? ": " : "", field, reason);
 }
 

@@ -19,6 +19,7 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
 
     if (!text)
         return SPL_E_NOMEM;
+    text->end = UINT64_MAX;
     int code = spl_source_peek(&cloud->source, 3, &bytes, &length, err);
     if (code < 0)
         return code;
@@ -28,6 +29,8 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     code = spl_text_find_columns(cloud, named, line, length, err);
+    if (code == SPL_OK)
+        code = spl_text_find_end(cloud, err);
     if (code < 0)
         return code;
     for (unsigned i = 0; i < text->layout.fields; i++)
@@ -64,7 +67,7 @@ static int refuse_number(const struct spl_cloud *cloud, const struct spl_layout 
 {
     const struct spl_source *source = &cloud->source;
     char shown[32];
-    const char *text = spl_fields_show(fields, shown), *hint = "";
+    const char *text = spl_fields_show(fields, shown), *hint = ": correct the line, or delete it";
     bool word = !strchr("+-.0123456789", text[0]);
     if (is_decimal_comma(fields))
         hint = "; decimal commas are read where no number of the first lines has a point, and semicolons, tabs or "
@@ -117,7 +120,8 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
         }
         if (got == SPL_FIELD_END)
             return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, column), err,
-                                        "column %u of %u is missing", i + 1, layout->fields);
+                                        "column %u of %u is missing: correct the line, or delete it", i + 1,
+                                        layout->fields);
         if (got == SPL_FIELD_BAD && column < 0)
             return spl_source_fail_line(source, source->line, "", err,
                                         "column %u, which is skipped, has a quotation mark without its other one, or "
@@ -143,7 +147,8 @@ static int text_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limi
 
     rows->count = 0;
     while (rows->count < limit) {
-        int code = spl_text_next_line(source, &line, &length, err);
+        bool over = spl_source_tell(source) >= text->end;
+        int code = over ? 0 : spl_text_next_line(source, &line, &length, err);
         if (code < 0)
             return code;
         if (code == 0 && text->left > 0 && text->left != UINT64_MAX)

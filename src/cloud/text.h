@@ -16,6 +16,7 @@ struct spl_layout {
     char group;     /* likewise */
     bool surveyors; /* names: Y and X, the east and the north of German geodesy, are x and y here */
     bool doubtful;  /* names: they may be that, or not */
+    bool letters;   /* names: x and y are called so, and not east and north */
     char separator; /* ' ', ',', ';', '|' or '\t' */
     uint64_t texts; /* 1 << field of those that hold text, which are skipped */
 };
@@ -132,7 +133,6 @@ int spl_text_look_doubled(const struct spl_text_look *look, char separator);
  * nothing. */
 struct spl_text_sample {
     unsigned lines;
-    bool elsewhere;                 /* x has not seven digits, or y not six, somewhere */
     bool given[SPL_TEXT_FIELDS];    /* some value is a number */
     bool above[SPL_TEXT_FIELDS];    /* with the next: they are not the number of an echo and of how many there are */
     bool fraction[SPL_TEXT_FIELDS]; /* some value is no integer */
@@ -148,6 +148,18 @@ struct spl_text_sample {
 bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout *layout, const char *line,
                          size_t length);
 void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sample *sample);
+
+/* Where x and y lie everywhere, of places on maps whose north comes before the east. Zero-initialised. */
+struct spl_text_north {
+    unsigned lines;
+    uint32_t elsewhere; /* 1 << place: not there, somewhere */
+};
+
+/* A line that is no point adds nothing. */
+void spl_text_north_add(struct spl_text_north *north, const struct spl_layout *layout, const char *line, size_t length);
+
+/* What is odd about x and y, "x has seven digits and y six"; NULL: nothing. `named`: headings call them x and y. */
+const char *spl_text_north_tell(const struct spl_text_north *north, bool named);
 
 /* The first of x, y, z that the layout lacks, or SPL_COLUMN_SKIP. */
 int spl_layout_lacks(const struct spl_layout *layout);

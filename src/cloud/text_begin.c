@@ -232,9 +232,25 @@ static int recognise(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0)
         return code;
     spl_layout_recognise(&text->layout, &sample);
-    cloud->info.north_first = sample.lines && !sample.elsewhere;
     tell_guess(cloud);
     return SPL_OK;
+}
+
+/* Lists of surveyors often have the north before the east, without a word or under X and Y. */
+static int look_for_north(struct spl_cloud *cloud, bool named, struct spl_error *err)
+{
+    const struct spl_text *text = cloud->state;
+    struct spl_text_north north = {0};
+    const char *line;
+    size_t length;
+    int code = 1;
+
+    begin_again(cloud);
+    for (unsigned i = 0; i < SPL_TEXT_SAMPLE && (code = next_sample(cloud, &line, &length, err)) > 0; i++)
+        spl_text_north_add(&north, &text->layout, line, length);
+    if (!named || text->layout.letters)
+        cloud->info.north_first = spl_text_north_tell(&north, named);
+    return code < 0 ? code : SPL_OK;
 }
 
 int spl_text_find_columns(struct spl_cloud *cloud, bool named, const char *line, size_t length, struct spl_error *err)
@@ -242,5 +258,6 @@ int spl_text_find_columns(struct spl_cloud *cloud, bool named, const char *line,
     int code = find_separator(cloud, named, line, length, err);
     if (code < 0)
         return code;
-    return named ? check_names(cloud, err) : recognise(cloud, err);
+    code = named ? check_names(cloud, err) : recognise(cloud, err);
+    return code == SPL_OK && !cloud->options->columns ? look_for_north(cloud, named, err) : code;
 }

@@ -128,7 +128,6 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
     bool whole = !layout->exact || spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
     if (!isfinite(v[at]) || !isfinite(v[at + 1]) || !isfinite(v[at + 2])) /* no point, so the rest of it says nothing */
         return whole;
-    sample->elsewhere |= !(v[at] >= 1e6 && v[at] < 1e7 && v[at + 1] >= 1e5 && v[at + 1] < 1e6);
     for (unsigned i = 0; i < layout->fields; i++) {
         if (!isfinite(v[i]))
             continue;

@@ -108,6 +108,100 @@ static int column_from_part(const char *word, bool axes)
     return column;
 }
 
+/* The next word of a heading, of letters and digits; 0 at the end. */
+static size_t next_word(const char **p, const char *end)
+{
+    size_t length = 0;
+    while (*p < end && strchr(" \t_-.:,/", **p))
+        (*p)++;
+    while (*p + length < end && !strchr(" \t_-.:,/", (*p)[length]))
+        length++;
+    return length;
+}
+
+static bool is_height(const char *word, size_t length)
+{
+    static const char *const heights[] = {"z",       "h",      "hoehe",     "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he",
+                                          "h\xd6he", "height", "elevation", "elev",        "altitude",    "alt",
+                                          "altitud", "cota",   "quota",     "hoogte",      "h\xc3\xb6jd", "h\xf6jd"};
+    return IS_ONE_OF(heights, word, length);
+}
+
+/* "Höhe ü. NN", "Altitude NGF", "H m a.s.l.": a height and what it counts from. Other words may make it
+ * one of an instrument or a reflector. */
+static bool is_height_above(const char *name, size_t length)
+{
+    static const char *const from[] = {"\xc3\xbc",
+                                       "\xc3\x9c",
+                                       "\xfc",
+                                       "\xdc",
+                                       "ue",
+                                       "\xc3\xbc"
+                                       "ber",
+                                       "\xfc"
+                                       "ber",
+                                       "ueber",
+                                       "above",
+                                       "over",
+                                       "m",
+                                       "ft",
+                                       "a",
+                                       "s",
+                                       "l",
+                                       "sl",
+                                       "sea",
+                                       "level",
+                                       "mean",
+                                       "msl",
+                                       "amsl",
+                                       "masl",
+                                       "\xc3\xbcm",
+                                       "\xfcm",
+                                       "\xc3\xbcnn",
+                                       "\xfcnn",
+                                       "\xc3\xbcnhn",
+                                       "\xfcnhn",
+                                       "nn",
+                                       "nhn",
+                                       "dhhn",
+                                       "dhhn12",
+                                       "dhhn92",
+                                       "dhhn2016",
+                                       "ln02",
+                                       "lhn95",
+                                       "ngf",
+                                       "ign69",
+                                       "nap",
+                                       "rh2000",
+                                       "nn2000",
+                                       "dvr90",
+                                       "navd",
+                                       "navd88",
+                                       "ngvd29",
+                                       "egm96",
+                                       "egm2008",
+                                       "evrf2007",
+                                       "odn",
+                                       "ell",
+                                       "ellipsoid",
+                                       "ellipsoidal",
+                                       "ellipsoidisch",
+                                       "ortho",
+                                       "orthometric",
+                                       "orthometrisch"};
+    const char *p = name, *end = name + length;
+    unsigned heights = 0, others = 0;
+    for (size_t size; (size = next_word(&p, end)); p += size) {
+        if (is_height(p, size))
+            heights++;
+        else if (IS_ONE_OF(from, p, size))
+            others++;
+        else
+            return false;
+    }
+    return heights == 1 && others;
+}
+
 /* Only where no column has the name itself: what surely is an axis before other words, and parts of those last. */
 enum pass { PASS_AXES, PASS_WORDS, PASS_PARTS, PASSES };
 
@@ -119,6 +213,8 @@ static int column_from_synonym(const char *name, size_t length, bool letters, en
         return SPL_COLUMN_X;
     if (letters && pass == PASS_WORDS && is(name, length, "n"))
         return SPL_COLUMN_Y;
+    if (pass == PASS_PARTS && is_height_above(name, length))
+        return SPL_COLUMN_Z;
     for (size_t i = 0; i < length && n + 1 < sizeof word; i++)
         if (!strchr(" _-.:", name[i]))
             word[n++] = (char)(name[i] >= 'A' && name[i] <= 'Z' ? name[i] + 32 : name[i]);
@@ -157,6 +253,8 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
 {
     bool letters = has_letters(fields);
     for (int pass = 0; pass < PASSES; pass++) {
+        if (pass == PASS_WORDS)
+            layout->letters = spl_layout_has(layout, SPL_COLUMN_X) && spl_layout_has(layout, SPL_COLUMN_Y);
         struct spl_fields again = fields;
         const char *name;
         size_t length;
@@ -168,13 +266,13 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
     }
 }
 
-/* In German geodesy Y is the east and X the north. With a point's number, Y X and a height called by its German name
- * that is what is meant; without the number it may be, and nobody can tell. */
+/* In German geodesy Y is the east and X the north. With a point's number called in German, Y X and a height that is
+ * what is meant; with a German height alone it may be, and nobody can tell. */
 static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fields)
 {
-    static const char *const numbers[] = {"nr",        "ptnr",    "pktnr",       "pkt",      "punkt",
-                                          "pnr",       "punktnr", "punktnummer", "punkt-nr", "pkt-nr",
-                                          "punktname", "pkt.nr",  "pkt.-nr"};
+    static const char *const numbers[] = {"nr",      "ptnr",        "pktnr",    "pkt",     "punkt",     "pnr",
+                                          "punktnr", "punktnummer", "punkt-nr", "pkt-nr",  "punktname", "pkt.nr",
+                                          "pkt.-nr", "nummer",      "pkt nr",   "punkt nr"};
     static const char *const heights[] = {"h", "hoehe", "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he", "h\xd6he"};
     const char *name;
     size_t length;
@@ -182,13 +280,14 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
     for (unsigned i = 0, stage = 0; next_name(&fields, &name, &length); i++) {
         length = without_unit(name, length);
         numbered |= !stage && IS_ONE_OF(numbers, name, length);
-        bool height = stage == 2 && IS_ONE_OF(heights, name, length) && layout->column[i] == SPL_COLUMN_Z;
-        bool either = stage == 2 && numbered && is(name, length, "z"); /* a German number, no German height */
+        bool height = stage == 2 && layout->column[i] == SPL_COLUMN_Z;
+        const char *blank = memchr(name, ' ', length);
+        bool german = IS_ONE_OF(heights, name, blank ? (size_t)(blank - name) : length);
         int axis = is(name, length, "x")   ? SPL_COLUMN_X
                    : is(name, length, "y") ? SPL_COLUMN_Y
                                            : column_from_synonym(name, length, false, PASS_AXES);
         stage = stage == 1 && axis == SPL_COLUMN_X ? 2 : axis == SPL_COLUMN_Y ? 1 : 0;
-        layout->doubtful |= either || (height && !numbered);
+        layout->doubtful |= height && german && !numbered;
         if (height && numbered) {
             layout->surveyors = true;
             layout->column[i - 2] = SPL_COLUMN_X;

@@ -5,6 +5,7 @@
  * Invariant: the source's cursor is at the start of a line. Owned by the cloud's thread. */
 #include "cloud/text_reader.h"
 
+#include "base/text.h"
 #include "cloud/fields.h"
 
 enum { PROSE_LINES = 30 }; /* before the headings or numbers */
@@ -82,9 +83,35 @@ int spl_text_check_count(const struct spl_source *source, uint64_t count, struct
     return SPL_OK;
 }
 
+const char *spl_text_show_latin(const char *line, size_t *length, char out[SPL_TEXT_SHOWN])
+{
+    size_t used = 0, bytes;
+    bool latin = false;
+    for (size_t i = 0; i < *length; i += bytes) {
+        unsigned char c = (unsigned char)line[i];
+        bool printable;
+        bytes = spl_text_next(line + i, &printable);
+        if (!bytes || i + bytes > *length || used + bytes + 3 > SPL_TEXT_SHOWN)
+            return line;
+        bool alone = !printable && c >= 0xa0 && bytes == 1;
+        if (alone) {
+            out[used++] = (char)(0xc0 | c >> 6);
+            out[used++] = (char)(0x80 | (c & 0x3f));
+        } else
+            for (size_t k = 0; k < bytes; k++)
+                out[used++] = line[i + k];
+        latin |= alone;
+    }
+    out[used] = 0;
+    *length = latin ? used : *length;
+    return latin ? out : line;
+}
+
 /* The names that columns are found by. */
 static void name_fields(struct spl_cloud *cloud, const struct spl_layout *layout, const char *line, size_t length)
 {
+    char shown[SPL_TEXT_SHOWN];
+    line = spl_text_show_latin(line, &length, shown);
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
     size_t name;
     cloud->fields[0] = 0;
@@ -122,16 +149,22 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
     const struct spl_text *text = cloud->state;
     const char *lacks = spl_column_name(spl_layout_lacks(&text->layout));
     enum { shown = 100 };
+    char latin[SPL_TEXT_SHOWN];
+    bool degrees = spl_text_names_degrees(line, length);
+    line = spl_text_show_latin(line, &length, latin);
+    const int cut = length < shown ? (int)length : shown;
+    const char *more = length < shown ? "" : "…";
+    if (degrees)
+        return spl_source_fail_line(&cloud->source, cloud->source.line, lacks, err,
+                                    "no column has this name; there are \"%.*s%s\": longitudes and latitudes, in "
+                                    "degrees, are no coordinates here and have to be projected first (cs2cs, QGIS)",
+                                    cut, line, more);
     return spl_source_fail_line(
         &cloud->source, cloud->source.line, lacks, err,
         "no column has this name; there are \"%.*s%s\", and known are x y z (or easting northing "
         "height), red green blue, nx ny nz, intensity and class: name the columns in their order "
-        "with --columns, '-' for one that is none of them%s",
-        length < shown ? (int)length : shown, line, length < shown ? "" : "…",
-        spl_text_names_degrees(line, length)
-            ? "; degrees are no coordinates here, so longitudes and latitudes have to be projected "
-              "first"
-            : "");
+        "with --columns, '-' for one that is none of them",
+        cut, line, more);
 }
 
 /* A line of units below headings: "m;m;m;0-255", "[m] [m] [m]". */

@@ -13,6 +13,7 @@ struct spl_text {
     bool counted;               /* PTS */
     uint64_t count;             /* the first block's */
     uint64_t left;              /* of the current block; UINT64_MAX where nothing is counted */
+    uint64_t end;               /* where lines of words begin that end the file; UINT64_MAX: it has none */
 };
 
 /* Of a line that is no data: "#", "//", "%", "!", the ";" of a line that has no other, what tells a spreadsheet its
@@ -54,5 +55,12 @@ int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **li
 /* From the lines that follow: what separates columns, how numbers are written, and which columns there are; `line` is
  * the first of them. */
 int spl_text_find_columns(struct spl_cloud *cloud, bool named, const char *line, size_t length, struct spl_error *err);
+
+/* Finds text->end, once the columns are known, and tells of it in info.footer. The source's place is kept. */
+int spl_text_find_end(struct spl_cloud *cloud, struct spl_error *err);
+
+/* Lines of old systems are in Latin-1, and shown in UTF-8: returns `line`, or `out` and its length. */
+enum { SPL_TEXT_SHOWN = 4096 };
+const char *spl_text_show_latin(const char *line, size_t *length, char out[SPL_TEXT_SHOWN]);
 
 #endif

@@ -140,9 +140,8 @@ static json_t *describe_pack(const struct spl_scans *scans, struct spl_scan *lis
     spl_system_finish(&system);
     spl_scans_compare(&some, collect, warnings);
     /* of thousands of tiles beside one folder of panoramas it is read once */
-    json_t *panoramas = count == scans->count
-                            ? spl_info_list_panoramas(list, count, warnings, &estimate.dataset_bytes)
-                            : json_array();
+    json_t *panoramas =
+        count == scans->count ? spl_info_list_panoramas(list, count, warnings, &estimate.dataset_bytes) : json_array();
     if (points > UINT32_MAX - 1)
         json_array_append_new(
             warnings, json_sprintf("more than %u points are refused: pack them as several datasets", UINT32_MAX - 1));
@@ -280,10 +279,13 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
         printf("  columns       %s by the values%s\n", info->guessed,
                info->guessed[0] == '-' ? ": the first numbers or names the points" : "");
     if (info->north_first)
-        printf("  columns       x has seven digits and y six, as where the north comes before the east: then y and x "
-               "change places in --columns\n");
+        printf(
+            "  columns       %s, as where the north comes before the east: then y and x change places in --columns\n",
+            info->north_first);
     if (info->surveyors)
         printf("  columns       Y is the east and X the north, as surveyors have it: x and y here\n");
+    if (info->footer[0])
+        print_text("end", info->footer);
     if (info->unused[0])
         print_text("not used", info->unused);
     if (scan->colors.from != SPL_COLORS_CONSTANT)

@@ -15,7 +15,9 @@ static const struct {
     const char *name;
     double metres;
 } units[] = {{"unknown", 0}, {"m", 1},        {"ft", 0.3048},   {"us-ft", 1200.0 / 3937}, {"km", 1000},
-             {"cm", 0.01},   {"mm", 0.001}, {"yd", 0.9144}, {"in", 0.0254}};
+             {"cm", 0.01},   {"mm", 0.001}, {"yd", 0.9144}, {"in", 0.0254},
+             {"meter", 1},   {"metre", 1},  {"meters", 1},  {"metres", 1}, /* these are read alone */
+             {"foot", 0.3048}, {"feet", 0.3048}};
 
 bool spl_unit_is_same(double metres_a, double metres_b)
 {

@@ -361,7 +361,9 @@ static int open_scans(struct spl_build *p, struct spl_inputs *inputs, const stru
                                           .max_points = options->max_points};
     if (p->part)
         return spl_part_open(p->part, &p->scans, &p->system, inputs, &how, p->stage, err);
-    int rc = spl_scans_init(&p->scans, inputs, &how, p->stage, err);
+    int rc = spl_system_check(said, err);
+    if (!rc)
+        rc = spl_scans_init(&p->scans, inputs, &how, p->stage, err);
     if (!rc)
         rc = spl_kept_check(&p->scans, err);
     if (!rc)

@@ -106,6 +106,21 @@ int spl_inputs_leave_out(struct spl_inputs *inputs, const char *path, int rc, co
     return SPL_OK;
 }
 
+int spl_inputs_check_there(const struct spl_inputs *inputs, struct spl_error *err)
+{
+    for (size_t i = 0; i < inputs->count && !inputs->listener.left_out; i++) {
+        struct stat status;
+        struct spl_source source;
+        if (!stat(inputs->paths[i], &status))
+            continue;
+        int rc = spl_source_open(&source, inputs->paths[i], err); /* says why */
+        if (rc)
+            return rc;
+        spl_source_close(&source); /* it came meanwhile */
+    }
+    return SPL_OK;
+}
+
 int spl_inputs_fail_empty(const struct spl_inputs *inputs, struct spl_error *err)
 {
     if (!inputs->left_out_count)

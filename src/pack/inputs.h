@@ -42,6 +42,9 @@ void spl_inputs_sort(struct spl_inputs *inputs);
 int spl_inputs_leave_out(struct spl_inputs *inputs, const char *path, int rc, const struct spl_error *why,
                          struct spl_error *err);
 
+/* Where nothing may be left out: are all of them there? Before any work. */
+int spl_inputs_check_there(const struct spl_inputs *inputs, struct spl_error *err);
+
 /* The error of having nothing left to read, all of which has been heard of; its field is "inputs". */
 int spl_inputs_fail_empty(const struct spl_inputs *inputs, struct spl_error *err);
 

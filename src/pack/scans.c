@@ -84,11 +84,13 @@ int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_clou
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
                    struct spl_stage *stage, struct spl_error *err)
 {
-    int rc = SPL_OK;
     *scans = (struct spl_scans){.inputs = inputs, .how = *how};
     scans->how.threads = stage->threads;
     scans->how.cancelled = stage->cancelled;
     scans->how.sample_colors = true;
+    int rc = spl_inputs_check_there(inputs, err);
+    if (rc)
+        return rc;
     scans->list = spl_alloc(inputs->count, sizeof *scans->list, err);
     if (!scans->list)
         return SPL_E_NOMEM;

@@ -20,7 +20,7 @@ static void add(char *text, size_t size, const char *format, const char *of)
 
 int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_error *err)
 {
-    char text[800] = "", white[16];
+    char text[1200] = "", white[16];
     bool bits = info->colors.from == SPL_COLORS_RGB && info->colors.guessed && info->colors.white > 255 &&
                 info->colors.white < 65535;
     *out = NULL;
@@ -32,11 +32,12 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
     if (text[0])
         add(text, sizeof text, "%s", "--columns says otherwise");
     if (info->north_first)
-        add(text, sizeof text, "%s",
-            "x has seven digits and y six, as where the north comes before the east: then y and "
-            "x change places in --columns");
+        add(text, sizeof text, "%s, as where the north comes before the east: then y and x change places in --columns",
+            info->north_first);
     if (info->surveyors)
         add(text, sizeof text, "%s", "Y is the east and X the north, as surveyors have it: x and y here");
+    if (info->footer[0])
+        add(text, sizeof text, "%s", info->footer);
     if (info->unused[0])
         add(text, sizeof text, "columns not used: %s", info->unused);
     snprintf(white, sizeof white, "%g", info->colors.white);

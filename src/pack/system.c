@@ -264,6 +264,14 @@ int spl_system_find(struct spl_system *system, const struct spl_scans *scans, co
     return rc;
 }
 
+int spl_system_check(const struct spl_system_options *options, struct spl_error *err)
+{
+    struct finding f = {.options = options};
+    int rc = read_options(&f, err);
+    spl_crs_finish(&f.given);
+    return rc;
+}
+
 void spl_system_finish(struct spl_system *system)
 {
     free(system->crs);

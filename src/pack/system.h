@@ -23,6 +23,9 @@ struct spl_system_options {
  * names. */
 int spl_system_find(struct spl_system *system, const struct spl_scans *scans, const struct spl_system_options *options,
                     struct spl_error *err);
+
+/* Refuses `options` that no scans could make right, before anybody looks at scans: SPL_E_USAGE. Blocks likewise. */
+int spl_system_check(const struct spl_system_options *options, struct spl_error *err);
 void spl_system_finish(struct spl_system *system);
 
 #endif

@@ -78,7 +78,8 @@ struct loaded {
     uint32_t attributes, station_count;
     uint64_t points, skipped, expected, end_offset;
     bool at_most, surveyors;
-    char guessed[192], unused[200];
+    char guessed[192], unused[200], footer[192];
+    const char *north; /* static */
     struct spl_cloud_colors colors;
     double station[4][16];
     double sum[3];
@@ -122,7 +123,9 @@ static inline void load_path(const char *path, const char *columns, size_t capac
         l->expected = info->points_expected;
         l->at_most = info->points_at_most;
         l->surveyors = info->surveyors;
+        l->north = info->north_first;
         snprintf(l->guessed, sizeof l->guessed, "%s", info->guessed);
+        snprintf(l->footer, sizeof l->footer, "%s", info->footer);
         snprintf(l->unused, sizeof l->unused, "%s", info->unused);
         l->colors = info->colors;
         l->end_offset = spl_cloud_get_offset(cloud);

@@ -130,7 +130,7 @@ static void a_header_without_names_asks_for_columns(void **state)
     (void)state;
     refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "there are \"left back up\", and known are x y z");
     refused_text("left back up\n1 2 3\n", SPL_E_INPUT, "x", "with --columns");
-    refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+    refused_text("Lon,Lat,Height\n7,47,3\n", SPL_E_INPUT, "x", "degrees, are no coordinates");
     refused_text("x,lat,z\n7,47,3\n", SPL_E_INPUT, "y", "projected first");
 }
 
@@ -393,6 +393,9 @@ static void what_is_no_scan_is_named(void **state)
          8, "may be text in UTF-16"},
         {BYTES("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1 2 3\n"), "is a model of Wavefront's (OBJ)"},
         {BYTES("# by hand\r\n\r\nmtllib a.mtl\r\nv 0 0 0\r\n"), "is a model of Wavefront's (OBJ)"},
+        {BYTES("*110001+0000000000000001 81..10+0000002600100123 82..10+0000001200200123 \n"),
+         "is a list of Leica's in GSI"},
+        {BYTES("110001+00000001 81..00+00100123\r\n"), "is a list of Leica's in GSI"},
         {BYTES("ncols 3\nnrows 1\nxllcorner 0\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
         {BYTES("NCOLS 3\nNROWS 1\n1 2 3\n"), "is a raster of heights (Esri's grid)"},
         {BYTES("# vtk DataFile Version 3.0\nx y z\n1 2 3\n"), "is a VTK file"},
@@ -413,6 +416,9 @@ static void what_is_no_scan_is_named(void **state)
         put(&b, files[i].bytes, files[i].length);
         refused(&b, NULL, SPL_E_INPUT, i + 1 < sizeof files / sizeof *files ? "" : "x", files[i].message);
     }
+    load_text("110001 +81 2\n110002 +82 3\n", NULL, &l); /* numbers */
+    assert_point(&l, 0, 110001, 81, 2);
+    loaded_finish(&l);
     load_text("offset x y z\n9 1 2 3\n", NULL, &l); /* a heading, not a mesh */
     assert_point(&l, 0, 1, 2, 3);
     loaded_finish(&l);

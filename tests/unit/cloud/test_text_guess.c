@@ -2,6 +2,8 @@
  * the words of surveyors and other languages, the white of colours. */
 #include "cloud_test.h"
 
+#include "cloud/source.h"
+
 /* A text, what its columns are taken for, and its first and last point. */
 struct guess {
     const char *text, *columns;
@@ -331,6 +333,61 @@ static void what_stands_before_the_numbers_is_passed_over(void **state)
     refused_text(prose, SPL_E_INPUT, "x", "line 1: x: no column has this name");
 }
 
+/* Of 3000 points, so that not all lines decide. */
+static void words_at_the_end_are_left_out(void **state)
+{
+    static const struct {
+        const char *heading, *row, *end, *said, *error; /* said: "" = nothing is left out */
+    } rows[] = {
+        {"Nr;Ost;Nord;H\n", "%d;%d.5;2;3\n", "Anzahl Punkte: 3000\n",
+         "line is no point and left out: \"Anzahl Punkte: 3000\"", ""},
+        {"Nr;Ost;Nord;H\n", "%d;%d.5;2;3\n", "Anzahl Punkte: 3000", "\"Anzahl Punkte: 3000\"", ""},
+        {"", "%d;%d.5;2;3\n", "END\n", "\"END\"", ""},
+        {"x y z\n", "%d %d.5 3\n", "\n\n# that was it\nTotal: 3000\nEnd of file\n\n",
+         "the last 2 lines are no points and left out, from \"Total: 3000\" on", ""},
+        {"x,y,z\r\n", "%d,%d.5,3\r\n",
+         "*** End ***\r\nTotal,3000\r\nGr\xfc\xdf"
+         "e\r\n",
+         "the last 3 lines are no points and left out, from \"*** End ***\"", ""},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "END\n", "\"END\"", ""},
+        {"x y z\n", "%d %d.5 3\n", "", "", ""},
+        {"Name x y z\n", "P%d %d.5 2 3\n", "P - - -\n", "", ""}, /* a point without a place */
+        /* more of them, cut off rows, and words between points */
+        {"x y z\n", "%d %d.5 3\n", "One\nTwo\nThree\nFour\n", NULL,
+         "line 3002: x: \"One\" in column 1 is not a number: correct the line, or delete it"},
+        {"x y z\n", "%d %d.5 3\n", "END\n1 2 3\n", NULL, "line 3002"},
+        {"x y z\n", "%d %d.5 3\n", "7 8", NULL, "column 3 of 3 is missing: correct the line, or delete it"},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "P3000,45", NULL, "is missing"},
+        {"Name,x,y,z\n", "P%d,%d.5,2,3\n", "P3000,45,2\n", NULL, "is missing"},
+        {"x y z\n", "%d %d.5 3\n", "min 1 2\n", NULL, "\"min\" in column 1"},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct loaded l;
+        FILE *f = fopen(scratch_path(), "w");
+        assert_non_null(f);
+        fputs(rows[i].heading, f);
+        for (int k = 0; k < 3000; k++)
+            fprintf(f, rows[i].row, k, k % 7);
+        fputs(rows[i].end, f);
+        fclose(f);
+        load_path(scratch_path(), NULL, 100, &l);
+        bool right = rows[i].said ? l.code == 0 && l.points == 3000 && strstr(l.footer, rows[i].said) &&
+                                        !l.footer[0] == !rows[i].said[0]
+                                  : l.code == SPL_E_INPUT && strstr(l.err.message, rows[i].error);
+        if (!right)
+            fail_msg("row %zu: %llu points, \"%s\", \"%s\"", i, (unsigned long long)l.points, l.footer, l.err.message);
+        loaded_finish(&l);
+    }
+    static const struct guess few[] = {
+        {"1;2;3\n4;5;6\nEND\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"x y z\n1 2 3\n4 5 6\nPoints: 2\n", "", {1, 2, 3}, {4, 5, 6}},
+        {"2\n1 2 3\n4 5 6\nEnd\n", "x,y,z", {1, 2, 3}, {4, 5, 6}},
+        {"P1\t1,5\t2,5\t3,5\nP2\t4,5\t5\t6\nAnzahl:\t2\n", "-,x,y,z", {1.5, 2.5, 3.5}, {4.5, 5, 6}},
+    };
+    CHECK(few);
+}
+
 /* Beyond the lines that decide. */
 static void decimal_commas_hold_for_all_lines(void **state)
 {
@@ -424,6 +481,20 @@ static void headings_in_other_words(void **state)
         {"Easting (m);Northing (m);Ellipsoidal Height;a;b;c", "a, b, c", 0},
         {"Easting;Northing;Ellipsoidal Height;Height;a;b", "Ellipsoidal Height, a, b", 0},
         {"Points:0,Points:1,Points:2,a,b,c", "a, b, c", 0},
+        {"Rechtswert;Hochwert;H\xc3\xb6he \xc3\xbc. NN;a;b;c", "a, b, c", 0},
+        {"Rechtswert;Hochwert;H\xf6he \xfc. NN;Gr\xf6\xdf"
+         "e;b;c",
+         "Gr\xc3\xb6\xc3\x9f"
+         "e, b, c",
+         0},
+        {"Ost;Nord;HOEHE UEBER NHN [m];a;b;c", "a, b, c", 0},
+        {"Ost;Nord;H\xc3\xb6he \xc3\xbc.M.;a;b;c", "a, b, c", 0},
+        {"Ost;Nord;NHN-H\xc3\xb6he;a;b;c", "a, b, c", 0},
+        {"E;N;H m a.s.l.;a;b;c", "a, b, c", 0},
+        {"East;North;Elevation above mean sea level;a;b;c", "a, b, c", 0},
+        {"Est;Nord;Altitude NGF (m);a;b;c", "a, b, c", 0},
+        {"Ost;Nord;Z_NN;H\xc3\xb6he NN;b;c", "H\xc3\xb6he NN, b, c", 0},
+        {"Ost;Nord;Z;H\xc3\xb6he NN;b;c", "H\xc3\xb6he NN, b, c", 0},
         {"X-Wert;Y-Wert;Z-Wert;Int;xm;h", "xm, h", SPL_CLOUD_COLOR},
         {"X-co\xc3\xb6rdinaat;Y-co\xc3\xb6rdinaat;Hoogte;Rood;Groen;Blauw", "", SPL_CLOUD_COLOR},
     };
@@ -446,9 +517,48 @@ static void headings_in_other_words(void **state)
         assert_false(l.surveyors);
         loaded_finish(&l);
     }
+    refused_text("Ost;Nord;H\xf6he Instrument\n1;2;3\n", SPL_E_INPUT, "z", "\"Ost;Nord;H\xc3\xb6he Instrument\"");
+    refused_text("Ost;Nord;NN\n1;2;3\n", SPL_E_INPUT, "z", "no column has this name");
     refused_text("E Y H\n1 2 3\n", SPL_E_INPUT, "x", "no column has this name");
     refused_text("X N H\n1 2 3\n", SPL_E_INPUT, "y", "no column has this name");
-    refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees are no coordinates");
+    refused_text("lon[deg],lat[deg],h\n1,2,3\n", SPL_E_INPUT, "x", "degrees, are no coordinates");
+}
+
+/* However long the path and the headings are, a message goes on to its end: that says what to do. */
+static void messages_end_with_what_to_do(void **state)
+{
+    static const char *const texts[] = {
+        "Name,Latitude,Longitude,Ellipsoidal Height,and many a column more that makes the line a long one to show,b\n"
+        "P1,2,3,4,5,6\n",
+        "Name,Down,Right,Ellipsoidal Height,and many a column more that makes the line a long one to show as it is,b\n"
+        "P1,2,3,4,5,6\n",
+    };
+    static const char *const ends[] = {"have to be projected first (cs2cs, QGIS)", "'-' for one that is none of them"};
+    (void)state;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        struct loaded l;
+        char path[400] = "/tmp/", *end = path + 5;
+        write_scratch(texts[i], strlen(texts[i]));
+        while (end < path + 300)
+            end = stpcpy(end, "./");
+        stpcpy(end, scratch_path() + 5);
+        load_path(path, NULL, 7, &l);
+        size_t length = strlen(l.err.message), size = strlen(ends[i]);
+        if (length < size || strcmp(l.err.message + length - size, ends[i]) != 0)
+            fail_msg("\"%s\"", l.err.message);
+        assert_non_null(strstr(l.err.message, scratch_path() + 5));
+        loaded_finish(&l);
+    }
+    char name[300] = "", why[441] = "";
+    struct spl_source source;
+    struct spl_error err = {0};
+    memset(name, 'n', sizeof name - 1);
+    memset(why, 'w', sizeof why - 1);
+    assert_int_equal(spl_source_open_bytes(&source, name, "x", 1, NULL), 0);
+    spl_source_fail_line(&source, 7, "x", &err, "%send", why);
+    assert_string_equal(err.message + strlen(err.message) - 4, "wend");
+    assert_non_null(strstr(err.message, "nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn: line 7: x: www"));
+    spl_source_close(&source);
 }
 
 static void many_headings_are_cut(void **state)
@@ -469,11 +579,18 @@ static void many_headings_are_cut(void **state)
 
 static void surveyors_y_is_the_east(void **state)
 {
-    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n",           "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
-                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n", "# Punktnummer Y X Hoehe\n7 1 2 3\n",
-                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n",         "Nr;Y-Wert;X-Wert;H\xc3\xb6he\n7;1;2;3\n"};
+    static const char *const meant[] = {"PtNr Y X H\nP1 1 2 3\n",
+                                        "Punkt;Y;X;H\xc3\xb6he\nP1;1;2;3\n",
+                                        "Nr.,y [m],x [m],h [m]\n1,1,2,3\n",
+                                        "# Punktnummer Y X Hoehe\n7 1 2 3\n",
+                                        "Pkt.Nr.;Y;X;H\n7;1;2;3\n",
+                                        "Nr;Y-Wert;X-Wert;H\xc3\xb6he\n7;1;2;3\n",
+                                        "PktNr;Y;X;Z\nP1;1;2;3\n",
+                                        "Nummer;Y-Koordinate;X-Koordinate;H\xc3\xb6he\n1;1;2;3\n",
+                                        "Nr;Code;Y;X;H\xf6he \xfc. NN\n1;a;1;2;3\n",
+                                        "Nr;Y [m];X [m];Z [m]\n1;1;2;3\n"};
     static const char *const doubtful[] = {"Y X H\n1 2 3\n", "Code;Y;X;H\xc3\xb6he\nP1;1;2;3\n", "# Y X H\n1 2 3\n",
-                                           "PtNr Y X Z\nP1 1 2 3\n", "Y-Koordinate;X-Koordinate;H\n1;2;3\n"};
+                                           "Y;X;H\xc3\xb6he NN\n1;2;3\n", "Y-Koordinate;X-Koordinate;H\n1;2;3\n"};
     struct loaded l;
     (void)state;
     for (size_t i = 0; i < sizeof meant / sizeof *meant; i++) {
@@ -487,6 +604,50 @@ static void surveyors_y_is_the_east(void **state)
     load_text("id Y X Z\nP1 1 2 3\n", NULL, &l); /* as it says */
     assert_point(&l, 0, 2, 1, 3);
     assert_false(l.surveyors);
+    loaded_finish(&l);
+}
+
+/* What the east would be before the north is not told. */
+static void a_north_before_the_east_is_told(void **state)
+{
+    static const char seven[] = "x has seven digits and y six", swiss[] = "(Swiss LV95)", zone[] = "its zone in front";
+    static const struct {
+        const char *text, *said;
+    } rows[] = {
+        {"1,1200210.0,2600100.6,438.9,EP\n2,1200211,2600101,438,EP\n", swiss},
+        {"1;1060000;2849999;4\n2;1309999;2470000;4\n", swiss},
+        {"1;1060000;2849999;4\n2;1310000;2470000;4\n", NULL}, /* one lies elsewhere */
+        {"1;nan;2849999;4\n2;1200000;2470000;4\n", swiss},
+        {"1,2600100.6,1200210.0,438.9,EP\n2,2600101,1200211,438,EP\n", NULL},
+        {"1 5300210 500100.5 43.5\n2 5300211 500101 44\n", seven},
+        {"1 500100.5 5300210 43.5\n2 500101 5300211 44\n", NULL},
+        {"P1\t200210\t600100.5\t438\n", NULL}, /* Bern, or Scotland in its order */
+        {"\xe2\x84\x96;X;Y;H\n1;1200210;2600100.6;438.9\n", swiss},
+        {"Nr;X;Y;H\n1;2600100;1200210.6;438.9\n", NULL},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;412000.5;120\n", seven},
+        {"X [m];Y [m];Z [m]\n5300000;412000.5;120\n", seven},
+        {"x,y,z\n1005000,205000,10\n", NULL}, /* feet of New York */
+        {"1005000,205000.5,10\n", seven},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;7412000.5;120\n", zone},
+        {"\xe2\x84\x96;X;Y;H\n1;6180000;12612000.5;120\n", zone},
+        {"Nr;X;Y;H\n1;7412000.5;6180000;120\n", NULL},
+        {"Nr;X;Y;H\n1;5333000;4468000.5;520\n", zone},
+        {"1 4468000.5 5333000 520.5\n2 4468001 5333001 520\n", NULL},
+        {"Nr;X;Y;H\n1;5420000;5811000;34\n", NULL}, /* Berlin in its order */
+        {"Easting;Northing;Z\n1200210;2600100;438\n", NULL},
+        {"Nr Y X H\nP1 1200210 2600100 438\n", swiss},
+        {"Nr Y X H\nP1 2600100 1200210 438\n", NULL},
+    };
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        load_text(rows[i].text, NULL, &l);
+        if (!l.north != !rows[i].said || (l.north && !strstr(l.north, rows[i].said)))
+            fail_msg("row %zu: \"%s\"", i, l.north ? l.north : "");
+        loaded_finish(&l);
+    }
+    load_text(rows[0].text, "-,x,y,z,-", &l); /* who says so is believed */
+    assert_null(l.north);
     loaded_finish(&l);
 }
 
@@ -523,11 +684,14 @@ int main(void)
         cmocka_unit_test(numbers_are_read_as_people_write_them),
         cmocka_unit_test(tabs_keep_empty_cells_and_blanks),
         cmocka_unit_test(what_stands_before_the_numbers_is_passed_over),
+        cmocka_unit_test(words_at_the_end_are_left_out),
         cmocka_unit_test(decimal_commas_hold_for_all_lines),
         cmocka_unit_test(commas_that_are_both_are_refused),
         cmocka_unit_test(headings_in_other_words),
+        cmocka_unit_test(messages_end_with_what_to_do),
         cmocka_unit_test(many_headings_are_cut),
         cmocka_unit_test(surveyors_y_is_the_east),
+        cmocka_unit_test(a_north_before_the_east_is_told),
         cmocka_unit_test(white_is_that_of_the_bits_in_use),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);

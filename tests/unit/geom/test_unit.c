@@ -30,7 +30,7 @@ static void names_and_factors(void **state)
 static void what_is_no_unit(void **state)
 {
     (void)state;
-    static const char *const rows[] = {"",    "M",     "metre", "0.3048", "0 m",   "-1 m", "1e-7 m", "nan m",
+    static const char *const rows[] = {"",    "M",     "Metre", "0.3048", "0 m",   "-1 m", "1e-7 m", "nan m",
                                        "1 m ", "1  m", "inf m", "0x10m", "1e10 m", "0x1 mm", "m m",  "1 ft",   "ft "};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         double metres = 7;
@@ -39,6 +39,9 @@ static void what_is_no_unit(void **state)
     }
     double metres;
     assert_true(spl_unit_parse("0.2m", &metres) && metres == 0.2);
+    static const char *const words[] = {"meter", "metre", "meters", "metres", "foot", "feet"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        assert_true(spl_unit_parse(words[i], &metres) && metres == (i < 4 ? 1 : 0.3048));
 }
 
 int main(void)

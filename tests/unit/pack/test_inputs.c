@@ -535,6 +535,17 @@ static void test_the_command(void **state)
     write_text(path_of("tiles/0\033[2J.ply"), "ply\nnonsense\n");
     assert_int_equal(run("tiles -o all.spld", output, sizeof output), 2);
     assert_non_null(strstr(output, "0?[2J.ply: line 2: ")); /* a message on its way to a terminal */
+    static const char *const early[] = {"gone.ply", "tiles --unit furlong", "tiles --crs nosuch",
+                                        "tiles/a.ply gone.ply"};
+    for (size_t i = 0; i < sizeof early / sizeof *early; i++) { /* before any work */
+        char command[100];
+        snprintf(command, sizeof command, "%s -o none.spld", early[i]);
+        assert_int_equal(run(command, output, sizeof output), 2);
+        assert_null(strstr(output, "looking at"));
+        assert_non_null(strstr(output, i == 1   ? "--unit takes"
+                                       : i == 2 ? "--crs takes"
+                                                : "gone.ply: there is no such"));
+    }
     assert_int_equal(run("tiles gone.ply --skip-broken -o all.spld", output, sizeof output), 0);
     assert_non_null(strstr(output, "splatd: left out: "));
     const char *end = strstr(output, "2 scans were left out:\n");

@@ -210,7 +210,13 @@ static void test_guesses_are_noted(void **state)
          "--columns\n"},
         {"", "5000%02d.5 53000%02d.25 3\n", ""},
         {"", "26000%02d.5 12000%02d.25 3\n", ""},
-        {"x y z\n", "53000%02d.5 5000%02d.25 3\n", ""},
+        {"Rechtswert Hochwert Z\n", "53000%02d.5 5000%02d.25 3\n", ""},
+        {"x y z\n", "53000%02d.5 5000%02d.25 3\n",
+         "a.txt: x has seven digits and y six, as where the north comes before the east: then y and x change places in "
+         "--columns\n"},
+        {"", "12000%02d.25 26000%02d.5 3\n",
+         "a.txt: x is about 1.2 million and y 2.6 million (Swiss LV95), as where the north comes before the east: then "
+         "y and x change places in --columns\n"},
         {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
         {"Nr Y X H\n", "P%d %d 4 3\n",
          "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
@@ -400,7 +406,7 @@ static void test_coordinate_systems(void **state)
                       *alike = "COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"foot\",0.3048]],VERT_CS[\"V\","
                                "UNIT[\"US survey foot\",0.304800609601219]]]";
     const struct {
-        struct las a, b; /* b.scale 0: no such file */
+        struct las a, b;                      /* b.scale 0: no such file */
         const char *unit, *crs, *meta, *said; /* meta "-": refused; said NULL: nothing */
     } rows[] = {
         {{GRID, 0, 0, NULL, REST}, {0}, NULL, NULL, "unknown | null", NULL},
@@ -449,7 +455,7 @@ static void test_coordinate_systems(void **state)
         {{GRID, 2994, 0, NULL, REST}, {0}, "m", NULL, "m | null", "EPSG:2994, is in ft and left out"},
         {{GRID, 0, 0, degrees, REST}, {0}, "m", NULL, "m | null", "EPSG:4326, is in degrees and left out"},
         /* what users get wrong */
-        {{GRID, 0, 0, NULL, REST}, {0}, "metre", NULL, "-", "--unit takes m, ft, us-ft"},
+        {{GRID, 0, 0, NULL, REST}, {0}, "Metre", NULL, "-", "--unit takes m, ft, us-ft"},
         {{GRID, 0, 0, NULL, REST}, {0}, NULL, "25832", "-", "--crs takes EPSG and a number"},
         {{GRID, 0, 0, NULL, REST}, {0}, "0.2 m", "EPSG:25832", "-", "--unit 0.2 m contradicts --crs EPSG:25832"},
         {{GRID, 0, 0, NULL, REST}, {0}, "m", "EPSG:4326", "-", "EPSG:4326, which is in degrees"},
@@ -673,7 +679,9 @@ int main(void)
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
-        cmocka_unit_test(test_coarse_floats), cmocka_unit_test(test_uncounted_points), cmocka_unit_test(test_strays),
+        cmocka_unit_test(test_coarse_floats),
+        cmocka_unit_test(test_uncounted_points),
+        cmocka_unit_test(test_strays),
         cmocka_unit_test(test_brighter_than_the_first),
         cmocka_unit_test(test_a_part_of_the_points),
     };
