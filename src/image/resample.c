@@ -1,5 +1,6 @@
-/* Four pixels become one, by rows. Where the nearest pixel is empty, so is the result (but for colour and coverage,
- * whose alpha fades): a silhouette stays where the image has it. */
+/* Four pixels become one, by rows. Of an enlarged image, where the nearest pixel is empty, so is the result (but for
+ * colour and coverage, whose alpha fades): a silhouette stays where the image has it. A square that several pixels lie
+ * in holds what any of them does. */
 #include "image/resample.h"
 
 #include <math.h>
@@ -78,9 +79,12 @@ static void color(const uint8_t *from, const struct taps *t, uint8_t *to)
     to[3] = (uint8_t)(sum[3] + 0.5f);
 }
 
-static float distance(const float *from, const struct taps *t, float tolerance)
+/* Over those as far as the nearest pixel, or of a square as the one that is nearest to the eye. */
+static float distance(const float *from, const struct taps *t, bool square, float tolerance)
 {
     float nearest = from[t->at[0]], sum = 0, total = 0;
+    for (int i = 1; i < 4 && square; i++)
+        nearest = fminf(nearest, from[t->at[i]]); /* which of a number and NAN is the number */
     for (int i = 0; i < 4; i++) {
         float value = from[t->at[i]];
         if (fabsf(value - nearest) <= tolerance * nearest) { /* false for NAN */
@@ -91,11 +95,11 @@ static float distance(const float *from, const struct taps *t, float tolerance)
     return total > 0 ? sum / total : NAN;
 }
 
-static void normal(const float *from, const struct taps *t, float to[3])
+static void normal(const float *from, const struct taps *t, bool square, float to[3])
 {
     float sum[3] = {0}, length = 0;
     const float *nearest = from + 3 * t->at[0];
-    bool empty = nearest[0] == 0 && nearest[1] == 0 && nearest[2] == 0;
+    bool empty = !square && nearest[0] == 0 && nearest[1] == 0 && nearest[2] == 0;
     for (int c = 0; c < 3; c++) {
         for (int i = 0; i < 4; i++)
             sum[c] += t->weight[i] * from[3 * t->at[i] + c];
@@ -113,7 +117,20 @@ static float coverage(const float *from, const struct taps *t)
     return sum;
 }
 
-static void sample(const struct spl_image *small, const struct taps *t, float tolerance, void *to)
+/* The nearest pixel's, or of a square the one's that has most of it of those that hold something. */
+static uint32_t number(const uint32_t *from, const struct taps *t, bool square, uint32_t empty)
+{
+    uint32_t found = from[t->at[0]];
+    float most = 0;
+    for (int i = 0; i < 4 && square; i++)
+        if (from[t->at[i]] != empty && t->weight[i] > most) {
+            most = t->weight[i];
+            found = from[t->at[i]];
+        }
+    return found;
+}
+
+static void sample(const struct spl_image *small, const struct taps *t, bool square, float tolerance, void *to)
 {
     const void *from = small->pixels;
     switch (small->layer) {
@@ -122,16 +139,16 @@ static void sample(const struct spl_image *small, const struct taps *t, float to
         break;
     case SPL_LAYER_DEPTH:
     case SPL_LAYER_RANGE:
-        *(float *)to = distance(from, t, tolerance);
+        *(float *)to = distance(from, t, square, tolerance);
         break;
     case SPL_LAYER_NORMAL:
-        normal(from, t, to);
+        normal(from, t, square, to);
         break;
     case SPL_LAYER_COVERAGE:
         *(float *)to = coverage(from, t);
         break;
     default:
-        *(uint32_t *)to = ((const uint32_t *)from)[t->at[0]];
+        *(uint32_t *)to = number(from, t, square, small->layer == SPL_LAYER_ID ? UINT32_MAX : 0);
     }
 }
 
@@ -151,7 +168,7 @@ static void resample_rows(void *context, size_t begin, size_t end, unsigned work
             char *to = (char *)spl_image_row(j->to, y) + first * pixel_bytes;
             for (uint32_t x = 0; x < count; x++, to += pixel_bytes) {
                 struct taps t = place_taps(&columns[x], &row, j->from->width);
-                sample(j->from, &t, tolerance, to);
+                sample(j->from, &t, j->scale > 1, tolerance, to);
             }
         }
     }
@@ -161,7 +178,7 @@ void spl_image_sample(const struct spl_image *small, double x, double y, float t
 {
     struct axis column = place(x, small->width), row = place(y, small->height);
     struct taps t = place_taps(&column, &row, small->width);
-    sample(small, &t, tolerance, to);
+    sample(small, &t, false, tolerance, to);
 }
 
 void spl_image_resample(const struct spl_image *from, double scale, struct spl_image *to, uint32_t begin, uint32_t end)

@@ -6,14 +6,14 @@
 
 /* Fills the rows [begin, end) of `to` (same layer and type; size set, pixels allocated by the caller) from `from`, of
  * which scale × scale pixels are one of `to`. scale in (0, 1): bilinear between pixel centres. 1.25 or 1.5: the mean
- * over the pixel's square, which reaches into two pixels of `from` along each axis; its middle one is the nearest. What
- * is empty has no weight and an edge gives no value in between:
+ * over the pixel's square, which reaches into two pixels of `from` along each axis. What is empty has no weight and an
+ * edge gives no value in between:
  *     color     by alpha, so that the transparent side of an edge lends no colour
- *     depth, range   over those of the four pixels that lie within 1 % of the nearest one's (1 % / scale below 1): an
- *               edge, not a slant
+ *     depth, range   over those of the four pixels that lie within 1 % / scale of the nearest pixel's: an edge, not a
+ *               slant; of a square within 1 % of the least of them
  *     normal    over those that hold one, made unit again
  *     coverage  over all four
- *     id        the nearest pixel's
+ *     id        the nearest pixel's; of a square that of which it has most, if it is any
  * Pure; uses all cores. */
 void spl_image_resample(const struct spl_image *from, double scale, struct spl_image *to, uint32_t begin, uint32_t end);
 

@@ -5,10 +5,12 @@
 #include "service/request/request.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "geom/ground.h"
 #include "geom/ray_list.h"
 
+#include "render/view.h"
 #include "service/request/values.h"
 
 static bool given(const struct values *values, enum param param)
@@ -49,8 +51,8 @@ int spl_values_resolve_encoding(const struct values *values, struct spl_view_req
         return spl_fail_field(err, SPL_E_INPUT, "depth_scale", "depth_scale %g is outside 1e-6 to 1e9", scale);
     out->listed = (int)format == SPL_FORMAT_LISTED;
     if (values->rays ? !out->listed && format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW : out->listed)
-        return spl_fail_field(err, SPL_E_INPUT, "format", values->rays ? "format of rays is npy, raw or json"
-                                                                        : "format 'json' is of rays alone");
+        return spl_fail_field(err, SPL_E_INPUT, "format",
+                              values->rays ? "format of rays is npy, raw or json" : "format 'json' is of rays alone");
     if (out->listed && values->rays->count > SPL_RAYS_JSON_MAX)
         return spl_fail_field(err, SPL_E_INPUT, "format", "JSON lists what %d rays hit, not %u; ask for npy or raw",
                               (int)SPL_RAYS_JSON_MAX, values->rays->count);
@@ -145,10 +147,13 @@ static int check_cost(const struct spl_view *view, const struct spl_camera_limit
                               "%u x %u pixels with supersample %g are %llu samples; the limit is %llu", camera->width,
                               camera->height, view->supersample, (unsigned long long)samples,
                               (unsigned long long)limits->samples);
+    char drawn[64] = "";
+    if (spl_view_is_resampled(view))
+        snprintf(drawn, sizeof drawn, ", and of the image of %g times the size,", view->supersample);
     if (limits->bytes && bytes > limits->bytes)
-        return spl_fail_field(err, SPL_E_INPUT, "layers",
-                              "%d layers of %u x %u pixels are %llu bytes in memory; the limit is %llu",
-                              __builtin_popcount(view->layers), camera->width, camera->height,
+        return spl_fail_field(err, SPL_E_INPUT, drawn[0] ? "supersample" : "layers",
+                              "%d layers of %u x %u pixels%s are %llu bytes in memory; the limit is %llu",
+                              __builtin_popcount(view->layers), camera->width, camera->height, drawn,
                               (unsigned long long)bytes, (unsigned long long)limits->bytes);
     return 0;
 }

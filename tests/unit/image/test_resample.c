@@ -132,8 +132,8 @@ static void squares_have_the_mean_of_what_they_cover(void **state)
         assert_true(fabsf(out[x] - thirds[x]) < 1e-5f);
 }
 
-/* An edge keeps to the pixel that more of the square lies in, a transparent side lends no colour, and sizes that the
- * factor does not divide end at the last pixel. */
+/* Of an edge the nearer side, of numbers the one with most of the square that is any; a transparent side lends no
+ * colour, and sizes that the factor does not divide end at the last pixel. */
 static void squares_keep_edges(void **state)
 {
     (void)state;
@@ -141,15 +141,20 @@ static void squares_keep_edges(void **state)
     struct spl_image from = image(SPL_LAYER_DEPTH, SPL_PIXEL_F32, 5, 1, depths);
     struct spl_image to = image(SPL_LAYER_DEPTH, SPL_PIXEL_F32, 4, 1, out);
     spl_image_resample(&from, 1.25, &to, 0, 1);
-    const float sides[] = {2, 2, 7};
+    const float sides[] = {2, 2, 7}; /* the first of 2 and 7 where both are in it */
     for (int x = 0; x < 3; x++)
         assert_true(fabsf(out[x] - sides[x]) < 1e-5f);
-    assert_true(isnan(out[3]));
-    uint32_t ids[] = {1, 2, 3, 4}, id[3];
+    assert_true(fabsf(out[3] - 7) < 1e-5f); /* a fifth of it */
+    uint32_t ids[] = {1, 2, UINT32_MAX, 4}, id[3];
     from = image(SPL_LAYER_ID, SPL_PIXEL_U32, 4, 1, ids);
     to = image(SPL_LAYER_ID, SPL_PIXEL_U32, 3, 1, id);
     spl_image_resample(&from, 1.25, &to, 0, 1);
     assert_true(id[0] == 1 && id[1] == 2 && id[2] == 4);
+    float normals[] = {1, 0, 0, 0, 0, 0}, mean[3];
+    from = image(SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 2, 1, normals);
+    to = image(SPL_LAYER_NORMAL, SPL_PIXEL_F32X3, 1, 1, mean);
+    spl_image_resample(&from, 1.5, &to, 0, 1);
+    assert_true(fabsf(mean[0] - 1) < 1e-5f && mean[1] == 0);
     uint8_t colors[] = {200, 100, 50, 255, 0, 255, 0, 0, 9, 9, 9, 255}, color[8];
     from = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 3, 1, colors);
     to = image(SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, 2, 1, color);
