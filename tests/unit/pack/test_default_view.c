@@ -166,6 +166,34 @@ static void all_of_it_is_in_images_of_any_shape(void **state)
     free(cloud.at);
 }
 
+/* Few points that stand over the edge are in the image, too, where the others hardly become smaller for them. */
+static void what_stands_over_is_in_it(void **state)
+{
+    (void)state;
+    static const double z[3] = {0, 0, 1};
+    struct cloud cloud = {0};
+    double fill, before;
+    add_sheet(&cloud, (double[]){0, 0, 0}, (double[]){60, 0, 0}, (double[]){0, 20, 0}, 0.5, z);
+    const size_t sheet = cloud.count;
+    for (int k = 1; k <= 6; k++) {
+        add(&cloud, -0.5 * k, 10, 0, 0, 0, 0);
+        add(&cloud, 60 + 0.5 * k, 10, 0, 0, 0, 0);
+    }
+    struct spl_dataset *dataset = open_packed(&cloud, false, "m");
+    assert_true(share_in_view(dataset, &cloud, cloud.count, 1280, 720, &fill) >= 1);
+    assert_true(fill > 0.9);
+    share_in_view(dataset, &cloud, sheet, 1280, 720, &before);
+    spl_dataset_close(dataset);
+    for (int k = 0; k < 7; k++) /* a hair of it far out, for which nothing is made small */
+        add(&cloud, 65 + 2 * k, 10, 0, 0, 0, 0);
+    dataset = open_packed(&cloud, false, "m");
+    assert_true(share_in_view(dataset, &cloud, sheet, 1280, 720, &fill) >= 1);
+    if (fill < 0.95 * before)
+        fail_msg("%g of the image after %g", fill, before);
+    spl_dataset_close(dataset);
+    free(cloud.at);
+}
+
 /* A dense street before few points of the bushes behind it, which a tile's root has nearly all of: packed in two tiles
  * that are collected, it is framed as packed whole. */
 static void a_collection_is_seen_as_a_pack_is(void **state)
@@ -389,6 +417,7 @@ int main(void)
         cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
+        cmocka_unit_test(what_stands_over_is_in_it),
         cmocka_unit_test(a_collection_is_seen_as_a_pack_is),
         cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
         cmocka_unit_test(as_wide_as_coordinates_go),
