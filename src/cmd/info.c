@@ -233,6 +233,19 @@ static void print_bytes(const char *attribute, double bytes, int width)
     printf("%6.2f\n", bytes);
 }
 
+/* A line each. What META says of all tiles is said all the same. */
+static void print_lost(const struct spl_info_report *report)
+{
+    char text[32];
+    if (report->lost_count)
+        printf("  lost tiles    %s, of which nothing is counted in levels, lines, linear and clip lines:\n",
+               spl_cmd_group(report->lost_count, text));
+    for (uint32_t i = 0; i < report->lost_count && i < SPL_INFO_LOST_MAX; i++)
+        print_line("", report->lost[i].reason);
+    if (report->lost_count > SPL_INFO_LOST_MAX)
+        printf("                and %s more\n", spl_cmd_group(report->lost_count - SPL_INFO_LOST_MAX, text));
+}
+
 static void print_table(const struct spl_info_report *report)
 {
     const struct spl_dataset_info *info = report->info;
@@ -247,6 +260,7 @@ static void print_table(const struct spl_info_report *report)
     if (info->tiles)
         printf("  tiles         %s, which take %.1f MB more\n", spl_cmd_group(info->tiles, a),
                (double)info->tile_bytes / 1e6);
+    print_lost(report);
     json_array_foreach(sources, i, source) print_line(i ? "" : "  source", json_string_value(source));
     const json_t *whole = json_object_get(spl_dataset_get_meta(report->dataset), "part_of");
     const json_t *pruned = json_object_get(json_object_get(spl_dataset_get_meta(report->dataset), "pruned"), "of");
@@ -394,6 +408,9 @@ int spl_cmd_info(int argc, char **argv)
             print_table(&report);
         if (!rc && a.picture)
             rc = spl_cmd_write_dictionary(dataset, a.picture, &err);
+        if (!rc && report.lost_count)
+            rc = spl_fail(&err, SPL_E_CORRUPT, "%s: %u of its %u tiles cannot be used", argv[i], report.lost_count,
+                          report.info->tiles);
         spl_dataset_close(dataset);
         int code = rc ? spl_cmd_fail(&err) : 0;
         worst = code > worst ? code : worst;

@@ -97,24 +97,33 @@ static void gather_page(struct spl_info_report *report, const struct spl_tables 
     }
 }
 
+static int gather(struct spl_info_report *report, uint32_t page, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    struct spl_tables *read;
+    const struct spl_tables *tables = spl_dataset_borrow_tables(report->dataset, page, &read, &why);
+    if (!tables)
+        return spl_fail(err, why.code, "%s", why.message);
+    gather_page(report, tables);
+    free(read);
+    return spl_dataset_count_linear_of(report->dataset, page, &report->linear, err);
+}
+
 int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *dataset, struct spl_error *err)
 {
     *report = (struct spl_info_report){.dataset = dataset, .info = spl_dataset_get_info(dataset)};
     for (uint32_t page = 0; page < report->info->pages; page++) {
         struct spl_error why = {0};
-        struct spl_tables *read;
-        const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, page, &read, &why);
-        if (!tables)
-            return spl_fail(err, why.code, "%s", why.message);
-        gather_page(report, tables);
-        free(read);
+        int rc = gather(report, page, &why);
+        if (rc && (rc != SPL_E_CORRUPT || !spl_dataset_get_part(dataset, page)))
+            return spl_fail(err, rc, "%s", why.message);
     }
     for (uint32_t i = 0; i < report->level_count; i++) {
         struct spl_info_level *level = &report->levels[i];
         level->spacing /= fmax((double)(level->splats + level->panels + level->meshes), 1);
     }
-    int rc = spl_dataset_count_linear(dataset, &report->linear, err);
-    return rc ? rc : spl_dataset_count_atoms(dataset, report->atoms, err);
+    report->lost_count = spl_dataset_list_faulty(dataset, report->lost, SPL_INFO_LOST_MAX);
+    return spl_dataset_count_atoms(dataset, report->atoms, err);
 }
 
 const char *spl_info_name(const struct spl_dataset_info *info, int attribute)
@@ -255,6 +264,20 @@ static json_t *suggestions_to_json(const struct spl_dataset_info *info)
     return list;
 }
 
+/* As `faulty_tiles` of GET /v1/datasets; null of what is no collection. */
+static json_t *lost_to_json(const struct spl_info_report *report)
+{
+    json_t *first = json_array();
+    for (uint32_t i = 0; i < report->lost_count && i < SPL_INFO_LOST_MAX; i++)
+        json_array_append_new(first, json_pack("{s:s, s:s}", "file", report->lost[i].file, "reason",
+                                               report->lost[i].reason));
+    json_t *lost = json_pack("{s:I, s:o}", "count", (json_int_t)report->lost_count, "first", first);
+    if (report->info->tiles)
+        return lost;
+    json_decref(lost);
+    return json_null();
+}
+
 /* NULL when memory is refused: json_pack passes it on. */
 json_t *spl_info_to_json(const struct spl_info_report *report)
 {
@@ -282,11 +305,11 @@ json_t *spl_info_to_json(const struct spl_info_report *report)
         json_object_set_new(widths, name, histogram);
     }
     return json_pack(
-        "{s:s, s:I, s:I, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, "
+        "{s:s, s:I, s:I, s:o, s:o, s:I, s:I, s:I, s:I, s:i, s:I, s:I, s:I, s:{s:o, s:o}, s:{s:o, s:o, s:o, s:f}, s:f, "
         "s:{s:b, s:b, s:b, s:b}, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:O, s:O?, s:O?, s:s, s:O?, s:O?, "
         "s:O?, s:O?, s:o, s:s?, s:s?, s:o, s:o, s:o, s:o}",
-        "id", info->id, "tiles", (json_int_t)info->tiles, "tile_bytes", (json_int_t)info->tile_bytes, "version",
-        json_sprintf("%016" PRIx64, info->version),
+        "id", info->id, "tiles", (json_int_t)info->tiles, "tile_bytes", (json_int_t)info->tile_bytes,
+        "faulty_tiles", lost_to_json(report), "version", json_sprintf("%016" PRIx64, info->version),
         "file_bytes", (json_int_t)info->file_bytes, "points", (json_int_t)info->points, "leaf_splats",
         (json_int_t)info->leaf_splats, "splats", (json_int_t)info->splats, "levels", (int)info->levels, "nodes",
         (json_int_t)info->nodes, "chunks", (json_int_t)info->chunks, "pages", (json_int_t)info->pages, "bounds", "min",

@@ -9,7 +9,7 @@
 #include "dataset/dataset.h"
 #include "dataset/texture.h"
 
-enum { SPL_INFO_CODES = 4, SPL_INFO_WIDTH_MAX = 32, SPL_INFO_LEVELS_MAX = 64 };
+enum { SPL_INFO_CODES = 4, SPL_INFO_WIDTH_MAX = 32, SPL_INFO_LEVELS_MAX = 64, SPL_INFO_LOST_MAX = 10 };
 
 /* Fixed-width codes whose widths each chunk chose; attributes of the dataset's own follow. */
 struct spl_info_code {
@@ -35,6 +35,8 @@ struct spl_info_report {
     uint64_t points[SPL_CHUNK_KINDS]; /* of the leaves, that the kind stands for; of lines 0: they lie over discs */
     double error_squares[SPL_CHUNK_KINDS]; /* of panels and meshes: sum over their points of squared distances */
     double error_most[SPL_CHUNK_KINDS];
+    struct spl_faulty_tile lost[SPL_INFO_LOST_MAX]; /* the first of a collection's tiles that cannot be read */
+    uint32_t lost_count;                            /* of whose pages nothing is counted */
     uint64_t clips;                                                          /* splats that end at a clip line */
 };
 

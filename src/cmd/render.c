@@ -108,7 +108,9 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     fprintf(stderr, " in %.1f ms", stats->total_ms);
     const uint32_t faulty = spl_dataset_list_faulty(dataset, NULL, 0);
     if (!stats->complete && faulty)
-        fprintf(stderr, "; coarser than asked for: %u of its tiles cannot be read", faulty);
+        fprintf(stderr,
+                "; coarser than asked for: %u of its tiles are missing, damaged or other ones than were collected",
+                faulty);
     else if (!stats->complete)
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");

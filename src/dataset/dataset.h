@@ -161,6 +161,8 @@ int spl_dataset_count_atoms(const struct spl_dataset *dataset, uint64_t *histogr
 /* Adds the leaf splats that lie on wires, poles or cables to *linear. SPL_E_CORRUPT when the file was cut short in
  * place. Any thread; blocks on disk. */
 int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear, struct spl_error *err);
+int spl_dataset_count_linear_of(const struct spl_dataset *dataset, uint32_t page, uint64_t *linear,
+                                struct spl_error *err); /* of a page (< info.pages) */
 
 /* The bytes of page `index` (< info.pages) in the map that files and blocks of memory have, for tools: touching them
  * raises SIGBUS when the file was cut short in place. */

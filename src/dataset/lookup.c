@@ -91,7 +91,8 @@ static int count_chunk(const struct spl_dataset *dataset, uint32_t page, const s
     return SPL_OK;
 }
 
-static int count_page(const struct spl_dataset *dataset, uint32_t page, uint64_t *linear, struct spl_error *err)
+int spl_dataset_count_linear_of(const struct spl_dataset *dataset, uint32_t page, uint64_t *linear,
+                                struct spl_error *err)
 {
     struct spl_tables *read;
     struct spl_error why = {0};
@@ -111,6 +112,6 @@ int spl_dataset_count_linear(const struct spl_dataset *dataset, uint64_t *linear
 {
     int rc = SPL_OK;
     for (uint32_t page = 0; page < dataset->info.pages && !rc; page++)
-        rc = count_page(dataset, page, linear, err);
+        rc = spl_dataset_count_linear_of(dataset, page, linear, err);
     return rc;
 }

@@ -163,7 +163,7 @@ def test_what_can_be_wrong_with_a_tile():
                 out = folder / "out.png"
                 done = subprocess.run([REAL, "render", folder / "city/city.spld", "--eye", "55,10,6", "--target", "60,20,0", "-o", out],
                                       text=True, capture_output=True)
-                assert done.returncode == 0 and "1 of its tiles cannot be read" in done.stderr and said in done.stderr, (what, done.stderr)
+                assert done.returncode == 0 and "1 of its tiles are missing, damaged or other ones than were collected" in done.stderr and said in done.stderr, (what, done.stderr)
 
 
 def test_values_are_those_of_the_tiles():

@@ -11,7 +11,6 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "dataset/writer.h"
-#include "geom/unit.h"
 #include "pack/check.h"
 #include "pack/collect/collect.h"
 #include "pack/emit.h"
@@ -93,21 +92,6 @@ static int check_meta(const struct spl_collect *c, const json_t *meta, struct sp
                                 c->count, pages, bytes, SPL_META_BYTES_MAX - others);
 }
 
-/* Which station saw a point, as far as it is known: what a default view is found by. */
-static int know_stations(struct spl_points *p, struct spl_error *err)
-{
-    const struct spl_scalar_values *scan = &p->scalar[SPL_SCALAR_SCAN];
-    if (!p->station_count || (p->station_count > 1 && !scan->values))
-        return SPL_OK;
-    if (!(p->station = spl_alloc_raw(p->count ? p->count : 1, sizeof *p->station, err)))
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->count; i++) {
-        uint32_t station = p->station_count > 1 ? spl_scalar_number(scan, i) : 0;
-        p->station[i] = station < p->station_count ? (uint16_t)station : SPL_NO_STATION;
-    }
-    return SPL_OK;
-}
-
 /* What hangs below a leaf is looked for in its box. */
 static void hold_roots(const struct spl_collect *c, uint32_t first, struct spl_node *nodes, uint32_t count)
 {
@@ -121,16 +105,12 @@ static int write(struct spl_collect *c, struct spl_tree *tree, uint32_t first, c
 {
     struct spl_default_view view;
     struct spl_chunk_options chunk;
-    double unit_m = 0;
     unsigned neighbours;
-    spl_unit_parse(c->unit, &unit_m);
     int rc = spl_pack_check(said, &neighbours, &chunk, err);
-    if (!rc)
-        rc = know_stations(&c->points, err);
     if (!rc && said->default_view)
         spl_said_view(said->default_view, c->points.up, &view);
     else if (!rc)
-        rc = spl_default_view_find(&c->points, unit_m, c->has_sides, spl_thread_count(said->threads), &view, err);
+        rc = spl_collect_find_view(c, &view, err);
     if (rc)
         return rc;
     json_t *meta = spl_collect_describe(c, tree, first, &view);

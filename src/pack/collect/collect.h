@@ -20,7 +20,7 @@ struct spl_collect_tile {
     char *path;       // owned
     const char *name; /* of `path`: the file's, in its folder */
     bool in_folder;   /* it was not named itself, so it may be left out */
-    uint64_t version;
+    uint64_t version, leaf_splats;
     struct spl_node root; /* as it has it */
     size_t begin, end; /* its root's splats among the points */
     size_t first_vertex, end_vertex; /* its root's lines among those of the wires */
@@ -90,6 +90,14 @@ void spl_collect_finish_values(struct spl_collect *c);
 int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, const struct spl_dataset *dataset,
                           struct spl_error *err);
 
+/* Of the tile's leaves each step-th splat to the points, from number *next on, which then is that of the next tile. */
+int spl_collect_take_leaves(struct spl_collect *c, const struct spl_collect_tile *tile,
+                            const struct spl_dataset *dataset, uint64_t step, uint64_t *next, struct spl_error *err);
+
+/* The view that a pack of the tiles' points finds, from an even part of their leaves' splats (sight.c). */
+struct spl_default_view;
+int spl_collect_find_view(const struct spl_collect *c, struct spl_default_view *view, struct spl_error *err);
+
 /* Adds a chunk of lines of a tile whose root lies at `origin` to the wires (lines.c). */
 int spl_collect_take_lines(struct spl_collect *c, const struct spl_chunk *chunk, const double origin[3],
                            const uint32_t *page, struct spl_error *err);
@@ -104,7 +112,6 @@ int spl_collect_group(struct spl_collect *c, struct spl_tree *tree, uint32_t *fi
                       struct spl_error *err);
 
 /* META, once the tree has its levels; NULL: no memory (describe.c). */
-struct spl_default_view;
 json_t *spl_collect_describe(const struct spl_collect *c, const struct spl_tree *tree, uint32_t first,
                              const struct spl_default_view *view);
 

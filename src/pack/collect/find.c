@@ -131,7 +131,10 @@ static int check_tile(const struct spl_collect *c, const struct spl_collect_tile
     int rc = find_folder(tile->path, &status, err);
     if (rc)
         return rc;
-    if (status.st_dev != folder->st_dev || status.st_ino != folder->st_ino)
+    const bool elsewhere = status.st_dev != folder->st_dev || status.st_ino != folder->st_ino;
+    if (elsewhere && stat(tile->path, &status) && errno == ENOENT)
+        return spl_fail_field(err, SPL_E_NOT_FOUND, "inputs", "%.300s: there is no such file or folder", tile->path);
+    if (elsewhere)
         return spl_fail_field(err, SPL_E_USAGE, "inputs",
                               "%.200s lies in another folder than %.200s; a collection lies beside its tiles: write it "
                               "there, or move the tile",

@@ -216,6 +216,7 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory while describing %.200s", tile->path);
     if (!rc) {
         tile->version = info->version;
+        tile->leaf_splats = info->leaf_splats;
         c->has_sides &= info->has_sides;
         c->points.has_color |= info->has_color;
         for (int a = 0; a < 3; a++) {

@@ -1,6 +1,6 @@
-/* The splats of a tile's root as points, with their values: discs as they are, cells of panels and meshes as the discs
- * that they stand for, lines as lines. Of the tile's pages the words of the root's chunks alone are touched. The
- * caller's thread. */
+/* The splats of a tile's root, or some of its leaves', as points with their values: discs as they are, cells of panels
+ * and meshes as the discs that they stand for, lines as lines. Of the tile's pages the words of these chunks alone are
+ * touched. The caller's thread. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,20 +60,20 @@ static void read_values(const struct spl_dataset *dataset, const struct spl_tabl
     }
 }
 
-/* Adds a splat, whose values are those of number `i`; there is room. */
-static int add(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_node *root,
+/* Adds a splat of `node`, whose values are those of number `i`; there is room. */
+static int add(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_node *node,
                const struct spl_splat *splat, const struct values *values, uint32_t i, struct spl_error *err)
 {
     struct spl_points *p = &c->points;
     size_t at = p->count;
     double place[3];
     for (int a = 0; a < 3; a++) {
-        place[a] = p->axis[a][at] = root->origin[a] + (double)splat->position[a];
+        place[a] = p->axis[a][at] = node->origin[a] + (double)splat->position[a];
         p->normal[at][a] = c->has_surface ? splat->normal[a] : a == 2;
     }
     if (!spl_collect_is_place(place) || !(splat->radius > 0 && (double)splat->radius <= SPL_COLLECT_MOST))
         return spl_fail_field(err, SPL_E_CORRUPT, "inputs",
-                              "%.200s: a splat of its root lies at x = %g with radius %g; pack it again", tile->path,
+                              "%.200s: a splat of it lies at x = %g with radius %g; pack it again", tile->path,
                               place[0], (double)splat->radius);
     p->radius[at] = splat->radius;
     p->uncertainty[at] = 0;
@@ -94,57 +94,62 @@ static int add(struct spl_collect *c, const struct spl_collect_tile *tile, const
     return SPL_OK;
 }
 
-/* The cells of a chunk's panels, each the disc that it stands for. */
-static int add_cells(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_node *root,
-                     const struct spl_chunk *chunk, const uint32_t *page, const struct values *values,
-                     struct spl_error *err)
+enum { cells = SPL_PANEL_SIDE * SPL_PANEL_SIDE };
+
+/* The cells of a chunk's panels, each the disc that it stands for: of the cells that there may be each step-th one from
+ * number `first` on. */
+static int add_cells(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_node *node,
+                     const struct spl_chunk *chunk, const uint32_t *page, const struct values *values, uint64_t first,
+                     uint64_t step, struct spl_error *err)
 {
     struct spl_panel_frame frame;
-    int rc = reserve(c, (size_t)chunk->count * SPL_PANEL_SIDE * SPL_PANEL_SIDE, err);
+    int rc = reserve(c, (size_t)chunk->count * cells, err);
     spl_panels_get_frame(chunk, &frame);
     for (uint32_t i = 0; i < chunk->count && !rc; i++) {
         struct spl_panel panel;
         struct spl_relief relief;
         spl_panels_decode(chunk, page, i, &panel);
         spl_panels_get_relief(chunk, page, i, &relief);
-        for (unsigned cell = 0; cell < SPL_PANEL_SIDE * SPL_PANEL_SIDE && !rc; cell++) {
+        for (unsigned cell = 0; cell < cells && !rc; cell++) {
             unsigned x = cell % SPL_PANEL_SIDE, y = cell / SPL_PANEL_SIDE;
             struct spl_splat splat = {.radius = SPL_RADIUS_SPACING * frame.cell};
-            if (!spl_panel_has(&panel, x, y))
+            uint64_t number = (uint64_t)i * cells + cell;
+            if (!spl_panel_has(&panel, x, y) || number < first || (number - first) % step)
                 continue;
             memcpy(splat.color, panel.color[y][x], sizeof splat.color);
             spl_panels_place(&frame, &panel, &relief, (float)x + 0.5f, (float)y + 0.5f, splat.position, splat.normal);
-            rc = add(c, tile, root, &splat, values, i, err);
+            rc = add(c, tile, node, &splat, values, i, err);
         }
     }
     return rc;
 }
 
+/* Of the chunk's splats, or the cells that its panels may have, each step-th one from number `first` on. */
 static int take_chunk(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_dataset *dataset,
-                      const struct spl_tables *tables, uint32_t index, struct spl_error *err)
+                      const struct spl_tables *tables, const struct spl_node *node, uint32_t index, uint64_t first,
+                      uint64_t step, struct spl_error *err)
 {
     /* of it the chunk */
     uint32_t page[SPL_CHUNK_WORDS_MAX + SPL_STREAMS_MAX * SPL_STREAM_WORDS_MAX + SPL_PAGE_TAIL_WORDS];
     struct spl_chunk own = tables->chunks[index], *chunk = &own;
-    const struct spl_node *root = tables->nodes;
     struct values values;
     const size_t words = spl_chunk_words(chunk),
                  all = words + spl_tables_get_stream_words(tables, tables->stream_count, index) + SPL_PAGE_TAIL_WORDS;
     spl_assert(all <= sizeof page / sizeof *page);
-    int rc = spl_dataset_read_words(dataset, 0, chunk->geometry_word, page, all, err);
+    int rc = spl_dataset_read_words(dataset, tables->page, chunk->geometry_word, page, all, err);
     if (rc)
         return rc;
     chunk->geometry_word = 0;
     if (spl_chunk_kind(chunk) == SPL_CHUNK_LINES)
-        return spl_collect_take_lines(c, chunk, root->origin, page, err);
+        return spl_collect_take_lines(c, chunk, node->origin, page, err);
     read_values(dataset, tables, index, page + words, &values);
     if (spl_kind_has_panels(spl_chunk_kind(chunk)))
-        return add_cells(c, tile, root, chunk, page, &values, err);
+        return add_cells(c, tile, node, chunk, page, &values, first, step, err);
     rc = reserve(c, chunk->count, err);
-    for (uint32_t i = 0; i < chunk->count && !rc; i++) {
+    for (uint64_t i = first; i < chunk->count && !rc; i += step) {
         struct spl_splat splat;
-        spl_chunk_decode(chunk, page, i, &splat);
-        rc = add(c, tile, root, &splat, &values, i, err);
+        spl_chunk_decode(chunk, page, (uint32_t)i, &splat);
+        rc = add(c, tile, node, &splat, &values, (uint32_t)i, err);
     }
     return rc;
 }
@@ -159,7 +164,7 @@ int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, 
     tile->begin = c->points.count;
     tile->first_vertex = c->wires.count;
     for (uint32_t i = 0; !rc && i < tables->nodes[0].chunk_count; i++)
-        rc = take_chunk(c, tile, dataset, tables, i, err);
+        rc = take_chunk(c, tile, dataset, tables, tables->nodes, i, 0, 1, err);
     tile->end = c->points.count;
     tile->end_vertex = c->wires.count;
     if (!rc)
@@ -167,5 +172,43 @@ int spl_collect_take_root(struct spl_collect *c, struct spl_collect_tile *tile, 
     if (!rc && tile->end == tile->begin)
         rc = spl_fail_field(err, SPL_E_INPUT, "inputs", "%.200s: its root has no splats; pack it again", tile->path);
     free(read);
+    return rc;
+}
+
+static int take_leaves(struct spl_collect *c, const struct spl_collect_tile *tile, const struct spl_dataset *dataset,
+                       const struct spl_tables *tables, uint64_t step, uint64_t *next, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (uint32_t n = 0; n < tables->node_count && !rc; n++) {
+        const struct spl_node *node = &tables->nodes[n];
+        for (uint32_t k = 0; !node->child_count && k < node->chunk_count && !rc; k++) {
+            const uint32_t index = (uint32_t)(node->first_chunk - tables->first_chunk) + k;
+            const struct spl_chunk *chunk = &tables->chunks[index];
+            const uint64_t count =
+                spl_kind_has_panels(spl_chunk_kind(chunk)) ? (uint64_t)chunk->count * cells : chunk->count;
+            if (spl_chunk_kind(chunk) == SPL_CHUNK_LINES) /* their points are splats, too */
+                continue;
+            if (*next < count)
+                rc = take_chunk(c, tile, dataset, tables, node, index, *next, step, err);
+            while (*next < count)
+                *next += step;
+            *next -= count;
+        }
+    }
+    return rc;
+}
+
+int spl_collect_take_leaves(struct spl_collect *c, const struct spl_collect_tile *tile,
+                            const struct spl_dataset *dataset, uint64_t step, uint64_t *next, struct spl_error *err)
+{
+    int rc = SPL_OK;
+    for (uint32_t p = 0; p < spl_dataset_get_info(dataset)->pages && !rc; p++) {
+        struct spl_tables *read = NULL;
+        struct spl_error why = {0};
+        const struct spl_tables *tables = spl_dataset_borrow_tables(dataset, p, &read, &why);
+        rc = tables ? take_leaves(c, tile, dataset, tables, step, next, err)
+                    : spl_fail_field(err, why.code, why.field, "%s", why.message);
+        free(read);
+    }
     return rc;
 }

@@ -17,7 +17,8 @@
 
 enum { raster = 96, azimuths = 24, elevations = 3, spread_most = 3 };
 static const double aspect = 16.0 / 9, margin = 1.06;
-static const double beyond = 0.002; /* of the sample may lie beyond the frame */
+static const double beyond = 0.002; /* of the sample may lie beyond the frame, */
+static const double narrow = 1.02, wider = 1.08; /* not what a frame so much wider holds, by a lesser margin */
 
 /* Right, up and forward of a picture taken from azimuth and elevation. */
 static void get_axes(double azimuth, double elevation, double axes[3][3])
@@ -134,8 +135,8 @@ static void find_eye(const struct spl_view_sample *s, double axes[3][3], const d
         eye[c] = axes[0][c] * local[0] + axes[1][c] * local[1] + axes[2][c] * local[2];
 }
 
-/* The angles that the sample takes up around `target` from `eye`, in the frame, but for what `share` of it may lie
- * beyond; with a margin, within [least, most] degrees. SPL_E_NOMEM. */
+/* The angles that the sample takes up around `target` from `eye`, in the frame, all of it where that is hardly more
+ * than without what `share` of it may lie beyond; with a margin, within [least, most] degrees. SPL_E_NOMEM. */
 static int fit_sample(const struct spl_view_sample *s, const double eye[3], const double target[3], const double up[3],
                       double share, double least, double most, double fit[2], struct spl_error *err)
 {
@@ -155,13 +156,18 @@ static int fit_sample(const struct spl_view_sample *s, const double eye[3], cons
         return rc ? rc : SPL_E_NOMEM;
     for (int c = 0; c < 2; c++) {
         size_t count = 0;
+        double all = 0;
         for (size_t i = 0; i < s->count; i++) {
             double arm[3] = {s->at[i][0] - eye[0], s->at[i][1] - eye[1], s->at[i][2] - eye[2]};
             double z = dot3(&camera.rotation[6], arm);
-            if (z > 0)
-                values[count++] = fabs(dot3(&camera.rotation[3 * c], arm)) / z;
+            if (z <= 0)
+                continue;
+            values[count] = fabs(dot3(&camera.rotation[3 * c], arm)) / z;
+            all = fmax(all, values[count++]);
         }
         double tangent = count ? margin * most_of(values, count, share) : 0;
+        if (narrow * all > tangent && narrow * all <= wider * tangent)
+            tangent = narrow * all;
         fit[c] = fmin(most, fmax(least, 2 * atan(tangent) * 180 / M_PI));
     }
     free(values);

@@ -51,15 +51,20 @@ static double walk(const double *sorted, size_t count, size_t from, int step, do
     return at;
 }
 
-static int find_box(struct spl_view_sample *s, const struct spl_points *p, size_t count, struct spl_error *err)
+static int find_box(struct spl_view_sample *s, size_t count, struct spl_error *err)
 {
-    double *sorted[3] = {0}, extent = 0, radius = 10 * (double)p->radius[p->count / 2];
+    double *sorted[3] = {0}, extent = 0, radius;
+    if (!(sorted[0] = spl_alloc_raw(count, sizeof **sorted, err)))
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < count; i++)
+        sorted[0][i] = (double)s->area[i];
+    radius = 10 * sqrt(spl_nth(sorted[0], count, count / 2));
     for (int a = 0; a < 3; a++) /* what doubles tell apart there */
         radius = fmax(radius, 1e-14 * fabs(s->at[count / 2][a]));
     size_t first = count / tail, last = count - 1 - count / tail;
     int rc = 0;
     for (int a = 0; !rc && a < 3; a++) {
-        if (!(sorted[a] = spl_alloc_raw(count, sizeof **sorted, err))) {
+        if (!sorted[a] && !(sorted[a] = spl_alloc_raw(count, sizeof **sorted, err))) {
             rc = SPL_E_NOMEM;
             break;
         }
@@ -123,7 +128,7 @@ int spl_view_sample_init(struct spl_view_sample *s, const struct spl_points *p, 
                 (float)(s->frame[a][0] * (double)p->normal[i][0] + s->frame[a][1] * (double)p->normal[i][1] +
                         s->frame[a][2] * (double)p->normal[i][2]);
     }
-    int rc = find_box(s, p, count, err);
+    int rc = find_box(s, count, err);
     if (!rc)
         keep(s, count);
     return rc;

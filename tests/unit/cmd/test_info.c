@@ -1,4 +1,5 @@
-/* splatd info of datasets with maps, of pruned ones and of primitives, as people and scripts meet it. */
+/* splatd info of datasets with maps, of pruned ones, of primitives and of collections that have lost a tile, as people
+ * and scripts meet it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -19,17 +20,24 @@
 
 static char folder[256];
 
-/* `splatd info ARGUMENTS` in the folder. */
-static const char *tell(const char *arguments)
+/* `splatd ARGUMENTS` in the folder, which exits with `code`. */
+static const char *splatd(const char *arguments, int code)
 {
     static char output[32768];
     char line[2048];
-    snprintf(line, sizeof line, "cd '%s' && '%s' info %s", folder, getenv("SPLATD_BINARY"), arguments);
+    snprintf(line, sizeof line, "cd '%s' && '%s' %s", folder, getenv("SPLATD_BINARY"), arguments);
     FILE *pipe = popen(line, "r");
     assert_non_null(pipe);
     output[fread(output, 1, sizeof output - 1, pipe)] = 0;
-    assert_int_equal(WEXITSTATUS(pclose(pipe)), 0);
+    assert_int_equal(WEXITSTATUS(pclose(pipe)), code);
     return output;
+}
+
+static const char *tell(const char *arguments)
+{
+    char line[1024];
+    snprintf(line, sizeof line, "info %s", arguments);
+    return splatd(line, 0);
 }
 
 static json_t *tell_json(const char *name)
@@ -164,6 +172,58 @@ static void test_primitives(void **state)
     json_decref(json);
 }
 
+static void make_tile(int tile)
+{
+    char line[100];
+    FILE *f = fopen(place("tile.xyz"), "w");
+    assert_non_null(f);
+    for (int i = 0; i < 2500; i++)
+        fprintf(f, "%.2f %.2f 0\n", 5 * tile + 0.1 * (i % 50), 0.1 * (i / 50));
+    assert_int_equal(fclose(f), 0);
+    snprintf(line, sizeof line, "pack tile.xyz -o tile-%d.spld 2>&1", tile);
+    splatd(line, 0);
+}
+
+/* What the collection says is said, and which tiles are lost, whether one is gone or another one now. */
+static void test_lost_tiles(void **state)
+{
+    (void)state;
+    static const char *const commands[] = {"info city.spld 2>pipe.txt", "info --no-verify city.spld 2>pipe.txt"};
+    for (int t = 0; t < 3; t++)
+        make_tile(t);
+    splatd("collect tile-0.spld tile-1.spld tile-2.spld -o city.spld 2>&1", 0);
+    json_t *json = tell_json("city.spld");
+    const json_t *lost = json_object_get(json, "faulty_tiles");
+    assert_true(number(lost, "count") == 0 && json_array_size(json_object_get(lost, "first")) == 0);
+    json_decref(json);
+    assert_null(strstr(tell("city.spld"), "lost tiles"));
+    unlink(place("tile-1.spld"));
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        const char *said = splatd(commands[i], 2);
+        assert_non_null(strstr(said, "\n  points        7,500 read"));
+        assert_non_null(strstr(said, "\n  lost tiles    1, "));
+        assert_non_null(strstr(said, "tile-1.spld cannot be read: there is no such file"));
+        assert_null(strstr(said, "tile-0.spld cannot"));
+        assert_non_null(strstr(said, "\n  default view"));
+    }
+    assert_non_null(strstr(splatd("info city.spld 2>&1 >table.txt", 2),
+                           "\nsplatd: city.spld: 1 of its 3 tiles cannot be used\n"));
+    make_tile(3);
+    char from[600];
+    snprintf(from, sizeof from, "%s", place("tile-3.spld"));
+    assert_int_equal(rename(from, place("tile-1.spld")), 0);
+    json = json_loads(splatd("info --json city.spld 2>pipe.txt", 2), 0, NULL);
+    lost = json_object_get(json, "faulty_tiles");
+    const json_t *first = json_array_get(json_object_get(lost, "first"), 0);
+    assert_true(number(lost, "count") == 1 && number(json, "points") == 7500);
+    assert_string_equal(json_string_value(json_object_get(first, "file")), "tile-1.spld");
+    assert_non_null(strstr(json_string_value(json_object_get(first, "reason")), "is another one now"));
+    json_decref(json);
+    json = tell_json("plain.spld");
+    assert_true(json_is_null(json_object_get(json, "faulty_tiles")));
+    json_decref(json);
+}
+
 static int begin(void **state)
 {
     enum { side = 20 };
@@ -192,6 +252,7 @@ int main(void)
         cmocka_unit_test(test_maps),
         cmocka_unit_test(test_pruned),
         cmocka_unit_test(test_primitives),
+        cmocka_unit_test(test_lost_tiles),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }

@@ -419,6 +419,7 @@ static void test_what_is_no_city_is_refused(void **state)
         {{.keep = "scan"}, false, "attribute \"scan\" is there, but not in a.spld"},
         {{0}, true, "attribute \"intensity\" (steps from"},
     };
+    struct spl_error missing = {0};
     collect_all("city.spld");
     assert_int_equal(link(in_folder(tile_name(1)), in_folder("a.spld")), 0);
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
@@ -448,7 +449,11 @@ static void test_what_is_no_city_is_refused(void **state)
     assert_int_equal(symlink("a.spld", in_folder("b.spld?c")), 0); // no name beside a URL
     refuse(SPL_E_USAGE, "a.spld", "b.spld?c", "a tile's name is letters");
     unlink(in_folder("b.spld?c"));
-    refuse(SPL_E_NOT_FOUND, "a.spld", "nosuch.spld", "nosuch.spld");
+    refuse(SPL_E_NOT_FOUND, "a.spld", "nosuch.spld", "nosuch.spld: there is no such file");
+    assert_int_equal(spl_collect(&SPL_SIZED(spl_collect_options, .inputs = (const char *const[]){"/tmp/nosuch"},
+                                            .input_count = 1, .output = in_folder("refused.spld")), &missing),
+                     SPL_E_NOT_FOUND);
+    assert_string_equal(missing.message, "/tmp/nosuch: there is no such file or folder");
     assert_int_equal(mkdir(in_folder("elsewhere"), 0777), 0);
     refuse(SPL_E_NOT_FOUND, "elsewhere", NULL, "no NAME.spld lies in this folder");
     assert_int_equal(link(in_folder("a.spld"), in_folder("elsewhere/a.spld")), 0);

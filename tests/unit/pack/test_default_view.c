@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include <splatd/collect.h>
 #include <splatd/pack.h>
 
 #include "clouds.h"
@@ -163,6 +164,82 @@ static void all_of_it_is_in_images_of_any_shape(void **state)
     spl_dataset_close(alone);
     spl_dataset_close(with);
     free(cloud.at);
+}
+
+/* Few points that stand over the edge are in the image, too, where the others hardly become smaller for them. */
+static void what_stands_over_is_in_it(void **state)
+{
+    (void)state;
+    static const double z[3] = {0, 0, 1};
+    struct cloud cloud = {0};
+    double fill, before;
+    add_sheet(&cloud, (double[]){0, 0, 0}, (double[]){60, 0, 0}, (double[]){0, 20, 0}, 0.5, z);
+    const size_t sheet = cloud.count;
+    for (int k = 1; k <= 6; k++) {
+        add(&cloud, -0.5 * k, 10, 0, 0, 0, 0);
+        add(&cloud, 60 + 0.5 * k, 10, 0, 0, 0, 0);
+    }
+    struct spl_dataset *dataset = open_packed(&cloud, false, "m");
+    assert_true(share_in_view(dataset, &cloud, cloud.count, 1280, 720, &fill) >= 1);
+    assert_true(fill > 0.9);
+    share_in_view(dataset, &cloud, sheet, 1280, 720, &before);
+    spl_dataset_close(dataset);
+    for (int k = 0; k < 7; k++) /* a hair of it far out, for which nothing is made small */
+        add(&cloud, 65 + 2 * k, 10, 0, 0, 0, 0);
+    dataset = open_packed(&cloud, false, "m");
+    assert_true(share_in_view(dataset, &cloud, sheet, 1280, 720, &fill) >= 1);
+    if (fill < 0.95 * before)
+        fail_msg("%g of the image after %g", fill, before);
+    spl_dataset_close(dataset);
+    free(cloud.at);
+}
+
+/* A dense street before few points of the bushes behind it, which a tile's root has nearly all of: packed in two tiles
+ * that are collected, it is framed as packed whole. */
+static void a_collection_is_seen_as_a_pack_is(void **state)
+{
+    (void)state;
+    static const double z[3] = {0, 0, 1};
+    char tile[2][80], city[80];
+    struct spl_error err = {0};
+    struct cloud whole = {0};
+    uint64_t random = 7;
+    for (int t = 0; t < 2; t++) {
+        struct cloud half = {0};
+        add_sheet(&half, (double[]){30 * t, 0, 0}, (double[]){29.95, 0, 0}, (double[]){0, 8, 0}, 0.1, z);
+        for (int k = 0; k < 240; k++)
+            add(&half, 30 * (t + uniform(&random)), 8 + 62 * uniform(&random), 0.5 * uniform(&random), 0, 0, 0);
+        for (size_t i = 0; i < half.count; i++)
+            add(&whole, (double)half.at[i][0], (double)half.at[i][1], (double)half.at[i][2], 0, 0, 0);
+        if (pack_with(&half, false, &(struct spl_pack_options){.unit = "m"}, &err))
+            fail_msg("%s", err.message);
+        snprintf(tile[t], sizeof tile[t], "%s/tile-%d.spld", folder, t);
+        assert_int_equal(rename(packed, tile[t]), 0);
+        free(half.at);
+    }
+    snprintf(city, sizeof city, "%s/city.spld", folder);
+    const char *const inputs[] = {tile[0], tile[1]};
+    if (spl_collect(&SPL_SIZED(spl_collect_options, .inputs = inputs, .input_count = 2, .output = city), &err))
+        fail_msg("%s", err.message);
+    struct spl_dataset *pack = open_packed(&whole, false, "m"), *collection = NULL;
+    if (spl_dataset_open(city, true, &collection, &err))
+        fail_msg("%s", err.message);
+    const struct spl_dataset_info *a = spl_dataset_get_info(pack), *b = spl_dataset_get_info(collection);
+    double away = 0, eyes = 0, targets = 0;
+    for (int c = 0; c < 3; c++) {
+        away += pow(a->default_eye[c] - a->default_target[c], 2);
+        eyes += pow(a->default_eye[c] - b->default_eye[c], 2);
+        targets += pow(a->default_target[c] - b->default_target[c], 2);
+    }
+    if (!(sqrt(eyes) < 0.03 * sqrt(away) && sqrt(targets) < 0.03 * sqrt(away)))
+        fail_msg("of a distance of %g the eye is %g away, and the target %g", sqrt(away), sqrt(eyes), sqrt(targets));
+    assert_true(fabs(a->default_fov - b->default_fov) < 1);
+    spl_dataset_close(pack);
+    spl_dataset_close(collection);
+    for (int t = 0; t < 2; t++)
+        unlink(tile[t]);
+    unlink(city);
+    free(whole.at);
 }
 
 /* A facade whose front is known, turned to every side. */
@@ -340,6 +417,8 @@ int main(void)
         cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
+        cmocka_unit_test(what_stands_over_is_in_it),
+        cmocka_unit_test(a_collection_is_seen_as_a_pack_is),
         cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
         cmocka_unit_test(as_wide_as_coordinates_go),
         cmocka_unit_test(a_quantile_is_that_of_sorted_values),
