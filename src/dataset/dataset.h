@@ -103,6 +103,10 @@ struct spl_faulty_tile {
 };
 uint32_t spl_dataset_list_faulty(const struct spl_dataset *dataset, struct spl_faulty_tile *out, size_t capacity);
 
+/* Looks whether the files of a collection's tiles are there, without opening them, and notes which are not, or are
+ * again. What is on a server is not asked for. Any thread; blocks on disk. */
+void spl_dataset_look_for_tiles(const struct spl_dataset *dataset);
+
 /* For who reads on a thread of its own and may be left behind in a read that does not end: from hold() to let_go() the
  * dataset stays as it is, though it be closed; the last one closes it then. hold() only while it is open. Any thread;
  * let_go() closes the source, which may block. */

@@ -77,6 +77,7 @@ int spl_tiles_read_tables(const struct spl_dataset *dataset, uint32_t page, void
  * by its number in the collection. */
 #define SPL_TILE_OPENED UINT64_MAX
 #define SPL_TILE_WORDS (UINT64_MAX - 1)
+#define SPL_TILE_THERE (UINT64_MAX - 2) /* its file, as spl_dataset_look_for_tiles() finds it */
 static inline uint64_t spl_tile_page(uint32_t page, bool tables)
 {
     return 2 * (uint64_t)page + tables;

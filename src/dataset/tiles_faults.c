@@ -4,13 +4,16 @@
  *
  * Invariant: a tile has a fault from what was found wrong on until the same is found right, however long it rests: who
  * tries it again in between learns it anew. */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/clock.h"
 #include "base/log.h"
 #include "dataset/remote_counts.h"
+#include "dataset/remote_url.h"
 #include "dataset/open.h"
 #include "dataset/tiles.h"
 
@@ -59,7 +62,8 @@ void spl_tiles_note(const struct spl_dataset *dataset, struct spl_tile *tile, ui
     pthread_mutex_lock(&tiles->mutex);
     if (rc)
         news = begin_fault(tiles, tile, what, why->message);
-    else if ((news = tile->fault && tile->faulty == what))
+    else if ((news = tile->fault && (tile->faulty == what ||
+                                     (tile->faulty == SPL_TILE_THERE && what == SPL_TILE_OPENED))))
         end_fault(tiles, tile);
     pthread_mutex_unlock(&tiles->mutex);
     if (!news)
@@ -107,4 +111,23 @@ uint32_t spl_dataset_list_faulty(const struct spl_dataset *dataset, struct spl_f
     }
     pthread_mutex_unlock(&tiles->mutex);
     return count;
+}
+
+void spl_dataset_look_for_tiles(const struct spl_dataset *dataset)
+{
+    const struct spl_tiles *tiles = dataset->tiles;
+    for (uint32_t i = 0; tiles && tiles->beside && !dataset->remote && i < tiles->count; i++) {
+        struct spl_tile *tile = &tiles->list[i];
+        char *path = spl_remote_make_beside(tiles->beside, tile->file);
+        struct spl_error why = {0}, told = {0};
+        struct stat status;
+        int rc = SPL_OK;
+        if (path && stat(path, &status) && errno == ENOENT) {
+            spl_fail(&why, SPL_E_NOT_FOUND, "%s: there is no such file", path);
+            rc = spl_tiles_fail(dataset, tile, &why, &told);
+        }
+        if (path)
+            spl_tiles_note(dataset, tile, SPL_TILE_THERE, rc, &told);
+        free(path);
+    }
 }

@@ -108,7 +108,7 @@ def test_a_missing_tile_is_seen_from_afar():
             for away in others:
                 good = d.ask(away)
                 assert good.headers["Splatd-Complete"] == "true" and good.body == whole[away].body, away
-            assert faults(d) == {}  # nobody looked
+            assert list(faults(d)) == ["tile-1.spld"] and "there is no such file" in faults(d)["tile-1.spld"]  # found at opening
             for more in "", "&wait=0", "&lod=0", "&layer=depth&format=npy":
                 bad = d.ask((near.replace("&format=png", "") if "format" in more else near) + more)
                 assert bad.status == 200 and [bad.headers[f"Splatd-{h}"] for h in ("Complete", "Pending")] == ["false"] * 2, bad.headers
@@ -122,6 +122,23 @@ def test_a_missing_tile_is_seen_from_afar():
             eventually(lambda: d.ask(near).headers["Splatd-Complete"] == "true", 60)
             assert d.ask(near).body == whole[near].body and faults(d) == {}
             assert any("tile-1.spld can be read again" in line for line in d.lines)
+
+
+def test_files_of_tiles_are_looked_for():
+    """At opening and with each look at the folder, so that no view has to meet one that is gone."""
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        make(folder, whole=False)
+        with Daemon(REAL, datasets=[folder / "city"]) as d:
+            assert faults(d) == {}
+            (folder / "city/tile-2.spld").rename(folder / "aside")
+            count = lambda: d.ask("/v1/datasets/city").json()["faulty_tiles"]["count"]
+            eventually(lambda: count() == 1, 20)
+            assert list(faults(d)) == ["tile-2.spld"]
+            assert "tile-2.spld cannot be read: there is no such file" in faults(d)["tile-2.spld"] and top not in faults(d)["tile-2.spld"]
+            (folder / "aside").rename(folder / "city/tile-2.spld")
+            eventually(lambda: count() == 0, 20)
+            assert d.status()["counters"]["tile_faults"] == 1
 
 
 def test_more_missing_tiles_than_may_be_read():

@@ -35,6 +35,7 @@ int spl_catalog_entry_open(const char *path, const char *place, const struct spl
     if ((rc = spl_dataset_open_as(path, how, &entry->dataset, err)))
         goto done;
     const struct spl_dataset_info *info = entry->info = spl_dataset_get_info(entry->dataset);
+    spl_dataset_look_for_tiles(entry->dataset);
     if ((rc = spl_dataset_get_default_camera(entry->dataset, 1280, 720, &camera, err)))
         goto done;
     entry->defaults.dataset = info;

@@ -25,6 +25,8 @@ struct look {
     uv_work_t work;
     struct spl_service *service;
     uint64_t changes; /* of clients, when it began */
+    struct spl_catalog_entry **collections; /* whose tiles are looked for, with a reference each */
+    size_t collection_count;
     struct spl_catalog_files files;
     struct spl_error err;
 };
@@ -307,6 +309,25 @@ static void run_look(uv_work_t *work)
     struct look *look = work->data;
     const struct spl_service_options *options = look->service->options;
     spl_catalog_list(options->datasets.items, options->datasets.count, &look->files, &look->err);
+    for (size_t i = 0; i < look->collection_count; i++)
+        spl_dataset_look_for_tiles(look->collections[i]->dataset);
+}
+
+/* None where there is no memory: the next look has them. */
+static void take_collections(struct look *look, const struct spl_catalog *catalog)
+{
+    look->collections = spl_alloc(catalog->count ? catalog->count : 1, sizeof(struct spl_catalog_entry *), NULL);
+    for (size_t i = 0; look->collections && i < catalog->count; i++)
+        if (catalog->slots[i].current && catalog->slots[i].current->info->tiles)
+            look->collections[look->collection_count++] = spl_catalog_entry_ref(catalog->slots[i].current);
+}
+
+static void free_look(struct look *look)
+{
+    for (size_t i = 0; i < look->collection_count; i++)
+        spl_catalog_entry_unref(look->collections[i]);
+    free(look->collections);
+    free(look);
 }
 
 static void after_look(uv_work_t *work, int status)
@@ -330,7 +351,7 @@ static void after_look(uv_work_t *work, int status)
         spl_catalog_say_left_out(&service->library->catalog, left_out, &look->files);
     }
     spl_catalog_files_finish(&look->files);
-    free(look);
+    free_look(look);
 }
 
 static void on_timer(uv_timer_t *timer)
@@ -342,8 +363,9 @@ static void on_timer(uv_timer_t *timer)
     look->work.data = look;
     look->service = service;
     look->changes = service->library->changes_made;
+    take_collections(look, &service->library->catalog);
     if (uv_queue_work(&service->loop, &look->work, run_look, after_look)) {
-        free(look);
+        free_look(look);
         return;
     }
     service->library->looking = true;

@@ -386,6 +386,36 @@ static void test_faults_of_tiles(void **state)
     spl_dataset_close(city);
 }
 
+/* A look at the files alone notes one that is gone, whoever met it first, and that it is there again. */
+static void test_files_that_are_gone(void **state)
+{
+    (void)state;
+    struct spl_dataset *city = open_city("city.spld");
+    const uint32_t page = city->tiles->list[2].first_page;
+    spl_dataset_look_for_tiles(city);
+    assert_false(is_faulty(city, ""));
+    for (int met = 0; met < 2; met++) {
+        unlink(path_of("tile-2.spld"));
+        if (met)
+            assert_int_equal(read_tables(city, page), SPL_E_CORRUPT);
+        spl_dataset_look_for_tiles(city);
+        assert_true(is_faulty(city, "its tile tile-2.spld cannot be read: there is no such file"));
+        make_tile(2, 2);
+        spl_dataset_look_for_tiles(city);
+        assert_false(is_faulty(city, ""));
+    }
+    unlink(path_of("tile-2.spld"));
+    spl_dataset_look_for_tiles(city);
+    make_tile(2, 2);
+    assert_int_equal(read_tables(city, page), SPL_OK); /* who opens it need not wait for a look */
+    assert_false(is_faulty(city, ""));
+    const struct spl_error why = {.code = SPL_E_CORRUPT, .message = "node 5 lies elsewhere"};
+    spl_dataset_spoil_tile(city, page, &why);
+    spl_dataset_look_for_tiles(city); /* that it is there does not make it good */
+    assert_true(is_faulty(city, "node 5 lies elsewhere"));
+    spl_dataset_close(city);
+}
+
 static void test_only_beside_a_file(void **state)
 {
     (void)state;
@@ -638,6 +668,7 @@ int main(void)
         cmocka_unit_test(test_a_tile_that_is_another),
         cmocka_unit_test(test_a_tile_that_is_damaged),
         cmocka_unit_test(test_faults_of_tiles),
+        cmocka_unit_test(test_files_that_are_gone),
         cmocka_unit_test(test_only_beside_a_file),
         cmocka_unit_test(test_what_a_file_is),
         cmocka_unit_test(test_forged),
