@@ -111,11 +111,11 @@ def test_a_plan_chooses_nothing_that_is_too_large():
     with Daemon(FAKE, "--max-samples", "40000") as d:
         for demand in ({"psnr": 60}, {"budget": "60s"}):
             sides = {}
-            for side in (100, 150):  # 2 x 2 fits the smaller one
+            for side in (100, 150):  # 2 x 2 fits the smaller one, 1.25 x 1.25 the larger
                 reply = d.view(width=side, height=side, **demand)
                 assert reply.status == 200, reply.body
                 sides[side] = re.search("supersample=([0-9.]+)", reply.headers["Splatd-Chosen"]).group(1)
-            assert sides == {100: "2", 150: "1"}, (demand, sides)
+            assert sides == {100: "2", 150: "1.25"}, (demand, sides)
 
 
 def test_too_many_large_views_are_refused_and_small_ones_are_not():
