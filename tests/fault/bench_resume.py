@@ -112,7 +112,7 @@ def test_profile(folder, dataset):
     profile = json.loads((folder / "small.profile.json").read_text())
     assert profile["format"] == "splatd-profile" and profile["views"] == 2
     methods = [p["method"] for p in profile["points"]]
-    assert {m: methods.count(m) for m in all_methods()} == dict.fromkeys(methods, 2 * 4), "two levels, four sizes"
+    assert {m: methods.count(m) for m in all_methods()} == dict.fromkeys(methods, 2 * 5), "two levels, five sizes"
     splatd("bench", dataset, "--size", "96x54", "--frames", "2", "--repeats", "1", "--lod", "1,2", "-o",
            folder / "o", "--profile", folder / "elsewhere.json")
     assert (folder / "elsewhere.json").read_text() == (folder / "small.profile.json").read_text()
@@ -210,7 +210,7 @@ def test_refusals(folder, dataset):
     assert "twice" in splatd("bench", dataset, "--lod", "1,1", "-o", out, code=2).stderr
     assert "-o OUT" in splatd("bench", dataset, "--supersample", "2", code=2).stderr
     assert "one dataset" in splatd("bench", dataset, dataset, "-o", out, code=2).stderr
-    assert "1, 2 or 4, not '3'" in splatd("bench", dataset, "--supersample", "3", "-o", out, code=2).stderr
+    assert "1.5, 2 and 4, not '3'" in splatd("bench", dataset, "--supersample", "3", "-o", out, code=2).stderr
     assert not out.exists()
 
 
