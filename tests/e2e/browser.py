@@ -167,7 +167,8 @@ class Page:
                     return value
             except AssertionError:
                 value = None
-            assert time.monotonic() < end, f"never became true: {what or script}; complaints: {self.complaints}"
+            assert time.monotonic() < end, (f"never became true: {what or script}; complaints: {self.complaints}; the page "
+                                            f"says {self.run('document.body.innerText.slice(0, 500)')!r}")
             time.sleep(0.05)
 
     def text(self, selector):
