@@ -34,8 +34,7 @@ struct spl_frame_steps {
     const struct spl_dataset *dataset;
     struct spl_view wanted, view; /* as asked for; as rendered, with at least one sample a pixel */
     struct spl_frame frame;       /* of `view` */
-    struct spl_frame
-        resampled;             /* of `wanted`, where its pixels are no whole number of samples, or looked up in faces */
+    struct spl_frame resampled; /* of `wanted`, where samples a side are no whole number, or it is looked up in faces */
     struct spl_around *around; // may be NULL: `view` is not one of several faces
     struct spl_frame_job job;
     uint32_t x, y;             /* corner of the tile; y = height: all are there */

@@ -128,7 +128,7 @@ static void print_datasets(FILE *out, const struct spl_catalog *catalog)
                     (unsigned long long)spl_catalog_entry_get_resident_bytes(slot->current));
     }
     fprintf(out, "# HELP splatd_dataset_faulty_tiles Tiles of a collection that are missing, other ones or damaged, as "
-                 "far as views have met them; /v1/datasets says which.\n"
+                 "far as files are gone or views have met them; /v1/datasets says which.\n"
                  "# TYPE splatd_dataset_faulty_tiles gauge\n");
     for (size_t i = 0; i < catalog->count; i++) {
         const struct spl_catalog_slot *slot = &catalog->slots[i];
