@@ -19,9 +19,11 @@ export class Picture {
   open(dataset, wanted) {
     this.dataset = dataset;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
-    choices($("method"), dataset.methods, offered(wanted.method, dataset));
+    const said = wanted.method !== undefined || wanted.supersample !== undefined;
+    const usual = said ? {supersample: 1} : dataset.picture; // what the service would draw
+    choices($("method"), dataset.methods, offered(wanted.method ?? usual.method, dataset));
     $("lod").value = wanted.lod ?? 1;
-    choose($("supersample"), wanted.supersample ?? 1);
+    choose($("supersample"), wanted.supersample ?? usual.supersample);
     for (const parameter of listed()) this.parameters.set(parameter, wanted[parameter.name]);
     choose($("budget"), wanted.budget ?? "");
   }

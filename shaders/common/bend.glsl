@@ -3,6 +3,8 @@
 #ifndef SPL_BEND_GLSL
 #define SPL_BEND_GLSL
 
+#include "common/frame.glsl"
+
 #define BEND_ZERO ((127 - 16) << 4) /* the upper bits of the float that code 0 would be */
 #define BEND_SHIFT 19               /* 23 - 4 */
 
@@ -17,6 +19,30 @@ float unbent(float bent, uint code)
     float share = code == 0u ? 0.0 : uintBitsToFloat((code + uint(BEND_ZERO)) << BEND_SHIFT);
     precise float z = bent - bent * share;
     return z;
+}
+
+/* Beside a colour that no map is added to: how far off its disc's centre a sample lies, squared, in 6 bits, and in 2
+ * how large its disc is on the image, the short way: 0 below SPL_SMOOTH_RADIUS samples, 1 to 3 from it, twice and four
+ * times as much on. */
+uint disc_word(float radius)
+{
+    float size = radius * (1.0 / SPL_SMOOTH_RADIUS);
+    return size < 1.0 ? 0u : size < 2.0 ? 1u << 30 : size < 4.0 ? 2u << 30 : 3u << 30;
+}
+
+uint disc_size(uint word)
+{
+    return word >> 30;
+}
+
+uint disc_off_bits(float distance)
+{
+    return uint(distance * 63.0) << 24;
+}
+
+float disc_off(uint word)
+{
+    return float(word >> 24 & 63u) * (1.0 / 63.0);
 }
 
 #endif

@@ -26,6 +26,7 @@ struct disc {
     float reach;
     vec2 ray, pitch;   /* the centre's ray, one over the focal lengths; both times scale */
     float scale;
+    float short_radius; /* samples, seen at its slant */
 };
 
 /* Extent of the disc along one image axis: the tangents s of (p - s q)^2 = r^2 (1 + s^2 - (n_p - s n_q)^2), where p is
@@ -92,6 +93,8 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     d.ray = PARALLEL != 0u ? vec2(0.0) : scaled_ray;
     d.pitch = pitch;
     d.scale = scale;
+    precise float short_radius = frame.fx * min(abs(facing), 1.0) / scale;
+    d.short_radius = short_radius;
     d.margin = margin;
     d.behind = facing > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? s.radius : 0.0;
     return d;

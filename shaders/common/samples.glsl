@@ -2,6 +2,7 @@
 #ifndef SPL_SAMPLES_GLSL
 #define SPL_SAMPLES_GLSL
 
+#include "common/bend.glsl"
 #include "common/depths.glsl"
 
 SPL_TEXEL_BUFFER(SPL_TEXELS_IDS) id_texels;
@@ -44,25 +45,50 @@ uint sample_beside(ivec2 at, int i)
     return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
 }
 
-/* The colour around `at`, which holds something: over the 3 x 3 samples that lie on its surface, 4 : 1 : 1/2. With
- * `weighted` times what their payloads say of how near to its disc's centre each lies, as discs that blend weigh. */
-vec3 smooth_color(ivec2 at, uint own, bool weighted)
+/* The sample at `at`; outside of the tile `otherwise`. */
+uint sample_at(ivec2 at, uint otherwise)
+{
+    return uint(at.x) < frame.width && uint(at.y) < frame.height ? sample_index(at) : otherwise;
+}
+
+/* The mean colour over the samples around `at` on its surface, 2 `reach` + 1 a side, `apart` apart. `reach` is a
+ * constant where it is called: software drivers lose sums of lanes that leave a loop before others. */
+vec3 smooth_over(ivec2 at, uint own, int reach, int apart, bool weighted)
 {
     float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
+    ivec2 to = ivec2(-reach);
     vec3 sum = vec3(0.0);
-    for (int i = 0;;) {
-        uint beside = sample_beside(at, i);
+    for (;;) {
+        uint beside = sample_at(at + apart * to, own);
         float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
-        float weight = i == 4 ? 4.0 : i % 2 == 1 ? 1.0 : 0.5;
+        ivec2 away = abs(to);
+        int steps = away.x + away.y;
+        float near = steps == 0 ? 4.0 : steps == 1 ? 1.0 : 0.5, pyramid = float((3 - away.x) * (3 - away.y));
+        float weight = reach == 1 ? near : pyramid;
         weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
         uint word = payload(beside);
-        weight *= weighted ? 1.0 - float(word >> 24) * (1.0 / 255.0) : 1.0;
+        weight *= weighted ? 1.0 - disc_off(word) : 1.0;
         sum += weight * vec3(unpack_color(word));
         weights += weight;
-        if (++i >= 9)
+        to.x++;
+        bool wrap = to.x > reach;
+        to = ivec2(wrap ? -reach : to.x, to.y + int(wrap));
+        if (to.y > reach)
             break;
     }
     return sum / weights;
+}
+
+/* The colour around `at`, which holds something; if `weighted`, times what payloads say of how near to its disc's
+ * centre each sample lies, as discs that blend weigh. Of small discs over 3 x 3 samples, 4 : 1 : 1/2. Of large ones
+ * (common/bend.glsl) a pyramid of 5 x 5, as many samples apart as makes them reach a third to two thirds of a radius,
+ * up to SPL_SMOOTH_REACH. */
+vec3 smooth_color(ivec2 at, uint own, bool weighted)
+{
+    int size = weighted ? int(disc_size(payload(own))) : 0;
+    if (size == 0)
+        return smooth_over(at, own, 1, 1, weighted);
+    return smooth_over(at, own, 2, 1 << (size - 1), weighted);
 }
 
 #endif

@@ -6,6 +6,7 @@
 
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "render/view.h"
@@ -21,7 +22,7 @@ struct stretch {
 struct spl_spread {
     pthread_mutex_t mutex;
     unsigned renderers;
-    struct spl_view view;
+    struct spl_view view;   /* as it is drawn: resampling is of who drew the last piece */
     struct spl_frame frame;
     uint32_t tile_width, tile_height; /* 0 = the first take() lays them out, and pieces */
     uint32_t columns;                 /* of tiles */
@@ -37,7 +38,7 @@ struct spl_spread {
 
 bool spl_spread_can(const struct spl_view *view)
 {
-    return !spl_view_is_resampled(view) && !view->rays && !spl_camera_is_bent(&view->camera);
+    return !view->rays && !spl_camera_is_bent(&view->camera);
 }
 
 int spl_spread_create(const struct spl_view *view, unsigned renderers, struct spl_spread **out, struct spl_error *err)
@@ -48,8 +49,9 @@ int spl_spread_create(const struct spl_view *view, unsigned renderers, struct sp
         return SPL_E_NOMEM;
     spread->renderers = renderers;
     spread->view = *view;
+    spl_view_resize(&spread->view);
     spread->frame.stats.complete = true;
-    spread->pixels_left = (uint64_t)view->camera.width * view->camera.height;
+    spread->pixels_left = (uint64_t)spread->view.camera.width * spread->view.camera.height;
     for (unsigned i = 0; i < renderers; i++)
         spread->held[i] = none;
     pthread_mutex_init(&spread->mutex, NULL);
@@ -262,6 +264,14 @@ void spl_spread_hand_out(struct spl_spread *spread, struct spl_frame *frame)
             spread->frame.stats.total_ms = spread->total_ms[i];
     *frame = spread->frame;
     spread->frame = (struct spl_frame){0};
+    pthread_mutex_unlock(&spread->mutex);
+}
+
+void spl_spread_hand_out_images(struct spl_spread *spread, struct spl_image images[SPL_LAYER_COUNT])
+{
+    pthread_mutex_lock(&spread->mutex);
+    memcpy(images, spread->frame.images, sizeof spread->frame.images);
+    memset(spread->frame.images, 0, sizeof spread->frame.images);
     pthread_mutex_unlock(&spread->mutex);
 }
 

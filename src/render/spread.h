@@ -26,7 +26,7 @@ struct spl_frame_whole {
 
 struct spl_spread;
 
-/* Can pieces of the view be drawn apart? Those of one pinhole or plan can, of a sample a pixel or more. */
+/* Can pieces of the view be drawn apart? Those of one pinhole or plan can. */
 bool spl_spread_can(const struct spl_view *view);
 
 /* For as many renderers, 1 to SPL_SPREAD_MAX. Destroyed once no steps of it are left; NULL-safe. */
@@ -69,8 +69,9 @@ int spl_spread_get_images(struct spl_spread *spread,
                           int (*make)(struct spl_frame *frame, const struct spl_view *view, struct spl_error *err),
                           struct spl_image images[SPL_LAYER_COUNT], struct spl_error *err);
 
-/* The frame; once, after the last piece. */
+/* The frame; once, after the last piece. Or its images first, once, and the rest then. */
 void spl_spread_hand_out(struct spl_spread *spread, struct spl_frame *frame);
+void spl_spread_hand_out_images(struct spl_spread *spread, struct spl_image images[SPL_LAYER_COUNT]);
 
 /* Samples that nobody has taken, a renderer's share of them; 0 = none at all. */
 uint64_t spl_spread_get_left(struct spl_spread *spread);

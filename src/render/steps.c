@@ -56,20 +56,16 @@ static bool is_resampled(const struct spl_frame_steps *steps)
     return spl_view_is_resampled(&steps->wanted) || steps->around;
 }
 
+static uint64_t count_resampled_left(const struct spl_frame_steps *steps)
+{
+    const struct spl_camera *wanted = &steps->wanted.camera;
+    return is_resampled(steps) ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+}
+
 /* The frame that is handed out at the end. */
 static struct spl_frame *get_made(struct spl_frame_steps *steps)
 {
     return is_resampled(steps) ? &steps->resampled : &steps->frame;
-}
-
-/* Another size, to be resampled. */
-static void resize(struct spl_view *view)
-{
-    double scale = view->supersample;
-    view->supersample = 1;
-    view->shade.radius = (uint32_t)fmax(rint(view->shade.radius * scale), 1);
-    view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
-    spl_camera_coarsen(&view->camera, scale);
 }
 
 static int find_resident(struct spl_frame_steps *steps, struct spl_error *err)
@@ -130,8 +126,7 @@ static int begin(struct spl_renderer *renderer, const struct spl_dataset *datase
     steps->wanted = *view;
     steps->wanted.method = spl_method_for(view->method, info);
     steps->view = steps->wanted;
-    if (spl_view_is_resampled(view))
-        resize(&steps->view);
+    spl_view_resize(&steps->view);
     if (spl_camera_is_bent(&view->camera))
         rc = spl_around_create(&steps->view, &steps->around, err);
     double advance = spl_camera_advance(&steps->view.camera, info);
@@ -285,6 +280,11 @@ static int make_piece(struct spl_frame_steps *steps, struct spl_error *err)
     spl_pieces_remove(&steps->pieces);
     if (!steps->pieces.count)
         steps->drew_last = spl_spread_done(steps->spread, steps->number, &steps->frame.stats);
+    if (steps->drew_last && is_resampled(steps)) { // by these alone
+        spl_spread_hand_out_images(steps->spread, steps->frame.images);
+        steps->borrowed = 0;
+        steps->y = steps->view.camera.height;
+    }
     return SPL_OK;
 }
 
@@ -394,13 +394,14 @@ uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps)
 {
     const uint64_t of_pixel = (uint64_t)(steps->view.supersample * steps->view.supersample);
     if (steps->spread)
-        return spl_spread_get_left(steps->spread) + (steps->pieces.count ? steps->pieces.pixels * of_pixel : 0);
-    const struct spl_camera *camera = &steps->view.camera, *wanted = &steps->wanted.camera;
+        return spl_spread_get_left(steps->spread) + (steps->pieces.count ? steps->pieces.pixels * of_pixel : 0) +
+               (steps->drew_last ? count_resampled_left(steps) : 0);
+    const struct spl_camera *camera = &steps->view.camera;
     uint64_t side = (uint64_t)steps->view.supersample, rows = camera->height - steps->y;
     uint64_t drawn = rows < steps->job.tiling.height ? rows : steps->job.tiling.height; /* of those, left of x */
     const struct spl_piece tile = spl_tiling_get_tile(&steps->job.tiling, camera, steps->x, steps->y);
     uint64_t pieces = steps->pieces.count ? (uint64_t)tile.width * tile.height - steps->pieces.pixels : 0; /* drawn */
-    uint64_t resampled = is_resampled(steps) ? (uint64_t)wanted->width * (wanted->height - steps->row) : 0;
+    uint64_t resampled = count_resampled_left(steps);
     resampled += steps->around ? spl_around_get_samples_left(steps->around) : 0;
     return (camera->width * rows - steps->x * drawn - pieces) * side * side + resampled;
 }
@@ -412,11 +413,15 @@ void spl_frame_end(struct spl_frame_steps *steps, struct spl_frame *frame)
     if (!steps)
         return;
     struct spl_frame *made = get_made(steps);
-    spl_frame_give_images_back(made, steps->borrowed);
+    spl_frame_give_images_back(steps->spread ? &steps->frame : made, steps->borrowed);
     if (steps->spread) {
         spl_spread_leave(steps->spread, steps->number, steps->frame.stats.total_ms);
         if (frame && steps->drew_last)
             spl_spread_hand_out(steps->spread, frame);
+        if (frame && steps->drew_last && is_resampled(steps)) {
+            memcpy(frame->images, made->images, sizeof made->images);
+            memset(made->images, 0, sizeof made->images);
+        }
     } else if (frame && !spl_frame_get_samples_left(steps)) {
         steps->resampled.stats = steps->frame.stats;
         *frame = *made;

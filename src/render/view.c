@@ -35,6 +35,16 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         memcpy((char *)view + sizeof size, (const char *)&known + sizeof size, bytes - sizeof size);
 }
 
+bool spl_view_choose(struct spl_view *view, const struct spl_dataset_info *info)
+{
+    if (view->layers != 1u << SPL_LAYER_COLOR || spl_camera_is_bent(&view->camera) || !info->has_surface ||
+        info->atoms || info->maps)
+        return false;
+    view->method = SPL_METHOD_PICTURE;
+    view->supersample = SPL_PICTURE_SUPERSAMPLE;
+    return true;
+}
+
 /* But for the pose. */
 static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
 {
@@ -51,6 +61,17 @@ bool spl_supersample_is_known(double side)
 bool spl_view_is_resampled(const struct spl_view *view)
 {
     return view->supersample != floor(view->supersample);
+}
+
+void spl_view_resize(struct spl_view *view)
+{
+    const double scale = view->supersample;
+    if (!spl_view_is_resampled(view))
+        return;
+    view->supersample = 1;
+    view->shade.radius = (uint32_t)fmax(rint(view->shade.radius * scale), 1);
+    view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
+    spl_camera_coarsen(&view->camera, scale);
 }
 
 /* What samples are taken of. */

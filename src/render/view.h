@@ -20,6 +20,8 @@ int spl_view_read(const struct spl_view *given, struct spl_view *view, struct sp
 #define SPL_SUPERSAMPLES "0.25, 0.5, 1, 1.25, 1.5, 2 and 4"
 bool spl_supersample_is_known(double side);
 bool spl_view_is_resampled(const struct spl_view *view);
+/* To what is drawn of it: another size, where it is resampled. */
+void spl_view_resize(struct spl_view *view);
 
 /* Do bent views take samples of the same lens, so that it is traced once? Poses may differ. */
 bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b);

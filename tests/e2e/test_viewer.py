@@ -833,7 +833,9 @@ def test_controls_are_those_of_the_table():
     with page() as tab:
         assert tab.run("[...document.querySelector('#method').options].map(o => o.value)") == \
             [method["name"] for method in table["methods"]]
-        assert tab.run("document.querySelector('#method').value") == table["default"]
+        picture = daemon.ask("/v1/datasets/wall").json()["picture"]
+        assert tab.run("['method', 'supersample'].map(id => document.getElementById(id).value)") == \
+            [picture["method"], str(picture["supersample"])], "what the service draws where nothing is said"
         for method in table["methods"]:
             tab.choose("#method", method["name"])
             lacks = {name for name, parameter in parameters.items()  # the wall

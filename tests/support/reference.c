@@ -188,8 +188,8 @@ static uint32_t normal_word(const float n[3])
     return (uint32_t)((e[0] + 1) * 32767 + 0.5f) | (uint32_t)((e[1] + 1) * 32767 + 0.5f) << 16;
 }
 
-/* Method nearest: a fragment whose depth is bent to `bent`, `off` 255ths off its disc's centre; each layer's least
- * payload among equals. */
+/* Method nearest: a fragment whose depth is bent to `bent`, `off` 63rds off its disc's centre and above them its size;
+ * each layer's least payload among equals. */
 static void bend(struct sample *at, const struct disc *d, float z, float bent, uint32_t off)
 {
     uint32_t payload = d->color[0] | d->color[1] << 8 | (uint32_t)d->color[2] << 16 | off << 24;
@@ -210,6 +210,7 @@ static void bend(struct sample *at, const struct disc *d, float z, float bent, u
 struct fragment {
     float z, distance, offset[3], margin, behind;
     bool whole; /* of a line or a panel, whose samples all weigh 1 in method nearest */
+    uint32_t size; /* of a disc, there: how often its radius was halved */
 };
 
 static void draw(struct scene *s, const struct disc *d, struct sample *at, const struct fragment *f, bool shade)
@@ -218,7 +219,7 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
     bool light = f->distance >= 1; /* a cell that stands for a panel */
     if (!sums(s)) {
         bend(at, d, z, z + (light ? 0 : f->margin * f->distance) + f->behind,
-             f->whole ? 0 : (uint32_t)(f->distance * 255));
+             f->whole ? 0 : (uint32_t)(f->distance * 63) | f->size << 6);
         return;
     }
     if (!shade) {
@@ -298,6 +299,9 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     slant = slant < 1 ? 1 : slant > SPL_MARGIN_SLANT ? SPL_MARGIN_SLANT : slant;
     struct fragment f = {.margin = margin_of(s, d->radius, d->p[2], slant),
                          .behind = s->sided && facing > 0 ? d->radius : 0};
+    float radius = (float)s->camera.fx * fminf(fabsf(facing), 1) * d->radius / ray_scale(&s->camera, d->p[2]);
+    for (radius /= SPL_SMOOTH_RADIUS; radius >= 1 && f.size < 3; radius /= 2)
+        f.size++;
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {
             f.distance = coverage(s, d, center, x, y, &f.z, f.offset);

@@ -53,20 +53,22 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     return found;
 }
 
-/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2; with `weighted` times
- * how near to its disc's centre each lies. */
+/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2, or 5 x 5 that lie
+ * apart where its disc is large, a pyramid; with `weighted` times how near to its disc's centre each lies. */
 static float smooth_color(const struct scene *s, const struct sample *at, int c, bool weighted)
 {
-    int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
+    const int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
+    const int size = weighted ? (int)(at->payload >> 30) : 0, reach = size ? 2 : 1, apart = size ? 1 << (size - 1) : 1;
     double sum = 0, weights = 0;
-    for (int64_t j = -1; j <= 1; j++)
-        for (int64_t i = -1; i <= 1; i++) {
-            bool inside = x + i >= 0 && x + i < width && y + j >= 0 && y + j < s->camera.height;
-            const struct sample *beside = inside ? at + j * width + i : at;
-            double weight = i && j ? 0.5 : i || j ? 1 : 4;
+    for (int j = -reach; j <= reach; j++)
+        for (int i = -reach; i <= reach; i++) {
+            const int64_t bx = x + i * apart, by = y + j * apart;
+            bool inside = bx >= 0 && bx < width && by >= 0 && by < s->camera.height;
+            const struct sample *beside = inside ? s->samples + by * width + bx : at;
+            double weight = size ? (3 - abs(i)) * (3 - abs(j)) : i && j ? 0.5 : i || j ? 1 : 4;
             if (!(fabsf(beside->first - at->first) <= depth_slack(s, at->first, SPL_SMOOTH_SHARE)))
                 continue;
-            weight *= weighted ? 1 - (beside->payload >> 24) / 255.0 : 1;
+            weight *= weighted ? 1 - (beside->payload >> 24 & 63) / 63.0 : 1;
             sum += weight * (beside->payload >> 8 * c & 255);
             weights += weight;
         }

@@ -1,6 +1,7 @@
 /* Method nearest: each sample keeps one disc, the nearest by a depth that is bent into a cone (shaders/nearest.comp),
- * and no sums: with 64 bit atomics one pass instead of two. Resolving smooths colours over the samples around. Chunks
- * that the nearer half hides are dropped, as of splats that blend. */
+ * and no sums: with 64 bit atomics one pass instead of two. Resolving smooths colours over the samples around, the
+ * farther the larger discs are, so that close ones do not look like scales. Chunks that the nearer half hides are
+ * dropped, as of splats that blend. */
 #include "render/method.h"
 #include "render/renderer.h"
 
@@ -59,7 +60,7 @@ const struct spl_method_row spl_method_nearest = {
              .needs_surface = true,
              .stand_in = SPL_METHOD_FILL},
     .discs = true,
-    .apron = 1, /* smoothing looks at the samples beside it */
+    .apron = SPL_SMOOTH_REACH,
     .record = record,
     .resolve = SPL_RESOLVED_BENT,
     .guesses = {{2, 0.25, 4, 19, 20.95},
