@@ -153,24 +153,79 @@ static unsigned list_in_plane(const struct spl_points *p, size_t i, const struct
     return list_in_plane_any(p, i, near, of_plane, u, v, x, y, reach);
 }
 
+/* What lies in the plane of a point, along its frame's axes. */
+struct in_plane {
+    double x[SPL_NEIGHBOURS_MAX + lanes], y[SPL_NEIGHBOURS_MAX + lanes], spacing;
+    unsigned count;
+};
+
+static bool look_in_plane(const struct spl_points *p, size_t i, const struct spl_nearest *near, bool of_plane,
+                          const float u[3], const float v[3], struct in_plane *in)
+{
+    double reach = 0;
+    in->count = list_in_plane(p, i, near, of_plane, u, v, in->x, in->y, &reach);
+    if (in->count < border_points)
+        return false;
+    in->spacing = sqrt(M_PI_2 * reach / in->count); /* they fill half a disc */
+    for (unsigned a = in->count; a % lanes; a++)
+        in->x[a] = in->y[a] = 0; /* never outermost */
+    return true;
+}
+
+/* The number of the direction in which it ends, -1: in none. */
+static int find_border(const struct in_plane *in, const struct spl_clip_turns *turns, double *end)
+{
+    double least = nextafter(at_border * in->spacing, INFINITY); /* a direction with more says nothing */
+    const int turn = find_turn(in->x, in->y, in->count, turns, &least);
+    *end = least + beyond_all * in->spacing;
+    return turn;
+}
+
 bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl_nearest *near,
                           const struct spl_clip_turns *turns, bool of_plane, const float u[3], const float v[3],
                           double direction[2], double *end)
 {
-    double x[SPL_NEIGHBOURS_MAX + lanes], y[SPL_NEIGHBOURS_MAX + lanes], reach = 0;
-    const unsigned count = list_in_plane(p, i, near, of_plane, u, v, x, y, &reach);
-    if (count < border_points)
+    struct in_plane in;
+    const int turn = look_in_plane(p, i, near, of_plane, u, v, &in) ? find_border(&in, turns, end) : -1;
+    if (turn >= 0)
+        memcpy(direction, turns->at[turn], sizeof turns->at[turn]);
+    return turn >= 0;
+}
+
+/* The frame of the opposite normal has one axis turned round, the other as it is: to the bit the same places. */
+bool spl_clip_foresee(const struct spl_points *p, size_t i, const struct spl_nearest *near,
+                      const struct spl_clip_turns *turns, struct spl_clip_foreseen *line)
+{
+    const float *n = p->normal[i], opposite[3] = {-n[0], -n[1], -n[2]};
+    const int sign = signbit(n[0]) != 0;
+    float u[3], v[3], turned_u[3], turned_v[3];
+    struct in_plane in;
+    spl_tangent_frame(n, u, v);
+    if (!look_in_plane(p, i, near, false, u, v, &in))
         return false;
-    const double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
-    const double none = nextafter(at_border * spacing, INFINITY);
-    double least = none; /* a direction with more says nothing */
-    for (unsigned a = count; a % lanes; a++)
-        x[a] = y[a] = 0; /* never outermost */
-    const int k = find_turn(x, y, count, turns, &least);
-    if (k >= 0)
-        memcpy(direction, turns->at[k], sizeof turns->at[k]);
-    *end = least + beyond_all * spacing;
-    return least < none;
+    line->point = (uint32_t)i;
+    line->turn[sign] = (int8_t)find_border(&in, turns, &line->end[sign]);
+    spl_tangent_frame(opposite, turned_u, turned_v);
+    double *turned = turned_u[0] != u[0] || turned_u[1] != u[1] ? in.x : in.y;
+    for (unsigned a = 0; a < in.count; a++)
+        turned[a] = -turned[a];
+    line->turn[!sign] = (int8_t)find_border(&in, turns, &line->end[!sign]);
+    return line->turn[0] >= 0 || line->turn[1] >= 0;
+}
+
+void spl_clip_set_foreseen(struct spl_points *p, const struct spl_clip_turns *turns,
+                           const struct spl_clip_foreseen *lines, size_t count)
+{
+    for (size_t k = 0; k < count; k++) {
+        float u[3], v[3];
+        const size_t i = lines[k].point;
+        const int sign = signbit(p->normal[i][0]) != 0;
+        if (k % 256 == 0)
+            spl_spill_keep_bound(p->spill);
+        spl_tangent_frame(p->normal[i], u, v);
+        if (lines[k].turn[sign] >= 0)
+            spl_clip_set(p, i, u, v, turns->at[lines[k].turn[sign]], lines[k].end[sign]);
+    }
 }
 
 void spl_clip_set(struct spl_points *p, size_t i, const float u[3], const float v[3], const double direction[2],

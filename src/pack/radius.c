@@ -301,7 +301,7 @@ SPL_INLINE double least_radius(const struct spl_points *p, size_t i, const uint3
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
 SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
                            const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
-                           double *round, bool *edge)
+                           double *round, enum spl_edge *edge)
 {
     const struct spl_points *p = v->points;
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
@@ -323,7 +323,7 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
         radius = smaller(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
     eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
-    *edge = !flat && place.open; /* noise alone leaves no quarter empty */
+    *edge = !flat && place.open ? SPL_EDGE_LIKELY : SPL_EDGE_NONE; /* noise alone leaves no quarter empty */
     if (*round > 0.1)
         return radius;
     if (!linear && !place.open)
@@ -341,7 +341,7 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
-    *edge |= place.open;
+    *edge = *edge || place.open ? SPL_EDGE_ASKED : SPL_EDGE_NONE;
     radius *= sqrt(larger(place.filled, 0.25));
     if (!place.one_sided)
         return larger(radius, smaller(0.65 * place.gap, 3 * radius));
@@ -352,7 +352,7 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) static double
 estimate_avx2(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread, const struct spl_spread *around,
-              double reach, struct spl_nearest *near, double normal[3], double *round, bool *edge)
+              double reach, struct spl_nearest *near, double normal[3], double *round, enum spl_edge *edge)
 {
     return estimate_any(v, i, spread, around, reach, near, normal, round, edge);
 }
@@ -361,7 +361,7 @@ estimate_avx2(const struct spl_vicinity *v, size_t i, const struct spl_spread *s
 /* As widen(). */
 double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
                            const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
-                           double *round, bool *edge)
+                           double *round, enum spl_edge *edge)
 {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2"))
