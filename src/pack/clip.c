@@ -17,6 +17,8 @@
 #include "base/parallel.h"
 #include "geom/tangent.h"
 
+#define SPL_INLINE static inline __attribute__((always_inline))
+
 static const double coplanar = 0.25; /* slope within which a neighbour lies in the plane */
 static const double at_border =
     0.5; /* spacings that the outermost neighbours lie beyond a point at the border, at most */
@@ -102,38 +104,128 @@ static int find_turn(const double *x, const double *y, unsigned count, const str
     return find_turn_base(x, y, count, turns, least);
 }
 
+/* Fills x and y with those of `near` that lie in the plane of point i, along u and v; returns how many. *reach is the
+ * squared distance of the farthest. */
+SPL_INLINE unsigned list_in_plane_any(const struct spl_points *p, size_t i, const struct spl_nearest *near,
+                                      bool of_plane, const float u[3], const float v[3], double *x, double *y,
+                                      double *reach)
+{
+    const float *n = p->normal[i];
+    double at[3], d[3][SPL_NEIGHBOURS_MAX], along[SPL_NEIGHBOURS_MAX], across[SPL_NEIGHBOURS_MAX];
+    int64_t is_in[SPL_NEIGHBOURS_MAX];
+    unsigned count = 0;
+    spl_points_place(p, i, at);
+    spl_points_list_apart(p, at, near->index, near->count, d);
+    for (unsigned a = 0; a < near->count; a++) {
+        double height = 0 + d[0][a] * n[0] + d[1][a] * n[1] + d[2][a] * n[2];
+        is_in[a] = !(height * height > coplanar * coplanar * near->squared[a]);
+        along[a] = d[0][a] * u[0] + d[1][a] * u[1] + d[2][a] * u[2];
+        across[a] = d[0][a] * v[0] + d[1][a] * v[1] + d[2][a] * v[2];
+    }
+    for (unsigned a = 0; of_plane && a < near->count; a++)
+        is_in[a] = p->plane[near->index[a]] == p->plane[i];
+    for (unsigned a = 0; a < near->count; a++) { /* about half of them: no branch */
+        x[count] = along[a];
+        y[count] = across[a];
+        *reach = is_in[a] && near->squared[a] > *reach ? near->squared[a] : *reach;
+        count += (unsigned)is_in[a];
+    }
+    return count;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static unsigned
+list_in_plane_avx2(const struct spl_points *p, size_t i, const struct spl_nearest *near, bool of_plane,
+                   const float u[3], const float v[3], double *x, double *y, double *reach)
+{
+    return list_in_plane_any(p, i, near, of_plane, u, v, x, y, reach);
+}
+#endif
+
+/* Compiled twice; contraction is off, so both give the same bits. */
+static unsigned list_in_plane(const struct spl_points *p, size_t i, const struct spl_nearest *near, bool of_plane,
+                              const float u[3], const float v[3], double *x, double *y, double *reach)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return list_in_plane_avx2(p, i, near, of_plane, u, v, x, y, reach);
+#endif
+    return list_in_plane_any(p, i, near, of_plane, u, v, x, y, reach);
+}
+
+/* What lies in the plane of a point, along its frame's axes. */
+struct in_plane {
+    double x[SPL_NEIGHBOURS_MAX + lanes], y[SPL_NEIGHBOURS_MAX + lanes], spacing;
+    unsigned count;
+};
+
+static bool look_in_plane(const struct spl_points *p, size_t i, const struct spl_nearest *near, bool of_plane,
+                          const float u[3], const float v[3], struct in_plane *in)
+{
+    double reach = 0;
+    in->count = list_in_plane(p, i, near, of_plane, u, v, in->x, in->y, &reach);
+    if (in->count < border_points)
+        return false;
+    in->spacing = sqrt(M_PI_2 * reach / in->count); /* they fill half a disc */
+    for (unsigned a = in->count; a % lanes; a++)
+        in->x[a] = in->y[a] = 0; /* never outermost */
+    return true;
+}
+
+/* The number of the direction in which it ends, -1: in none. */
+static int find_border(const struct in_plane *in, const struct spl_clip_turns *turns, double *end)
+{
+    double least = nextafter(at_border * in->spacing, INFINITY); /* a direction with more says nothing */
+    const int turn = find_turn(in->x, in->y, in->count, turns, &least);
+    *end = least + beyond_all * in->spacing;
+    return turn;
+}
+
 bool spl_clip_find_border(const struct spl_points *p, size_t i, const struct spl_nearest *near,
                           const struct spl_clip_turns *turns, bool of_plane, const float u[3], const float v[3],
                           double direction[2], double *end)
 {
-    const float *n = p->normal[i];
-    double x[SPL_NEIGHBOURS_MAX + lanes], y[SPL_NEIGHBOURS_MAX + lanes], at[3], reach = 0;
-    unsigned count = 0;
-    spl_points_place(p, i, at);
-    for (unsigned a = 0; a < near->count; a++) {
-        double d[3], height = 0;
-        spl_points_apart(p, at, near->index[a], d);
-        for (int c = 0; c < 3; c++)
-            height += d[c] * n[c];
-        if (of_plane ? p->plane[near->index[a]] != p->plane[i]
-                     : height * height > coplanar * coplanar * near->squared[a])
-            continue;
-        x[count] = d[0] * u[0] + d[1] * u[1] + d[2] * u[2];
-        y[count++] = d[0] * v[0] + d[1] * v[1] + d[2] * v[2];
-        reach = near->squared[a] > reach ? near->squared[a] : reach;
-    }
-    if (count < border_points)
+    struct in_plane in;
+    const int turn = look_in_plane(p, i, near, of_plane, u, v, &in) ? find_border(&in, turns, end) : -1;
+    if (turn >= 0)
+        memcpy(direction, turns->at[turn], sizeof turns->at[turn]);
+    return turn >= 0;
+}
+
+/* The frame of the opposite normal has one axis turned round, the other as it is: to the bit the same places. */
+bool spl_clip_foresee(const struct spl_points *p, size_t i, const struct spl_nearest *near,
+                      const struct spl_clip_turns *turns, struct spl_clip_foreseen *line)
+{
+    const float *n = p->normal[i], opposite[3] = {-n[0], -n[1], -n[2]};
+    const int sign = signbit(n[0]) != 0;
+    float u[3], v[3], turned_u[3], turned_v[3];
+    struct in_plane in;
+    spl_tangent_frame(n, u, v);
+    if (!look_in_plane(p, i, near, false, u, v, &in))
         return false;
-    const double spacing = sqrt(M_PI_2 * reach / count); /* they fill half a disc */
-    const double none = nextafter(at_border * spacing, INFINITY);
-    double least = none; /* a direction with more says nothing */
-    for (unsigned a = count; a % lanes; a++)
-        x[a] = y[a] = 0; /* never outermost */
-    const int k = find_turn(x, y, count, turns, &least);
-    if (k >= 0)
-        memcpy(direction, turns->at[k], sizeof turns->at[k]);
-    *end = least + beyond_all * spacing;
-    return least < none;
+    line->point = (uint32_t)i;
+    line->turn[sign] = (int8_t)find_border(&in, turns, &line->end[sign]);
+    spl_tangent_frame(opposite, turned_u, turned_v);
+    double *turned = turned_u[0] != u[0] || turned_u[1] != u[1] ? in.x : in.y;
+    for (unsigned a = 0; a < in.count; a++)
+        turned[a] = -turned[a];
+    line->turn[!sign] = (int8_t)find_border(&in, turns, &line->end[!sign]);
+    return line->turn[0] >= 0 || line->turn[1] >= 0;
+}
+
+void spl_clip_set_foreseen(struct spl_points *p, const struct spl_clip_turns *turns,
+                           const struct spl_clip_foreseen *lines, size_t count)
+{
+    for (size_t k = 0; k < count; k++) {
+        float u[3], v[3];
+        const size_t i = lines[k].point;
+        const int sign = signbit(p->normal[i][0]) != 0;
+        if (k % 256 == 0)
+            spl_spill_keep_bound(p->spill);
+        spl_tangent_frame(p->normal[i], u, v);
+        if (lines[k].turn[sign] >= 0)
+            spl_clip_set(p, i, u, v, turns->at[lines[k].turn[sign]], lines[k].end[sign]);
+    }
 }
 
 void spl_clip_set(struct spl_points *p, size_t i, const float u[3], const float v[3], const double direction[2],

@@ -30,11 +30,10 @@ SPL_INLINE void load_points(const struct spl_points *p, enum spl_points_kind kin
             at[c] = *(const spl_vec *)(p->axis[c] + first);
     else if (kind == SPL_POINTS_FLOATS)
         for (int c = 0; c < 3; c++)
-            at[c] = __builtin_convertvector(*(const spl_vec_floats *)(p->floats[c] + first), spl_vec);
+            at[c] = spl_from_floats(*(const spl_vec_floats *)(p->floats[c] + first));
     else
         for (int c = 0; c < 3; c++)
-            at[c] = __builtin_convertvector(*(const spl_vec_steps *)(p->steps[c] + first), spl_vec) * p->step[c] +
-                    p->first[c];
+            at[c] = spl_from_steps(*(const spl_vec_steps *)(p->steps[c] + first)) * p->step[c] + p->first[c];
 }
 
 /* Squared distances from `at` to SPL_LANES points. */
@@ -52,15 +51,10 @@ SPL_INLINE void scan_leaf(const struct spl_points *p, enum spl_points_kind kind,
 {
     unsigned n = c->count, used = p->count - first < leaf ? (unsigned)(p->count - first) : leaf;
     for (unsigned k = 0; k < leaf; k += SPL_LANES) {
-        double squared[SPL_LANES];
-        uint32_t index[SPL_LANES];
         spl_vec distances = point_distances(p, kind, first + k, at);
         unsigned bits = spl_bits_within(distances, c->bound);
         bits &= used >= k + SPL_LANES ? ~0u : used > k ? (1u << (used - k)) - 1 : 0;
-        *(spl_vec *)squared = distances;
-        for (unsigned a = 0; a < SPL_LANES; a++)
-            index[a] = (uint32_t)first + k + a;
-        n = spl_near_put(c->squared, c->index, n, bits, squared, index);
+        n = spl_near_put(c->squared, c->index, n, bits, distances, spl_indices((uint32_t)first + k));
     }
     c->count = n;
     if (n > c->wanted + SPL_NEAR_SET_SPARE)
@@ -95,7 +89,8 @@ SPL_INLINE unsigned group_distances(const struct spl_box_group *g, const double 
     return bits;
 }
 
-/* A search on its own, nearest boxes first: among the boxes of a group the nearest is on top of the stack. */
+/* A search on its own, nearest boxes first: among the boxes of a group the nearest is on top of the stack. Leaves come
+ * off it at once. */
 SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *points, enum spl_points_kind kind,
                      const double at[3], struct spl_near_set *c)
 {
@@ -106,18 +101,18 @@ SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *poi
         struct entry e = stack[--depth];
         if (e.squared > c->bound)
             continue;
-        if (!e.level) {
-            scan_leaf(points, kind, (size_t)e.box * leaf, at, c);
-            continue;
-        }
         double squared[fan];
         unsigned bits = group_distances(&boxes->groups[boxes->first[e.level - 1] + e.box], at, at, c->bound, squared);
-        for (unsigned bottom = depth; bits; bits &= bits - 1) {
+        unsigned bottom = depth;
+        for (; bits; bits &= bits - 1) {
             unsigned k = (unsigned)__builtin_ctz(bits), to = depth++;
             for (; to > bottom && stack[to - 1].squared < squared[k]; to--)
                 stack[to] = stack[to - 1];
             stack[to] = (struct entry){squared[k], e.box * fan + k, e.level - 1};
         }
+        for (; e.level == 1 && depth > bottom; depth--)
+            if (stack[depth - 1].squared <= c->bound)
+                scan_leaf(points, kind, (size_t)stack[depth - 1].box * leaf, at, c);
     }
 }
 
@@ -147,7 +142,7 @@ SPL_INLINE void bound_in_order(const struct spl_points *p, enum spl_points_kind 
             spl_vec t = low + (high - low) * (most - low_count + 0.4) / (high_count - low_count);
             spl_mask within = {0};
             for (size_t k = 0; k < size; k++)
-                within -= squared[k] <= t;
+                within = spl_count_up(within, squared[k], t);
             spl_vec count = __builtin_convertvector(within, spl_vec);
             spl_mask goes_on = high_count > most, few = goes_on & (count < most), many = goes_on & (count >= most);
             low = spl_select(few, t, low);
@@ -257,9 +252,11 @@ SPL_INLINE void find_kind(const struct spl_boxes *boxes, const struct spl_points
     spl_near_set_reduce(&c);
 
     unsigned kept = 0;
-    for (unsigned a = 0; a < c.count; a += SPL_LANES)
-        kept = spl_near_put(nearest->squared, nearest->index, kept,
-                            spl_bits_other(c.index + a, c.count - a, (uint32_t)i), c.squared + a, c.index + a);
+    for (unsigned a = 0; a < c.count; a += SPL_LANES) {
+        spl_vec_index index = *(const spl_vec_index *)(c.index + a);
+        kept = spl_near_put(nearest->squared, nearest->index, kept, spl_bits_other(index, c.count - a, (uint32_t)i),
+                            *(const spl_vec *)(c.squared + a), index);
+    }
     nearest->count = kept < k ? kept : k;
     spl_vec most = {0};
     *(spl_vec *)(nearest->squared + nearest->count) = most;

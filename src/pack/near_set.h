@@ -28,6 +28,7 @@ typedef double spl_vec __attribute__((vector_size(SPL_LANES * 8), aligned(8), ma
 typedef int64_t spl_mask __attribute__((vector_size(SPL_LANES * 8), aligned(8), may_alias));
 typedef float spl_vec_floats __attribute__((vector_size(SPL_LANES * 4), aligned(4), may_alias));
 typedef int32_t spl_vec_steps __attribute__((vector_size(SPL_LANES * 4), aligned(4), may_alias));
+typedef uint32_t spl_vec_index __attribute__((vector_size(SPL_LANES * 4), aligned(4), may_alias));
 #define SPL_VEC(v) ((v) - (spl_vec){0}) /* of -0 too */
 
 enum {
@@ -42,6 +43,34 @@ struct spl_near_set {
     double squared[SPL_NEAR_SET_MAX + SPL_LANES]; /* and room for a vector that is stored at the end */
     uint32_t index[SPL_NEAR_SET_MAX + SPL_LANES];
 };
+
+/* GCC converts eight in two halves. */
+SPL_INLINE spl_vec spl_from_floats(spl_vec_floats v)
+{
+#if defined(SPL_NEAR_AVX512)
+    return (spl_vec)_mm512_cvtps_pd((__m256)v);
+#else
+    return __builtin_convertvector(v, spl_vec);
+#endif
+}
+
+SPL_INLINE spl_vec spl_from_steps(spl_vec_steps v)
+{
+#if defined(SPL_NEAR_AVX512)
+    return (spl_vec)_mm512_cvtepi32_pd((__m256i)v);
+#else
+    return __builtin_convertvector(v, spl_vec);
+#endif
+}
+
+/* SPL_LANES indices from `first` on. */
+SPL_INLINE spl_vec_index spl_indices(uint32_t first)
+{
+    spl_vec_index index;
+    for (unsigned k = 0; k < SPL_LANES; k++)
+        index[k] = k;
+    return index + first;
+}
 
 SPL_INLINE spl_vec spl_select(spl_mask which, spl_vec yes, spl_vec no)
 {
@@ -66,6 +95,17 @@ SPL_INLINE spl_vec spl_lesser(spl_vec a, spl_vec b)
 #endif
 }
 
+/* Counts in each lane what is at most its limit. */
+SPL_INLINE spl_mask spl_count_up(spl_mask count, spl_vec values, spl_vec limit)
+{
+#if defined(SPL_NEAR_AVX512)
+    __mmask8 within = _mm512_cmp_pd_mask((__m512d)values, (__m512d)limit, _CMP_LE_OQ);
+    return (spl_mask)_mm512_mask_add_epi64((__m512i)count, within, (__m512i)count, _mm512_set1_epi64(1));
+#else
+    return count - (values <= limit);
+#endif
+}
+
 /* Bit k: whether value k of SPL_LANES is at most `limit`. */
 SPL_INLINE unsigned spl_bits_within(spl_vec values, double limit)
 {
@@ -80,12 +120,11 @@ SPL_INLINE unsigned spl_bits_within(spl_vec values, double limit)
 }
 
 /* Bit k: whether index k of the first `n` of SPL_LANES is another than `other`. */
-SPL_INLINE unsigned spl_bits_other(const uint32_t *index, unsigned n, uint32_t other)
+SPL_INLINE unsigned spl_bits_other(spl_vec_index index, unsigned n, uint32_t other)
 {
     unsigned used = n < SPL_LANES ? (1u << n) - 1 : (1u << SPL_LANES) - 1;
 #if defined(SPL_NEAR_AVX512)
-    __m256i all = _mm256_loadu_si256((const __m256i *)index);
-    return used & _mm256_cmpneq_epi32_mask(all, _mm256_set1_epi32((int)other));
+    return used & _mm256_cmpneq_epi32_mask((__m256i)index, _mm256_set1_epi32((int)other));
 #else
     unsigned bits = 0;
     for (unsigned k = 0; k < SPL_LANES; k++)
@@ -120,7 +159,12 @@ SPL_INLINE double spl_next_above(const double *values, unsigned n, double limit)
     spl_vec floor = SPL_VEC(limit), least = SPL_VEC(INFINITY);
     for (unsigned i = 0; i < n; i += SPL_LANES) {
         spl_vec v = *(const spl_vec *)(values + i);
+#if defined(SPL_NEAR_AVX512)
+        __mmask8 above = _mm512_cmp_pd_mask((__m512d)v, (__m512d)floor, _CMP_GT_OQ);
+        least = (spl_vec)_mm512_mask_min_pd((__m512d)least, above, (__m512d)least, (__m512d)v);
+#else
         least = spl_select((v > floor) & (v < least), v, least);
+#endif
     }
     double found = least[0];
     for (int k = 1; k < SPL_LANES; k++)
@@ -129,14 +173,13 @@ SPL_INLINE double spl_next_above(const double *values, unsigned n, double limit)
 }
 
 /* Appends those of SPL_LANES points whose bits are set, in their order; returns the end. Writes up to SPL_LANES. */
-SPL_INLINE unsigned spl_near_put(double *squared, uint32_t *index, unsigned at, unsigned bits,
-                                 const double *from_squared, const uint32_t *from_index)
+SPL_INLINE unsigned spl_near_put(double *squared, uint32_t *index, unsigned at, unsigned bits, spl_vec from_squared,
+                                 spl_vec_index from_index)
 {
 #if defined(SPL_NEAR_AVX512)
-    __m512d d = _mm512_loadu_pd(from_squared);
-    __m256i i = _mm256_loadu_si256((const __m256i *)from_index);
-    _mm512_storeu_pd(squared + at, _mm512_maskz_compress_pd((__mmask8)bits, d));
-    _mm256_storeu_si256((__m256i *)(index + at), _mm256_maskz_compress_epi32((__mmask8)bits, i));
+    __m512d nearest = _mm512_maskz_compress_pd((__mmask8)bits, (__m512d)from_squared);
+    _mm512_storeu_pd(squared + at, nearest);
+    _mm256_storeu_si256((__m256i *)(index + at), _mm256_maskz_compress_epi32((__mmask8)bits, (__m256i)from_index));
     return at + (unsigned)__builtin_popcount(bits);
 #else
     for (unsigned k = 0; k < SPL_LANES; k++) {
@@ -177,9 +220,11 @@ SPL_INLINE void spl_near_set_reduce(struct spl_near_set *c)
         }
     }
     unsigned kept = 0;
-    for (unsigned i = 0; !ties && i < n; i += SPL_LANES)
-        kept = spl_near_put(c->squared, c->index, kept, spl_bits_within(*(const spl_vec *)(c->squared + i), low),
-                            c->squared + i, c->index + i);
+    for (unsigned i = 0; !ties && i < n; i += SPL_LANES) {
+        spl_vec squared = *(const spl_vec *)(c->squared + i);
+        kept = spl_near_put(c->squared, c->index, kept, spl_bits_within(squared, low), squared,
+                            *(const spl_vec_index *)(c->index + i));
+    }
     for (unsigned i = 0, left = ties; ties && i < n; i++) {
         double d = c->squared[i];
         c->squared[kept] = d;

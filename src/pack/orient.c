@@ -75,26 +75,17 @@ SPL_INLINE void agree(const float a[3], const struct beside *b, spl_floats *agre
     *agreement = (spl_floats)((spl_marks)((ab - 2 * behind) * (1 - size)) & b->counts);
 }
 
-/* Point j beside `at`. */
-SPL_INLINE void set_beside(struct beside *b, unsigned a, const struct spl_points *p, const double at[3], size_t j,
-                           bool counts)
-{
-    double apart[3];
-    spl_points_apart(p, at, j, apart);
-    for (int c = 0; c < 3; c++) {
-        b->apart[c][a] = (float)apart[c];
-        b->normal[c][a] = p->normal[j][c];
-    }
-    b->counts[a] = counts ? -1 : 0;
-}
-
 float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j)
 {
-    struct beside b = {0};
+    struct beside b = {.counts = {-1}};
     spl_floats agreement;
-    double at[3];
+    double at[3], apart[3];
     spl_points_place(points, i, at);
-    set_beside(&b, 0, points, at, j, true);
+    spl_points_apart(points, at, j, apart);
+    for (int c = 0; c < 3; c++) {
+        b.apart[c][0] = (float)apart[c];
+        b.normal[c][0] = points->normal[j][c];
+    }
     agree(points->normal[i], &b, &agreement);
     return agreement[0];
 }
@@ -253,24 +244,37 @@ SPL_INLINE bool get_neighbour(const struct graph *g, uint32_t i, unsigned a, uin
 /* Fills in how normals agree, and in `surface` of each point whether it lies on one. */
 SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
 {
+    const unsigned rounded = (g->k + eight - 1) / eight * eight;
     for (uint32_t i = 0; i < g->count; i++) {
         float *agreement = g->agreement + (size_t)i * g->k;
+        uint32_t index[SPL_NEIGHBOURS_MAX]; /* of those in other blocks, which may change meanwhile, the point's own */
+        int32_t counts[SPL_NEIGHBOURS_MAX];
         unsigned edges = 0, agreed = 0;
-        double at[3];
+        double at[3], apart[3][SPL_NEIGHBOURS_MAX];
+        for (unsigned a = 0; a < rounded; a++) {
+            uint32_t j = i;
+            bool is_inside = a < g->k && get_neighbour(g, i, a, &j);
+            index[a] = (uint32_t)g->begin + (is_inside ? j : i);
+            counts[a] = is_inside ? -1 : 0;
+            edges += is_inside;
+        }
         spl_points_place(g->points, g->begin + i, at);
-        for (unsigned first = 0; first < g->k; first += eight) {
+        spl_points_list_apart(g->points, at, index, rounded, apart);
+        for (unsigned first = 0; first < rounded; first += eight) {
             struct beside beside;
             spl_floats agreements;
-            unsigned count = g->k - first < eight ? g->k - first : eight;
-            for (unsigned a = 0; a < eight; a++) {
-                uint32_t j = i;
-                bool is_inside = a < count && get_neighbour(g, i, first + a, &j);
-                set_beside(&beside, a, g->points, at, g->begin + (is_inside ? j : i), is_inside);
-                edges += is_inside;
-            }
+            float away[3][eight], normal[3][eight];
+            for (unsigned a = 0; a < eight; a++)
+                for (int c = 0; c < 3; c++) {
+                    away[c][a] = (float)apart[c][first + a];
+                    normal[c][a] = g->points->normal[index[first + a]][c];
+                }
+            memcpy(beside.apart, away, sizeof beside.apart);
+            memcpy(beside.normal, normal, sizeof beside.normal);
+            memcpy(&beside.counts, counts + first, sizeof beside.counts);
             agree(g->points->normal[g->begin + i], &beside, &agreements);
             spl_marks certainly = (agreements >= certain) | (agreements <= -certain);
-            for (unsigned a = 0; a < count; a++) {
+            for (unsigned a = 0; a < eight && first + a < g->k; a++) {
                 agreement[first + a] = agreements[a];
                 agreed -= (unsigned)certainly[a];
             }
@@ -301,15 +305,19 @@ static void find_agreements(const struct graph *g, uint32_t *surface)
 /* Joins what lies on surfaces; `surface` says of each point whether it does. */
 static void join_surfaces(const struct graph *g, struct forest *f, const uint32_t *surface)
 {
-    for (uint32_t i = 0; i < g->count; i++)
+    for (uint32_t i = 0; i < g->count; i++) {
+        uint8_t sign;
+        uint32_t root = surface[i] ? find_root(f, i, &sign) : i;
         for (unsigned a = 0; surface[i] && a < g->k; a++) {
             uint32_t j;
-            uint8_t sign;
             float agreement = g->agreement[(size_t)i * g->k + a];
-            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] &&
-                find_root(f, i, &sign) != find_root(f, j, &sign))
+            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] && f->parent[j] != root &&
+                find_root(f, j, &sign) != root) {
                 join(f, i, j, agreement < 0);
+                root = find_root(f, i, &sign);
+            }
         }
+    }
 }
 
 /* The edges between different trees, by their roots. */

@@ -15,6 +15,7 @@
 #define SPL_NO_STATION UINT16_MAX
 #define SPL_POINTS_MAX (UINT32_MAX - 1) /* of a dataset: indices have 32 bits */
 enum { SPL_CELLS_ALIGNED = 64 };  /* cells of a part: cubes begin a multiple of so many apart */
+enum { SPL_NEIGHBOURS_MAX = 64 }; /* nearest points that are asked for */
 enum { SPL_POINTS_PAD = 16 };   /* elements behind the last one that vector loops may read */
 
 /* A clip line: its direction in 127ths, world, and its distance in 255ths of the radius; direction 0 = none. */
@@ -101,6 +102,29 @@ static inline __attribute__((always_inline)) void spl_points_apart(const struct 
         apart[c] -= from[c];
 }
 
+/* The same of many, axis by axis, which vectors take where the caller is compiled for them. */
+static inline __attribute__((always_inline)) void spl_points_list_apart(const struct spl_points *points,
+                                                                        const double from[3], const uint32_t *index,
+                                                                        unsigned count,
+                                                                        double apart[3][SPL_NEIGHBOURS_MAX])
+{
+    for (int c = 0; c < 3; c++) {
+        int32_t steps[SPL_NEIGHBOURS_MAX];
+        if (points->kind == SPL_POINTS_DOUBLES)
+            for (unsigned a = 0; a < count; a++)
+                apart[c][a] = points->axis[c][index[a]] - from[c];
+        else if (points->kind == SPL_POINTS_FLOATS)
+            for (unsigned a = 0; a < count; a++)
+                apart[c][a] = (double)points->floats[c][index[a]] - from[c];
+        else {
+            for (unsigned a = 0; a < count; a++)
+                steps[a] = points->steps[c][index[a]];
+            for (unsigned a = 0; a < count; a++)
+                apart[c][a] = steps[a] * points->step[c] + points->first[c] - from[c];
+        }
+    }
+}
+
 static inline size_t spl_points_axis_bytes(const struct spl_points *points) /* of a coordinate */
 {
     return points->kind == SPL_POINTS_DOUBLES ? sizeof(double) : sizeof(float);
@@ -141,7 +165,6 @@ int spl_points_narrow(struct spl_points *points, const struct spl_cloud_coordina
 
 /* Normals, radii and uncertainties from the `neighbours` nearest (3..SPL_NEIGHBOURS_MAX), with `clip_lines`
  * where discs end; needs sorted points. */
-enum { SPL_NEIGHBOURS_MAX = 64 };
 int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines, struct spl_stage *stage,
                 struct spl_error *err);
 

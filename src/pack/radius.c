@@ -22,6 +22,8 @@
 
 #include "geom/eigen.h"
 
+#define SPL_INLINE static inline __attribute__((always_inline))
+
 static const double linear_below = 0.15;                /* sigma_1 / sigma_2 */
 static const double coplanar = 0.25;                    /* slope within which a far point continues a surface */
 static const double round_from = 0.25, round_to = 0.75; /* sigma_0 / sigma_1 where a surface ends and a volume begins */
@@ -64,7 +66,7 @@ typedef float spl_eight __attribute__((vector_size(32), aligned(4), may_alias));
 
 /* The moments of point i and of its neighbours within the block together, about point i: a wider view at little cost.
  */
-static inline __attribute__((always_inline)) void widen_any(const struct spl_vicinity *v, size_t i,
+SPL_INLINE void widen_any(const struct spl_vicinity *v, size_t i,
                                                             struct spl_moments *out)
 {
     const struct spl_points *p = v->points;
@@ -163,9 +165,17 @@ static void spread_some(const struct spl_moments *const moments[], unsigned coun
         }
 }
 
+/* How many of `count` listed neighbours there are. */
+SPL_INLINE unsigned count_listed(const uint32_t *neighbours, unsigned count)
+{
+    while (count && neighbours[count - 1] == UINT32_MAX)
+        count--;
+    return count;
+}
+
 /* Squared distance to the nearest of `count` points in each eighth of the plane across `normal`; infinity where none
  * is. Points that stand out of the plane by more than `slope` of their distance do not count. */
-static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count,
+SPL_INLINE void eighths(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count,
                     const double normal[3], double slope, double nearest[8])
 {
     /* any two axes across the normal, of equal length */
@@ -179,17 +189,22 @@ static void eighths(const struct spl_points *p, size_t i, const uint32_t *neighb
     y[c] = normal[least] * x[b] - normal[b] * x[least];
     for (int e = 0; e < 8; e++)
         nearest[e] = INFINITY;
-    for (unsigned a = 0; a < count && neighbours[a] != UINT32_MAX; a++) {
-        double d[3];
-        spl_points_apart(p, at, neighbours[a], d);
-        double u = d[0] * x[0] + d[1] * x[1] + d[2] * x[2], v = d[0] * y[0] + d[1] * y[1] + d[2] * y[2];
-        double h = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2];
-        double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        if (h * h > slope * slope * squared)
-            continue;
+    double d[3][SPL_NEIGHBOURS_MAX], squared[SPL_NEIGHBOURS_MAX];
+    int64_t eighth[SPL_NEIGHBOURS_MAX];
+    unsigned n = count_listed(neighbours, count);
+    spl_points_list_apart(p, at, neighbours, n, d);
+    for (unsigned a = 0; a < n; a++) {
+        double u = d[0][a] * x[0] + d[1][a] * x[1] + d[2][a] * x[2];
+        double v = d[0][a] * y[0] + d[1][a] * y[1] + d[2][a] * y[2];
+        double h = d[0][a] * normal[0] + d[1][a] * normal[1] + d[2][a] * normal[2];
+        double all = d[0][a] * d[0][a] + d[1][a] * d[1][a] + d[2][a] * d[2][a];
+        squared[a] = h * h > slope * slope * all ? INFINITY : all;
+        eighth[a] = (u > 0 ? 4 : 0) | (v > 0 ? 2 : 0) | (fabs(v) > fabs(u) ? 1 : 0);
+    }
+    for (unsigned a = 0; a < n; a++) {
         static const uint8_t turn[8] = {4, 5, 3, 2, 7, 6, 0, 1}; /* counted around */
-        uint8_t e = turn[(u > 0) * 4 + (v > 0) * 2 + (fabs(v) > fabs(u))];
-        nearest[e] = squared < nearest[e] ? squared : nearest[e];
+        double *least_there = &nearest[turn[eighth[a]]];
+        *least_there = squared[a] < *least_there ? squared[a] : *least_there;
     }
 }
 
@@ -202,7 +217,7 @@ struct place {
     bool one_sided; /* three eighths in a row are empty */
 };
 
-static struct place place_of(const double nearest[8])
+SPL_INLINE struct place place_of(const double nearest[8])
 {
     struct place place = {0};
     double quarter[8];
@@ -263,29 +278,30 @@ void spl_radius_spread(const struct spl_vicinity *v, size_t begin, size_t end, s
 }
 
 /* Eq. 20 over as few neighbours as two, the least of them all: what points of another leaf or wall do not enlarge. */
-static double least_radius(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count)
+SPL_INLINE double least_radius(const struct spl_points *p, size_t i, const uint32_t *neighbours, unsigned count)
 {
-    double squared[SPL_NEIGHBOURS_MAX], least = INFINITY, at[3], d[3];
-    unsigned n = 0;
+    double d[3][SPL_NEIGHBOURS_MAX], squared[SPL_NEIGHBOURS_MAX], within[SPL_NEIGHBOURS_MAX], least = INFINITY, at[3];
     spl_points_place(p, i, at);
-    for (; n < count && neighbours[n] != UINT32_MAX; n++) {
-        spl_points_apart(p, at, neighbours[n], d);
-        squared[n] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    }
+    unsigned n = count_listed(neighbours, count);
+    spl_points_list_apart(p, at, neighbours, n, d);
     for (unsigned a = 0; a < n; a++) {
-        double within = 0; /* neighbours as near as this one */
-        for (unsigned b = 0; b < n; b++)
-            within += squared[b] <= squared[a];
-        if (within >= 2 || n < 2)
-            least = squared[a] / within < least ? squared[a] / within : least;
+        squared[a] = d[0][a] * d[0][a] + d[1][a] * d[1][a] + d[2][a] * d[2][a];
+        within[a] = 0; /* neighbours as near as this one */
+    }
+    for (unsigned b = 0; b < n; b++)
+        for (unsigned a = 0; a < n; a++)
+            within[a] += squared[b] <= squared[a] ? 1 : 0;
+    for (unsigned a = 0; a < n; a++) {
+        double mean = within[a] >= 2 || n < 2 ? squared[a] / within[a] : INFINITY;
+        least = mean < least ? mean : least;
     }
     return 2 * sqrt(least);
 }
 
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
-double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
+SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
                            const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
-                           double *round, bool *edge)
+                           double *round, enum spl_edge *edge)
 {
     const struct spl_points *p = v->points;
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
@@ -307,7 +323,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
         radius = smaller(radius, radius + volume * (in_volume * least_radius(p, i, list, v->k) - radius));
     eighths(p, i, list, v->k, normal, 1, nearest);
     struct place place = place_of(nearest);
-    *edge = !flat && place.open; /* noise alone leaves no quarter empty */
+    *edge = !flat && place.open ? SPL_EDGE_LIKELY : SPL_EDGE_NONE; /* noise alone leaves no quarter empty */
     if (*round > 0.1)
         return radius;
     if (!linear && !place.open)
@@ -325,12 +341,33 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
-    *edge |= place.open;
+    *edge = *edge || place.open ? SPL_EDGE_ASKED : SPL_EDGE_NONE;
     radius *= sqrt(larger(place.filled, 0.25));
     if (!place.one_sided)
         return larger(radius, smaller(0.65 * place.gap, 3 * radius));
     return smaller(larger(at_border * radius, smaller(0.5 * place.gap, 3 * radius)),
                    along_border * least_radius(p, i, list, v->k));
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) static double
+estimate_avx2(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread, const struct spl_spread *around,
+              double reach, struct spl_nearest *near, double normal[3], double *round, enum spl_edge *edge)
+{
+    return estimate_any(v, i, spread, around, reach, near, normal, round, edge);
+}
+#endif
+
+/* As widen(). */
+double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
+                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           double *round, enum spl_edge *edge)
+{
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        return estimate_avx2(v, i, spread, around, reach, near, normal, round, edge);
+#endif
+    return estimate_any(v, i, spread, around, reach, near, normal, round, edge);
 }
 
 bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)

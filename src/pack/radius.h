@@ -35,13 +35,16 @@ struct spl_spreads {
 };
 void spl_radius_spread(const struct spl_vicinity *vicinity, size_t begin, size_t end, struct spl_spreads *spreads);
 
+/* Whether a point's surface may end or turn there: the points around do not lie flat, or are asked for widely, and a
+ * quarter of the plane holds none of them. */
+enum spl_edge { SPL_EDGE_NONE, SPL_EDGE_LIKELY, SPL_EDGE_ASKED };
+
 /* Radius of point i of the run, which has `reach` to its farthest listed neighbour, from its two spreads; its normal,
- * of either sign; and how round its surroundings are, from 0 (a surface or a line) to 1 (a volume); `edge` where its
- * surface may end or turn: the points around do not lie flat, or are asked for widely, and a quarter of the plane holds
- * none of them. `near` is scratch for searches in order. */
+ * of either sign; and how round its surroundings are, from 0 (a surface or a line) to 1 (a volume); whether it lies at
+ * an edge: SPL_EDGE_ASKED where `near`, scratch for searches in order, holds the wide neighbours of i afterwards. */
 double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
                            const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
-                           double *round, bool *edge);
+                           double *round, enum spl_edge *edge);
 
 /* Whether a wider view of point i shows a surface that goes on all around it. `near` as above. */
 bool spl_radius_on_surface(const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near);

@@ -42,9 +42,10 @@ static void limit_runs(const struct spl_settle_block *block)
 
 static bool waits(const struct spl_settle_block *block, const uint32_t *list)
 {
-    bool outside = false;
-    for (unsigned a = 0; a < block->k && list[a] != UINT32_MAX; a++)
-        outside |= list[a] < block->begin || list[a] >= block->end;
+    const uint32_t begin = (uint32_t)block->begin, points = (uint32_t)(block->end - block->begin);
+    unsigned outside = 0;
+    for (unsigned a = 0; a < block->k; a++)
+        outside |= (list[a] - begin >= points) & (list[a] != UINT32_MAX);
     return outside;
 }
 

@@ -5,6 +5,8 @@
  * percent, until the signs between blocks are settled. Blocks do not depend on the number of threads, so neither does
  * the result.
  *
+ * Points whose wide neighbours are asked for anyway get their clip line at once, of either sign of their normal.
+ *
  * What a point's own neighbours give (radius.c) is held against the radii around it (settle.c), more strictly where
  * there is no surface. */
 #include "pack/points.h"
@@ -31,6 +33,8 @@ enum { wide_factor = 3 };
 
 struct block {
     struct spl_unsettled unsettled;
+    struct spl_clip_foreseen *lines;
+    size_t line_count;
     struct spl_component *components;
     uint32_t component_count, first_component;
 };
@@ -40,6 +44,7 @@ struct scratch {                 /* of one worker */
     uint32_t *neighbours;        /* k a point, unused ones UINT32_MAX */
     float *limit; /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
                      radius, that times the median, its settled radius */
+    struct spl_clip_foreseen *lines; /* of the block */
     struct spl_orient orient;
 };
 
@@ -50,7 +55,8 @@ struct surface {
     struct scratch *scratch;
     struct block *blocks;
     size_t block_count;
-    uint8_t *edge;   /* a bit of each point: its surface may end there; NULL: no clip lines */
+    uint8_t *edge;   /* a bit of each point: its surface may end there, and nobody has looked; NULL: no clip lines */
+    struct spl_clip_turns turns;
     uint16_t *label; /* component of each point within its block; NULL when every side is known */
     struct spl_component *components;
     unsigned k, wide;
@@ -59,7 +65,7 @@ struct surface {
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
 static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
-                     const struct spl_spread *around, struct spl_nearest *near, float *limit, bool *edge)
+                     const struct spl_spread *around, struct spl_nearest *near, float *limit, enum spl_edge *edge)
 {
     double least[3], round, side = 1;
     double radius = spl_radius_estimate(vicinity, i, own, around, *limit, near, least, &round, edge);
@@ -97,6 +103,17 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
     return true;
 }
 
+static bool keep_lines(const struct surface *s, struct block *block, const struct scratch *w, size_t count)
+{
+    block->lines = spl_spill_take(s->points->spill, count, sizeof *block->lines, NULL);
+    if (!block->lines)
+        return false;
+    if (count)
+        memcpy(block->lines, w->lines, count * sizeof *block->lines);
+    block->line_count = count;
+    return true;
+}
+
 static void surface_block(void *context, size_t begin_block, size_t end_block, unsigned worker)
 {
     struct surface *s = context;
@@ -124,19 +141,22 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                                               w->moments, w->neighbours, s->k,  s->wide};
         spl_nearest_init(&near);
         struct spl_spreads spreads;
+        size_t line_count = 0;
         for (size_t i = begin; i < end; i++) {
-            bool edge = false;
+            enum spl_edge edge = SPL_EDGE_NONE;
             size_t at = (i - begin) % SPL_SPREADS;
             if (!at)
                 spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
             w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at],
                                                      &near, &w->limit[i - begin], &edge);
             const bool kept = !s->points->halo || !s->points->halo[i]; /* of others nobody asks for lines */
-            if (edge && kept && s->edge)
+            if (edge == SPL_EDGE_ASKED && kept && s->edge)
+                line_count += spl_clip_foresee(s->points, i, &near, &s->turns, &w->lines[line_count]);
+            else if (edge && kept && s->edge)
                 s->edge[i / 8] |= (uint8_t)(1 << i % 8); /* blocks share no byte */
         }
         const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, &vicinity, w->limit};
-        if (spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
+        if (!keep_lines(s, &s->blocks[b], w, line_count) || spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
             (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
             atomic_store(&s->failed, true);
             return;
@@ -208,6 +228,14 @@ static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
                 s->points->normal[i][c] = -s->points->normal[i][c];
 }
 
+static void set_lines(void *context, size_t begin, size_t end, unsigned worker)
+{
+    struct surface *s = context;
+    (void)worker;
+    for (size_t b = begin; b < end; b++)
+        spl_clip_set_foreseen(s->points, &s->turns, s->blocks[b].lines, s->blocks[b].line_count);
+}
+
 static void settle_rest(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct surface *s = context;
@@ -245,7 +273,8 @@ static int allocate(struct surface *s, struct spl_error *err)
         s->scratch[t].neighbours = spl_alloc_raw(capacity, s->k * sizeof(uint32_t), err);
         s->scratch[t].limit = spl_alloc_raw(capacity, sizeof(float), err);
         s->scratch[t].moments = spl_alloc_raw(capacity, sizeof *s->scratch[t].moments, err);
-        if (!s->scratch[t].neighbours || !s->scratch[t].limit || !s->scratch[t].moments ||
+        s->scratch[t].lines = spl_alloc_raw(capacity, sizeof *s->scratch[t].lines, err);
+        if (!s->scratch[t].neighbours || !s->scratch[t].limit || !s->scratch[t].moments || !s->scratch[t].lines ||
             spl_orient_init(&s->scratch[t].orient, capacity, s->k, err))
             return SPL_E_NOMEM;
     }
@@ -259,23 +288,23 @@ static int allocate(struct surface *s, struct spl_error *err)
 }
 
 /* What clip lines are not made of. */
-static void finish_blocks(struct surface *s)
+static void finish_scratch(struct surface *s)
 {
     for (size_t b = 0; s->blocks && b < s->block_count; b++) {
         spl_unsettled_finish(&s->blocks[b].unsettled);
         free(s->blocks[b].components);
+        s->blocks[b].components = NULL;
     }
     for (unsigned t = 0; s->scratch && t < s->stage->threads; t++) {
         free(s->scratch[t].neighbours);
         free(s->scratch[t].limit);
         free(s->scratch[t].moments);
+        free(s->scratch[t].lines);
         spl_orient_finish(&s->scratch[t].orient);
     }
-    free(s->blocks);
     free(s->scratch);
     free(s->components);
     spl_spill_free(s->points->spill, s->label);
-    s->blocks = NULL;
     s->scratch = NULL;
     s->components = NULL;
     s->label = NULL;
@@ -284,7 +313,10 @@ static void finish_blocks(struct surface *s)
 
 static void finish(struct surface *s)
 {
-    finish_blocks(s);
+    finish_scratch(s);
+    for (size_t b = 0; s->blocks && b < s->block_count; b++)
+        spl_spill_give(s->points->spill, s->blocks[b].lines);
+    free(s->blocks);
     spl_spill_free(s->points->spill, s->edge);
     spl_neighbours_destroy(s->neighbours);
 }
@@ -303,6 +335,7 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
 {
     struct surface s = {.points = points, .stage = stage, .k = neighbours};
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
+    spl_clip_turns_init(&s.turns);
     spl_stage_begin(stage, "normals and radii", "points", points->count);
     int rc = allocate(&s, err);
     if (!rc && clip_lines && points->count > 1 &&
@@ -331,9 +364,11 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
     for (size_t b = 0; b < s.block_count; b++)
         spl_settle_store(points, &s.blocks[b].unsettled);
     spl_stage_finish(stage);
-    finish_blocks(&s);
+    finish_scratch(&s);
     if (s.edge)
         rc = spl_clip_lines(points, s.neighbours, s.wide, s.edge, stage, err);
+    if (s.edge && !rc)
+        spl_parallel_for(stage->threads, s.block_count, 1, set_lines, &s);
 done:
     finish(&s);
     return rc;

@@ -14,8 +14,9 @@
 #include "geom/size.h"
 #include "geom/vector.h"
 #include "pack/median.h"
+#include "pack/view/picture.h"
 
-enum { raster = 96, azimuths = 24, elevations = 3, spread_most = 3 };
+enum { azimuths = 24, elevations = 3 };
 static const double aspect = 16.0 / 9, margin = 1.06;
 static const double beyond = 0.002; /* of the sample may lie beyond the frame, */
 static const double narrow = 1.02, wider = 1.08; /* not what a frame so much wider holds, by a lesser margin */
@@ -26,86 +27,6 @@ static void get_axes(double azimuth, double elevation, double axes[3][3])
     double ca = cos(azimuth), sa = sin(azimuth), ce = cos(elevation), se = sin(elevation);
     const double rows[3][3] = {{-sa, ca, 0}, {-se * ca, -se * sa, ce}, {-ce * ca, -ce * sa, -se}};
     memcpy(axes, rows, sizeof rows);
-}
-
-/* Of the picture: where it begins and how large a cell is. */
-struct frame {
-    double low[2], cell;
-};
-
-static struct frame frame_of(const struct spl_view_sample *s, double axes[3][3])
-{
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (size_t i = 0; i < s->count; i++)
-        for (int c = 0; c < 2; c++) {
-            double x = dot3(axes[c], s->at[i]);
-            low[c] = x < low[c] ? x : low[c];
-            high[c] = x > high[c] ? x : high[c];
-        }
-    double width = fmax(fmax(high[0] - low[0], aspect * (high[1] - low[1])), DBL_MIN);
-    struct frame frame = {.cell = width / (raster - 1)};
-    for (int c = 0; c < 2; c++)
-        frame.low[c] = 0.5 * (low[c] + high[c]) - 0.5 * (c ? width / aspect : width);
-    return frame;
-}
-
-enum { rows = raster * 9 / 16 + 2 };
-
-struct picture { /* of one worker */
-    double depth[rows][raster];
-    bool filled[rows][raster];
-};
-
-/* The nearest depth of each cell. */
-static void draw(const struct spl_view_sample *s, double axes[3][3], const struct frame *frame,
-                 double depth[rows][raster])
-{
-    for (int y = 0; y < rows; y++)
-        for (int x = 0; x < raster; x++)
-            depth[y][x] = INFINITY;
-    for (size_t i = 0; i < s->count; i++) {
-        double z = dot3(axes[2], s->at[i]);
-        double reach = 0.7 * sqrt((double)s->area[i]) / frame->cell;
-        int spread = reach < spread_most ? (int)reach : spread_most;
-        int cx = (int)((dot3(axes[0], s->at[i]) - frame->low[0]) / frame->cell),
-            cy = (int)((dot3(axes[1], s->at[i]) - frame->low[1]) / frame->cell);
-        for (int y = cy - spread; y <= cy + spread; y++)
-            for (int x = cx - spread; x <= cx + spread; x++)
-                if (x >= 0 && x < raster && y >= 0 && y < rows && z < depth[y][x])
-                    depth[y][x] = z;
-    }
-}
-
-/* Share of the frame that is filled, times the share of the surface that is seen. */
-static double judge(const struct spl_view_sample *s, double azimuth, double elevation, struct picture *picture)
-{
-    double axes[3][3], seen = 0, all = 0;
-    double(*depth)[raster] = picture->depth;
-    bool(*filled)[raster] = picture->filled;
-    get_axes(azimuth, elevation, axes);
-    struct frame frame = frame_of(s, axes);
-    draw(s, axes, &frame, depth);
-    memset(filled, 0, sizeof picture->filled);
-    for (size_t i = 0; i < s->count; i++) {
-        int x = (int)((dot3(axes[0], s->at[i]) - frame.low[0]) / frame.cell),
-            y = (int)((dot3(axes[1], s->at[i]) - frame.low[1]) / frame.cell);
-        double facing = 1, weight = (double)s->area[i];
-        if (s->sides)
-            facing = -((double)s->normal[i][0] * axes[2][0] + (double)s->normal[i][1] * axes[2][1] +
-                       (double)s->normal[i][2] * axes[2][2]);
-        all += weight;
-        weight *= pow(fmax(facing, 0), 1.5); /* from straight ahead it shows most */
-        if (facing <= 0 || x < 0 || x >= raster || y < 0 || y >= rows ||
-            dot3(axes[2], s->at[i]) > depth[y][x] + 3 * frame.cell)
-            continue;
-        filled[y][x] = true;
-        seen += weight;
-    }
-    size_t covered = 0;
-    for (int y = 0; y < rows; y++)
-        for (int x = 0; x < raster; x++)
-            covered += filled[y][x];
-    return all > 0 ? (double)covered * seen / all : 0;
 }
 
 /* The value that all but `share` of them do not exceed. */
@@ -201,27 +122,36 @@ static double first_elevation(const struct spl_view_sample *s)
 /* All pictures that are looked at. */
 struct trials {
     const struct spl_view_sample *sample;
-    struct picture *pictures; /* one a worker */
+    struct spl_view_pictures **pictures; /* one a worker */
+    double area; /* of the sample */
     double azimuth[azimuths * elevations], elevation[azimuths * elevations], score[azimuths * elevations];
 };
 
 static void judge_some(void *context, size_t begin, size_t end, unsigned worker)
 {
     struct trials *t = context;
-    for (size_t i = begin; i < end; i++)
-        t->score[i] = judge(t->sample, t->azimuth[i], t->elevation[i], &t->pictures[worker]);
+    for (size_t i = begin; i < end; i++) {
+        double axes[3][3];
+        get_axes(t->azimuth[i], t->elevation[i], axes);
+        t->score[i] = spl_view_judge(t->pictures[worker], t->sample, axes, aspect, t->area);
+    }
 }
 
 int spl_view_from_outside(const struct spl_view_sample *s, unsigned threads, struct spl_default_view *view,
                           struct spl_error *err)
 {
     static const double tangent[2] = {0.41421356237309503 * 16 / 9, 0.41421356237309503}; /* of 45 degrees upright */
-    struct trials trials = {.sample = s,
-                            .pictures = spl_alloc_raw(spl_thread_count(threads), sizeof *trials.pictures, err)};
+    const unsigned workers = spl_thread_count(threads);
+    struct trials trials = {.sample = s, .pictures = spl_alloc(workers, sizeof *trials.pictures, err)};
     double *values = spl_alloc_raw(s->count, sizeof *values, err);
     double best = -1, axes[3][3], eye[3], target[3], up[3] = {0, 0, 1};
     double azimuth = 0, elevation = 0;
     int rc = trials.pictures && values ? 0 : SPL_E_NOMEM;
+    for (unsigned t = 0; !rc && t < workers; t++)
+        if (!(trials.pictures[t] = spl_view_pictures_create(s, err)))
+            rc = SPL_E_NOMEM;
+    for (size_t i = 0; i < s->count; i++)
+        trials.area += (double)s->area[i];
     for (int i = 0; i < azimuths * elevations; i++) {
         trials.azimuth[i] = 2 * M_PI * (i % azimuths) / azimuths - M_PI / 2;
         trials.elevation[i] = (first_elevation(s) + 8 * (i / azimuths)) * M_PI / 180;
@@ -256,6 +186,8 @@ int spl_view_from_outside(const struct spl_view_sample *s, unsigned threads, str
         spl_view_to_world(s, eye, view->eye);
         spl_view_to_world(s, target, view->target);
     }
+    for (unsigned t = 0; trials.pictures && t < workers; t++)
+        spl_view_pictures_destroy(trials.pictures[t]);
     free(trials.pictures);
     free(values);
     return rc;
