@@ -240,7 +240,7 @@ static bool submit_parts(struct spl_fleet *fleet, struct spl_job *job)
     if (count < 2 || spl_parts_begin(job, count, NULL))
         return false;
     for (unsigned i = 0; i < count; i++)
-        spl_parts_submit(job, i, idle[i], NULL); // the others draw what one has no room for
+        spl_parts_submit(job, i, idle[i]); // the others draw what one has no room for
     if (!job->spread.away)
         spl_parts_undo(job);
     return job->spread.away;
@@ -278,7 +278,7 @@ static struct spl_job *take_part(struct spl_fleet *fleet, struct spl_job *part, 
     if (state == SPL_PARTS_LEFT) {
         struct spl_pipeline *pipeline = whole->spread.again ? NULL : choose(fleet, whole, whole->spread.lost);
         whole->spread.again = true;
-        if (pipeline && !spl_parts_submit(whole, number, pipeline, NULL))
+        if (pipeline && spl_parts_submit(whole, number, pipeline))
             state = SPL_PARTS_INSIDE;
         else
             spl_parts_give_back(whole);

@@ -32,11 +32,11 @@ void spl_parts_undo(struct spl_job *job)
     job->spread = (struct spl_job_spread){0};
 }
 
-int spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline, struct spl_error *err)
+bool spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline)
 {
-    struct spl_job *part = spl_alloc(1, sizeof *part, err);
+    struct spl_job *part = spl_alloc(1, sizeof *part, NULL);
     if (!part)
-        return SPL_E_NOMEM;
+        return false;
     part->part = (struct spl_job_part){.whole = whole, .number = number};
     whole->spread.parts++;
     if (whole->entry)
@@ -45,15 +45,14 @@ int spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline
     part->request = whole->request;
     part->accepted_ns = whole->accepted_ns;
     part->deadline_ns = SPL_NEVER; // the whole's counts
-    int rc = spl_pipeline_submit(pipeline, part, err);
-    if (rc) {
+    if (spl_pipeline_submit(pipeline, part, NULL)) {
         spl_job_destroy(part);
-        return rc;
+        return false;
     }
     whole->spread.away = true;
     whole->spread.inside++;
     whole->large = part->large;
-    return SPL_OK;
+    return true;
 }
 
 /* What the loop says and counts of the job. */
