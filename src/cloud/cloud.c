@@ -172,11 +172,6 @@ const struct spl_cloud_info *spl_cloud_get_info(const struct spl_cloud *cloud)
     return &cloud->info;
 }
 
-uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud)
-{
-    return spl_source_tell(&cloud->source);
-}
-
 /* Of the points from `from` on, leaves those that belong to the part, as even as whole numbers can be. */
 static void thin(struct spl_cloud *cloud, struct spl_point_batch *batch, size_t from)
 {

@@ -149,9 +149,6 @@ int spl_cloud_open(const char *path, const struct spl_cloud_options *options, st
 
 const struct spl_cloud_info *spl_cloud_get_info(const struct spl_cloud *cloud);
 
-/* Bytes of the file consumed so far, for progress. */
-uint64_t spl_cloud_get_offset(const struct spl_cloud *cloud);
-
 /* Fills the next batch (overwriting it): 1 = batch.count > 0 points, 0 = end, negative = error. Points with a
  * non-finite coordinate are skipped and counted. A file with no usable point ends with 0 at once: the caller decides.
  * SPL_CLOUD_AGAIN where a point is brighter than sampled colours let expect: nothing that was read holds, info has the

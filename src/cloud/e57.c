@@ -208,11 +208,12 @@ static int read_column(struct spl_e57 *e57, enum spl_e57_role role, double *out,
     return SPL_OK;
 }
 
-static int read_columns(struct spl_e57 *e57, enum spl_e57_role role, struct spl_rows *rows, int column, int columns,
-                        struct spl_error *err)
+/* From this column on. */
+static int read_three(struct spl_e57 *e57, enum spl_e57_role role, struct spl_rows *rows, int column,
+                      struct spl_error *err)
 {
     int code = SPL_OK;
-    for (int k = 0; k < columns && code == SPL_OK; k++)
+    for (int k = 0; k < 3 && code == SPL_OK; k++)
         code = read_column(e57, role + (unsigned)k, rows->value[column + k], rows->count, 0, err);
     return code;
 }
@@ -223,7 +224,7 @@ static int read_positions(struct spl_e57 *e57, struct spl_rows *rows, struct spl
     const struct spl_e57_frame *scan = &e57->scans[e57->scan];
     double *x = rows->value[SPL_COLUMN_X], *y = rows->value[SPL_COLUMN_Y], *z = rows->value[SPL_COLUMN_Z];
     double *state = e57->state;
-    int code = read_columns(e57, scan->spherical ? SPL_E57_RANGE : SPL_E57_X, rows, SPL_COLUMN_X, 3, err);
+    int code = read_three(e57, scan->spherical ? SPL_E57_RANGE : SPL_E57_X, rows, SPL_COLUMN_X, err);
     if (code == SPL_OK)
         code = read_column(e57, scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE, state, rows->count, 0, err);
     for (size_t r = 0; code == SPL_OK && scan->spherical && r < rows->count; r++) {
@@ -284,9 +285,9 @@ static int read_rows(struct spl_cloud *cloud, struct spl_rows *rows, struct spl_
     const struct spl_e57_frame *scan = &e57->scans[e57->scan];
     int code = read_positions(e57, rows, err);
     if (code == SPL_OK && cloud->info.attributes & SPL_CLOUD_NORMAL)
-        code = read_columns(e57, SPL_E57_NX, rows, SPL_COLUMN_NX, 3, err);
+        code = read_three(e57, SPL_E57_NX, rows, SPL_COLUMN_NX, err);
     if (code == SPL_OK && cloud->columns >> SPL_COLUMN_RED & 1 && cloud->color.kind != SPL_COLOR_GREY)
-        code = read_columns(e57, SPL_E57_RED, rows, SPL_COLUMN_RED, 3, err);
+        code = read_three(e57, SPL_E57_RED, rows, SPL_COLUMN_RED, err);
     for (int column = SPL_COLUMN_CLASS; column < SPL_COLUMN_COUNT && code == SPL_OK; column++)
         if (is_wanted(cloud, column))
             code = read_scalars(e57, rows, column, err);

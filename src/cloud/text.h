@@ -34,6 +34,26 @@ static inline enum spl_field spl_layout_number(const struct spl_layout *layout, 
                            : spl_fields_number(fields, value);
 }
 
+/* A field both as text and, where it is one, as a number of the text's kind. */
+struct spl_layout_field {
+    const char *text; /* quotes taken off */
+    size_t length;
+    bool number; /* it has a value */
+    double value;
+};
+
+/* The next one; false: there is none, or its quotes are broken. */
+static inline bool spl_layout_next(const struct spl_layout *layout, struct spl_fields *fields,
+                                   struct spl_layout_field *field)
+{
+    struct spl_fields tried = *fields;
+    field->number = spl_layout_number(layout, &tried, &field->value) == SPL_FIELD_OK;
+    if (spl_fields_text(fields, &field->length) != SPL_FIELD_OK)
+        return false;
+    field->text = fields->start;
+    return true;
+}
+
 bool spl_layout_has(const struct spl_layout *layout, int column);
 uint32_t spl_layout_taken(const struct spl_layout *layout); /* 1 << column of all that it has */
 

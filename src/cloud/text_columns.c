@@ -115,15 +115,13 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
                          size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
+    struct spl_layout_field field;
     const unsigned at = layout->first;
     double v[SPL_TEXT_FIELDS];
     for (unsigned i = 0; i < layout->fields; i++) {
-        struct spl_fields field = fields;
-        size_t text;
-        if (spl_fields_text(&fields, &text) != SPL_FIELD_OK)
+        if (!spl_layout_next(layout, &fields, &field))
             return false;
-        if (spl_layout_number(layout, &field, &v[i]) != SPL_FIELD_OK)
-            v[i] = NAN;
+        v[i] = field.number ? field.value : NAN;
     }
     bool whole = !layout->exact || spl_fields_blank(fields.p, (size_t)(fields.end - fields.p));
     if (!isfinite(v[at]) || !isfinite(v[at + 1]) || !isfinite(v[at + 2])) /* no point, so the rest of it says nothing */

@@ -28,19 +28,14 @@ static bool begins_with_letter(const char *line, size_t length)
 static bool is_row(const struct spl_layout *layout, const char *line, size_t length, unsigned *numbers)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
+    struct spl_layout_field field;
     unsigned places = 0;
     *numbers = 0;
-    for (unsigned i = 0; i < SPL_TEXT_FIELDS; i++) {
+    for (unsigned i = 0; i < SPL_TEXT_FIELDS && spl_layout_next(layout, &fields, &field); i++) {
         int column = i < layout->fields ? layout->column[i] : SPL_COLUMN_SKIP;
-        struct spl_fields field = fields;
-        size_t size;
-        double v;
-        bool number = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
-        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
-            break;
         bool place = column >= SPL_COLUMN_X && column <= SPL_COLUMN_Z;
-        places += place && (number || spl_text_is_missing(fields.start, size));
-        *numbers += number;
+        places += place && (field.number || spl_text_is_missing(field.text, field.length));
+        *numbers += field.number;
     }
     return places == 3;
 }

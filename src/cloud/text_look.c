@@ -43,11 +43,10 @@ static bool take_whole(struct spl_fields *fields, struct whole *whole)
 
 bool spl_text_names_point(const struct spl_layout *layout, const char *line, size_t length)
 {
-    struct spl_fields fields = spl_layout_fields(layout, line, length), first = fields;
+    struct spl_fields fields = spl_layout_fields(layout, line, length);
+    struct spl_layout_field first;
     double v;
-    size_t length_of;
-    if (spl_layout_number(layout, &first, &v) == SPL_FIELD_OK || spl_fields_text(&fields, &length_of) != SPL_FIELD_OK ||
-        length_of == 0)
+    if (!spl_layout_next(layout, &fields, &first) || first.number || first.length == 0)
         return false;
     for (int i = 0; i < 3; i++)
         if (spl_layout_number(layout, &fields, &v) != SPL_FIELD_OK)
@@ -67,17 +66,12 @@ bool spl_text_is_missing(const char *text, size_t length)
 bool spl_text_kinds_add(struct spl_text_kinds *kinds, const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
+    struct spl_layout_field field;
     unsigned leading = 0, i = 0;
-    for (; i < SPL_TEXT_FIELDS; i++) {
-        struct spl_fields field = fields;
-        size_t size;
-        double v;
-        bool number = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
-        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
-            break;
-        bool text = !number && !spl_text_is_missing(fields.start, size);
-        kinds->numbers[i] += number;
-        kinds->fraction |= i == 0 && number && v != floor(v);
+    for (; i < SPL_TEXT_FIELDS && spl_layout_next(layout, &fields, &field); i++) {
+        bool text = !field.number && !spl_text_is_missing(field.text, field.length);
+        kinds->numbers[i] += field.number;
+        kinds->fraction |= i == 0 && field.number && field.value != floor(field.value);
         kinds->texts[i] += text;
         leading += leading == i && (!text || i == 0);
     }
@@ -119,22 +113,21 @@ bool spl_text_written_add(struct spl_text_written *written, const struct spl_lay
                           const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
-    size_t count = spl_fields_count(line, length, layout->separator), size;
+    struct spl_layout_field field;
+    size_t count = spl_fields_count(line, length, layout->separator);
     bool same = named || written->lines == 0 || count == written->fields; /* names: the last may be empty */
     written->fields = count;
     if (!same || count < 3 || (!named && count > SPL_TEXT_FIELDS))
         return false;
     written->lines++;
     for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {
-        struct spl_fields field = fields, plain = fields;
+        struct spl_fields plain = fields;
         double v;
-        spl_fields_text(&fields, &size);
-        if (named && (i >= layout->fields || layout->column[i] < 0))
+        if (!spl_layout_next(layout, &fields, &field) || (named && (i >= layout->fields || layout->column[i] < 0)))
             continue;
-        bool good = spl_layout_number(layout, &field, &v) == SPL_FIELD_OK;
-        written->found |= good && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
-        written->bad |=
-            !good && (named ? !spl_text_is_missing(fields.start, size) : looks_like_number(fields.start, size));
+        written->found |= field.number && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
+        written->bad |= !field.number && (named ? !spl_text_is_missing(field.text, field.length)
+                                                : looks_like_number(field.text, field.length));
     }
     return !written->bad;
 }

@@ -39,16 +39,12 @@ static bool is_there(const struct place *place, double x, double y)
 void spl_text_north_add(struct spl_text_north *north, const struct spl_layout *layout, const char *line, size_t length)
 {
     struct spl_fields fields = spl_layout_fields(layout, line, length);
+    struct spl_layout_field field;
     double at[2] = {NAN, NAN};
-    for (unsigned i = 0; i < layout->fields; i++) {
+    for (unsigned i = 0; i < layout->fields && spl_layout_next(layout, &fields, &field); i++) {
         int column = layout->column[i];
-        struct spl_fields field = fields;
-        size_t size;
-        double v;
-        if (column >= SPL_COLUMN_X && column <= SPL_COLUMN_Y && spl_layout_number(layout, &field, &v) == SPL_FIELD_OK)
-            at[column - SPL_COLUMN_X] = v;
-        if (spl_fields_text(&fields, &size) != SPL_FIELD_OK)
-            break;
+        if (column >= SPL_COLUMN_X && column <= SPL_COLUMN_Y && field.number)
+            at[column - SPL_COLUMN_X] = field.value;
     }
     if (!isfinite(at[0]) || !isfinite(at[1]))
         return;

@@ -145,7 +145,7 @@ static int take_output(void *arguments, const char *option, char *text, struct s
 {
     (void)option;
     ((struct arguments *)arguments)->folder = text;
-    return spl_cmd_check_folder("-o", text, "a folder", err);
+    return spl_cmd_check_folder(text, "a folder", err);
 }
 
 static const struct spl_cmd_option options[] = {

@@ -174,7 +174,7 @@ static int take_output(void *arguments, const char *option, char *text, struct s
 {
     (void)option;
     ((struct spl_cmd_bench_arguments *)arguments)->sweep.output = text;
-    return spl_cmd_check_folder("-o", text, "a folder", err);
+    return spl_cmd_check_folder(text, "a folder", err);
 }
 
 static int take_reference(void *arguments, const char *option, char *text, struct spl_error *err)

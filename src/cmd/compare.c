@@ -31,7 +31,7 @@ static const char *const kinds[] = {"color", "depth", "normal", "coverage", NULL
 static int take_map(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     ((struct arguments *)arguments)->map = text;
-    return spl_cmd_check_ending(option, text, "png", err);
+    return spl_cmd_check_png(option, text, err);
 }
 
 static const struct spl_cmd_option options[] = {

@@ -380,7 +380,7 @@ int spl_cmd_info(int argc, char **argv)
     if (!parsed && a.picture && argc - optind > 1)
         parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of one dataset, not of %d", argc - optind);
     if (!parsed && a.picture)
-        parsed = spl_cmd_check_ending("--dictionary", a.picture, "png", &wrong);
+        parsed = spl_cmd_check_png("--dictionary", a.picture, &wrong);
     if (!parsed && a.picture && spl_info_is_scan(argv[optind]))
         parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of a dataset; %.300s is a scan",
                           argv[optind]);

@@ -60,14 +60,14 @@ const char *spl_cmd_ending(const char *path)
     return dot && dot > name && strcmp(name, "..") ? dot + 1 : "";
 }
 
-int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err)
+int spl_cmd_check_png(const char *option, const char *path, struct spl_error *err)
 {
     struct stat status;
-    if (!strcasecmp(spl_cmd_ending(path), ending) || !strcmp(path, "-") ||
+    if (!strcasecmp(spl_cmd_ending(path), "png") || !strcmp(path, "-") ||
         (!stat(path, &status) && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)))
         return SPL_OK;
-    return spl_fail(err, SPL_E_USAGE, "%s writes a .%s file, so its name ends like one: %s NAME.%s, not '%s'", option,
-                    ending, option, ending, path);
+    return spl_fail(err, SPL_E_USAGE, "%s writes a .png file, so its name ends like one: %s NAME.png, not '%s'", option,
+                    option, path);
 }
 
 int spl_cmd_check_dataset(const char *command, const char *path, struct spl_error *err)
@@ -92,17 +92,17 @@ static bool is_of_a_file(const char *ending)
     return letters && length <= 5;
 }
 
-int spl_cmd_check_folder(const char *option, const char *path, const char *takes, struct spl_error *err)
+int spl_cmd_check_folder(const char *path, const char *takes, struct spl_error *err)
 {
     struct stat status;
     if (!*path || !strcmp(path, "-"))
-        return spl_fail(err, SPL_E_USAGE, "%s takes %s, not '%s'", option, takes, path);
+        return spl_fail(err, SPL_E_USAGE, "-o takes %s, not '%s'", takes, path);
     if (!stat(path, &status))
         return S_ISDIR(status.st_mode)
                    ? SPL_OK
-                   : spl_fail(err, SPL_E_USAGE, "%s takes %s, and '%s' is a file", option, takes, path);
+                   : spl_fail(err, SPL_E_USAGE, "-o takes %s, and '%s' is a file", takes, path);
     if (is_of_a_file(spl_cmd_ending(path)))
-        return spl_fail(err, SPL_E_USAGE, "%s takes %s: give '%s' without .%s, or a slash behind it if it is a folder",
-                        option, takes, path, spl_cmd_ending(path));
+        return spl_fail(err, SPL_E_USAGE, "-o takes %s: give '%s' without .%s, or a slash behind it if it is a folder",
+                        takes, path, spl_cmd_ending(path));
     return SPL_OK;
 }

@@ -22,15 +22,15 @@ const char *spl_cmd_group(uint64_t value, char text[32]);
  * ".c", "a.b/" and "..". Borrows from `path`. */
 const char *spl_cmd_ending(const char *path);
 
-/* Fails with SPL_E_USAGE, naming `option`, where `path` does not end in ".`ending`", so that what is written is not
- * taken for something else and is not written over something else. "-" and what is no regular file has any name. */
-int spl_cmd_check_ending(const char *option, const char *path, const char *ending, struct spl_error *err);
+/* Fails with SPL_E_USAGE, naming `option`, where `path` does not end in ".png", so that what is written is not taken
+ * for something else and is not written over something else. "-" and what is no regular file has any name. */
+int spl_cmd_check_png(const char *option, const char *path, struct spl_error *err);
 
 /* The same of the dataset that `command` makes, which may not have been named (NULL) and has one ending, of a file. */
 int spl_cmd_check_dataset(const char *command, const char *path, struct spl_error *err);
 
-/* The same where `path` is to be a folder: a name that ends like a file's is refused, unless it is a folder's already
+/* The same of -o where it is to be a folder: a name that ends like a file's is refused, unless it is a folder's already
  * or a slash says that it is one; so is "-", and a file. `takes`: what the option takes, "a folder". */
-int spl_cmd_check_folder(const char *option, const char *path, const char *takes, struct spl_error *err);
+int spl_cmd_check_folder(const char *path, const char *takes, struct spl_error *err);
 
 #endif

@@ -42,7 +42,7 @@ static int take_output(void *arguments, const char *option, char *text, struct s
 {
     (void)option;
     ((struct arguments *)arguments)->scan.directory = text;
-    return spl_cmd_check_folder("-o", text, "a folder", err);
+    return spl_cmd_check_folder(text, "a folder", err);
 }
 
 static const char *const photo_formats[] = {"png", "jpeg", NULL};

@@ -107,7 +107,7 @@ static int resolve_output(struct arguments *a, struct spl_error *err)
     a->video = !strcasecmp(spl_cmd_ending(output), "mp4");
     if (a->video && !stat(output, &status) && S_ISDIR(status.st_mode))
         return spl_fail(err, SPL_E_USAGE, "'%s' is a folder, where a video cannot be written", output);
-    if (!a->video && (rc = spl_cmd_check_folder("-o", output, "NAME.mp4 or a folder", err)))
+    if (!a->video && (rc = spl_cmd_check_folder(output, "NAME.mp4 or a folder", err)))
         return rc;
     if (a->video && (a->drawing.format >= 0 || a->drawing.layer != SPL_LAYER_COLOR))
         return spl_fail(err, SPL_E_USAGE, "a video is of color and takes no --format; give a folder for images");

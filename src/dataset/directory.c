@@ -36,7 +36,7 @@ int spl_dataset_check_directory(struct spl_dataset *dataset, struct spl_error *e
 {
     struct spl_dataset_info *info = &dataset->info;
     uint64_t bytes;
-    const struct spl_page_row *rows = spl_dataset_get_copy(dataset, SPL_KIND_DIRECTORY, 0, &bytes);
+    const struct spl_page_row *rows = spl_dataset_get_copy(dataset, SPL_KIND_DIRECTORY, &bytes);
     const struct spl_page_row *first = &rows[0], *last = &rows[info->pages];
     if (first->first_node || first->first_chunk || first->first_id || first->first_child != 1)
         return wrong(dataset, err, 0, "does not begin with the first node, chunk and splat");

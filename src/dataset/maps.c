@@ -34,7 +34,7 @@ int spl_dataset_check_stations(struct spl_dataset *dataset, struct spl_error *er
 {
     struct spl_dataset_info *info = &dataset->info;
     uint64_t bytes;
-    const struct spl_map_row *rows = spl_dataset_get_copy(dataset, SPL_KIND_STATIONS, 0, &bytes);
+    const struct spl_map_row *rows = spl_dataset_get_copy(dataset, SPL_KIND_STATIONS, &bytes);
     const uint32_t count = (uint32_t)(bytes / sizeof *rows); // as many as there are maps
     for (uint32_t i = 0; i < count; i++) {
         const char *what = spl_map_judge(&rows[i]);

@@ -149,7 +149,7 @@ static int get_said(struct spl_dataset *dataset, struct spl_error *err)
         return wrong(dataset, err, "description", description, "a text of at most 4000 bytes");
     info->title = json_string_value(title);
     info->description = json_string_value(description);
-    if (views && spl_saved_views_from_json(views, info->default_up, false, dataset->views, &info->view_count, &why))
+    if (views && spl_saved_views_from_json(views, info->default_up, dataset->views, &info->view_count, &why))
         return spl_fail_field(err, SPL_E_CORRUPT, why.field, "%s: section META: %s; pack the dataset again",
                               dataset->name, why.message);
     info->views = dataset->views;
@@ -297,7 +297,7 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
     uint64_t bytes;
-    const char *text = spl_dataset_get_copy(dataset, SPL_KIND_META, 0, &bytes);
+    const char *text = spl_dataset_get_copy(dataset, SPL_KIND_META, &bytes);
     json_error_t where;
     dataset->meta = json_loadb(text, bytes, JSON_REJECT_DUPLICATES, &where);
     if (!dataset->meta)

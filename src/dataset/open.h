@@ -120,9 +120,8 @@ int spl_dataset_check_cancelled(const struct spl_dataset *dataset, struct spl_er
 int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl_section *section, uint64_t *hash,
                              struct spl_error *err);
 
-/* Section `index` of a kind in memory, and its length; NULL and 0 where there is none. */
-const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
-                                 uint64_t *bytes);
+/* The first section of a kind in memory, and its length; NULL and 0 where there is none. */
+const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint64_t *bytes);
 
 /* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held
  * against theirs whenever they are read; fills everything up to `textures` and the sizes in info. */

@@ -38,7 +38,6 @@ struct spl_curl {
 const struct spl_curl *spl_curl_open(struct spl_error *err);
 
 /* Scheme, host and port of a URL; false and "" where it has none. */
-bool spl_curl_get_origin(const struct spl_curl *curl, CURLU *url, char out[SPL_REMOTE_ORIGIN_MAX]);
 bool spl_curl_origin_of(const struct spl_curl *curl, const char *url, char out[SPL_REMOTE_ORIGIN_MAX]);
 
 /* Does what a redirect says lead to origin `own`, or `landed` where that is not ""? It is resolved against *at, which

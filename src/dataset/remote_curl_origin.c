@@ -6,7 +6,7 @@
 #include "dataset/remote_curl.h"
 #include "dataset/remote_link.h"
 
-bool spl_curl_get_origin(const struct spl_curl *curl, CURLU *url, char out[SPL_REMOTE_ORIGIN_MAX])
+static bool get_origin(const struct spl_curl *curl, CURLU *url, char out[SPL_REMOTE_ORIGIN_MAX])
 {
     char *scheme = NULL, *host = NULL, *port = NULL;
     const bool known = !curl->curl_url_get(url, CURLUPART_SCHEME, &scheme, 0) &&
@@ -27,7 +27,7 @@ bool spl_curl_origin_of(const struct spl_curl *curl, const char *url, char out[S
     CURLU *parsed = curl->curl_url();
     *out = '\0';
     const bool known =
-        parsed && !curl->curl_url_set(parsed, CURLUPART_URL, url, 0) && spl_curl_get_origin(curl, parsed, out);
+        parsed && !curl->curl_url_set(parsed, CURLUPART_URL, url, 0) && get_origin(curl, parsed, out);
     curl->curl_url_cleanup(parsed);
     return known;
 }
@@ -39,6 +39,6 @@ bool spl_curl_may_go_on(const struct spl_curl *curl, CURLU *at, const char *loca
     if (bytes >= sizeof text)
         return false;
     snprintf(text, sizeof text, "%.*s", (int)bytes, location);
-    return !curl->curl_url_set(at, CURLUPART_URL, text, 0) && spl_curl_get_origin(curl, at, origin) &&
+    return !curl->curl_url_set(at, CURLUPART_URL, text, 0) && get_origin(curl, at, origin) &&
            (!strcmp(origin, own) || (*landed && !strcmp(origin, landed)));
 }

@@ -157,8 +157,8 @@ const struct spl_saved_view *spl_saved_views_find(const struct spl_saved_view *v
     return NULL;
 }
 
-int spl_saved_views_from_json(const json_t *json, const double up[3], bool strict, struct spl_saved_view *views,
-                              uint32_t *count, struct spl_error *err)
+int spl_saved_views_from_json(const json_t *json, const double up[3], struct spl_saved_view *views, uint32_t *count,
+                              struct spl_error *err)
 {
     *count = 0;
     if (!json_is_array(json) || json_array_size(json) > SPL_SAVED_VIEWS_MAX)
@@ -166,7 +166,7 @@ int spl_saved_views_from_json(const json_t *json, const double up[3], bool stric
     for (size_t i = 0; i < json_array_size(json); i++) {
         struct spl_error why = {0};
         char field[sizeof why.field + 40];
-        int rc = spl_saved_view_from_json(json_array_get(json, i), up, true, strict, &views[i], &why);
+        int rc = spl_saved_view_from_json(json_array_get(json, i), up, true, false, &views[i], &why);
         if (!rc && spl_saved_views_find(views, (uint32_t)i, views[i].name))
             rc = spl_fail_field(&why, SPL_E_INPUT, "name", "'%s' is there twice", views[i].name);
         snprintf(field, sizeof field, "views[%zu].%s", i, why.field);

@@ -25,9 +25,10 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
 int spl_saved_view_from_json(const json_t *json, const double up[3], bool named, bool strict,
                              struct spl_saved_view *view, struct spl_error *err);
 
-/* An array of named views into `views`, room for SPL_SAVED_VIEWS_MAX, sorted by name. Errors say which. */
-int spl_saved_views_from_json(const json_t *json, const double up[3], bool strict, struct spl_saved_view *views,
-                              uint32_t *count, struct spl_error *err);
+/* An array of named views, with whatever other keys, into `views`, room for SPL_SAVED_VIEWS_MAX, sorted by name. Errors
+ * say which. */
+int spl_saved_views_from_json(const json_t *json, const double up[3], struct spl_saved_view *views, uint32_t *count,
+                              struct spl_error *err);
 
 /* NULL without memory. */
 json_t *spl_saved_view_to_json(const struct spl_saved_view *view);

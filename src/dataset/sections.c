@@ -303,12 +303,11 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
-const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint32_t index,
-                                 uint64_t *bytes)
+const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint64_t *bytes)
 {
     const struct spl_section_list *list = &dataset->found[kind];
-    *bytes = index < list->count ? list->at[index]->bytes : 0;
-    return index < list->count ? dataset->copies[list->at[index] - dataset->sections] : NULL;
+    *bytes = list->count ? list->at[0]->bytes : 0;
+    return list->count ? dataset->copies[list->at[0] - dataset->sections] : NULL;
 }
 
 /* What is kept into memory. */

@@ -20,7 +20,7 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const
 int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err)
 {
     uint64_t bytes;
-    const struct spl_atoms_header *header = spl_dataset_get_copy(dataset, SPL_KIND_ATOMS, 0, &bytes);
+    const struct spl_atoms_header *header = spl_dataset_get_copy(dataset, SPL_KIND_ATOMS, &bytes);
     struct spl_dataset_info *info = &dataset->info;
     if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
         header->reserved[1])

@@ -81,8 +81,8 @@ int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct
     return 0;
 }
 
-int spl_form_set(struct spl_value *values, enum spl_camera_param param, const char *source, const double *numbers,
-                 unsigned count, struct spl_error *err)
+static int set(struct spl_value *values, enum spl_camera_param param, const char *source, const double *numbers,
+               unsigned count, struct spl_error *err)
 {
     int rc = spl_value_claim(&values[param], source, err);
     memcpy(values[param].n, numbers, count * sizeof *numbers);
@@ -94,7 +94,7 @@ int spl_form_set(struct spl_value *values, enum spl_camera_param param, const ch
 int spl_form_set_number(struct spl_value *values, enum spl_camera_param param, const char *source, double number,
                         struct spl_error *err)
 {
-    return spl_form_set(values, param, source, &number, 1, err);
+    return set(values, param, source, &number, 1, err);
 }
 
 /* fx, fy, cx, cy. */
@@ -116,14 +116,14 @@ int spl_form_set_bent_lens(struct spl_value *values, const char *source, const d
     memcpy(params + 4, bend, count * sizeof *bend);
     int rc = spl_form_set_number(values, SPL_CAMERA_model, source,
                                  spl_colmap_model_from_name(fisheye ? "OPENCV_FISHEYE" : "FULL_OPENCV"), err);
-    return rc ? rc : spl_form_set(values, SPL_CAMERA_params, source, params, 4 + count, err);
+    return rc ? rc : set(values, SPL_CAMERA_params, source, params, 4 + count, err);
 }
 
 /* A row-major matrix, camera to world. */
 int spl_form_set_pose(struct spl_value *values, const char *source, const double matrix[16], enum spl_axes axes,
                       struct spl_error *err)
 {
-    int rc = spl_form_set(values, SPL_CAMERA_matrix, source, matrix, 16, err);
+    int rc = set(values, SPL_CAMERA_matrix, source, matrix, 16, err);
     return rc ? rc : spl_form_set_number(values, SPL_CAMERA_convention, source, axes, err);
 }
 
@@ -166,7 +166,7 @@ static int read_perspective(const json_t *json, struct spl_value *values, struct
         return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_ASPECT, SPL_GLTF_ASPECT " %g is outside 0.0001 to 10000",
                               aspect);
     const double fov[2] = {yfov * (180 / M_PI), aspect};
-    if ((rc = spl_form_set(values, SPL_CAMERA_fov, yfov_name, fov, 2, err)) ||
+    if ((rc = set(values, SPL_CAMERA_fov, yfov_name, fov, 2, err)) ||
         (rc = spl_form_set_number(values, SPL_CAMERA_near, near_name, near, err)))
         return rc;
     return spl_form_set_number(values, SPL_CAMERA_far, far_name, far, err);
@@ -196,7 +196,7 @@ static int read_orthographic(const json_t *json, struct spl_value *values, struc
         return spl_fail_field(err, SPL_E_INPUT, SPL_GLTF_XMAG, "xmag over ymag is %g, outside 0.0001 to 10000",
                               view[1]);
     if ((rc = spl_form_set_number(values, SPL_CAMERA_projection, path, SPL_ORTHOGRAPHIC, err)) ||
-        (rc = spl_form_set(values, SPL_CAMERA_view_height, ymag_name, view, 2, err)) ||
+        (rc = set(values, SPL_CAMERA_view_height, ymag_name, view, 2, err)) ||
         (rc = spl_form_set_number(values, SPL_CAMERA_near, near_name, near, err)))
         return rc;
     return spl_form_set_number(values, SPL_CAMERA_far, far_name, far, err);

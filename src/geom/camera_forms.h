@@ -11,9 +11,7 @@ const json_t *spl_form_get(const json_t *object, const char *path);
 /* Is it an object of `known` members (ends in NULL) alone? */
 int spl_form_check(const json_t *object, const char *path, const char *const *known, struct spl_error *err);
 
-/* Claim values for `source`, a literal. */
-int spl_form_set(struct spl_value *values, enum spl_camera_param param, const char *source, const double *numbers,
-                 unsigned count, struct spl_error *err);
+/* Claims a value for `source`, a literal. */
 int spl_form_set_number(struct spl_value *values, enum spl_camera_param param, const char *source, double number,
                         struct spl_error *err);
 

@@ -38,7 +38,7 @@ void spl_quaternion_to_matrix(const double q[4], double m[9])
     memcpy(m, out, sizeof out);
 }
 
-void spl_quaternion_multiply(const double a[4], const double b[4], double out[4])
+static void multiply(const double a[4], const double b[4], double out[4])
 {
     double product[4] = {
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -58,7 +58,7 @@ void spl_quaternion_exp(const double v[3], double q[4])
         q[1 + i] = scale * v[i];
 }
 
-void spl_quaternion_log(const double q[4], bool shortest, double v[3])
+static void logarithm(const double q[4], bool shortest, double v[3])
 {
     double sign = shortest && q[0] < 0 ? -1 : 1;
     double sine = sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -70,13 +70,13 @@ void spl_quaternion_log(const double q[4], bool shortest, double v[3])
 void spl_quaternion_turn(const double a[4], const double b[4], bool shortest, double v[3])
 {
     double inverse[4] = {a[0], -a[1], -a[2], -a[3]}, between[4];
-    spl_quaternion_multiply(inverse, b, between);
-    spl_quaternion_log(between, shortest, v);
+    multiply(inverse, b, between);
+    logarithm(between, shortest, v);
 }
 
 void spl_quaternion_advance(const double a[4], const double v[3], double share, double out[4])
 {
     double part[3] = {share * v[0], share * v[1], share * v[2]}, turn[4];
     spl_quaternion_exp(part, turn);
-    spl_quaternion_multiply(a, turn, out);
+    multiply(a, turn, out);
 }

@@ -8,14 +8,11 @@
 void spl_quaternion_from_matrix(const double m[9], double q[4]);
 void spl_quaternion_to_matrix(const double q[4], double m[9]);
 
-void spl_quaternion_multiply(const double a[4], const double b[4], double out[4]);
-
-/* exp: the rotation about `v` by |v| radians. log: its inverse, |v| <= 2 pi; with `shortest` the sign of the quaternion
- * does not matter and |v| <= pi. */
+/* exp: the rotation about `v` by |v| radians. */
 void spl_quaternion_exp(const double v[3], double q[4]);
-void spl_quaternion_log(const double q[4], bool shortest, double v[3]);
 
-/* log(a^-1 b): the turn from a to b in a's own axes. */
+/* log(a^-1 b): the turn from a to b in a's own axes. log is the inverse of exp, |v| <= 2 pi; with `shortest` the sign
+ * of the quaternion does not matter and |v| <= pi. */
 void spl_quaternion_turn(const double a[4], const double b[4], bool shortest, double v[3]);
 
 /* a exp(share v): `share` of the turn `v` away from a. */

@@ -1,449 +1,18 @@
-/* Morton order over the cubic bounds, and exact duplicates out: of equal coordinates the point stays that has a
- * station, a normal, the greater class and colour, and so on. The order is that of the points, not that in which they
- * were read.
- *
- * A stable parallel radix sort of indices, 4 bytes a point; keys are found anew from coordinates, which takes less than
- * to move them. Points go by the first bits of their keys into parts (pieces count, one prefix sum, pieces scatter),
- * then each part is sorted digit by digit, by one worker and in so little memory that it is near. So the result does
- * not depend on the number of threads. Equal keys (a cell of 2^-21 of the cloud) are ordered within their own bounds,
- * recursively, so that a dense cluster in a wide cloud is as well ordered as any other; equal coordinates can only lie
- * in one such run. Beside one stray point far away that can be all the others: a part that is much larger than others
- * is divided by the next bits of its keys, a long run of equal ones in its own cube, by all threads. */
-#include "pack/points.h"
-
-#include <math.h>
-#include <pthread.h>
-#include <stdlib.h>
+/* Points in Morton order over the cubic bounds, exact duplicates out: their order is found as indices (order_sort.c),
+ * and then one array after the other is moved into it. It is that of the points, not that in which they were read. Runs
+ * on the caller's thread; parallel loops end before it goes on. */
 #include <string.h>
 
-#include "base/array.h"
-#include "base/memory.h"
 #include "base/parallel.h"
-#include "geom/morton.h"
-#include "pack/order.h"
-
-enum { digits = 256, threads_max = 64, short_run = 32, long_run = 1 << 16, grain = 1 << 16 };
-/* Each element of these may be in a page of its own, which comes with fifteen others. */
-enum { random_grain = 256 };
-enum { lead_bits = 16, leads = 1 << lead_bits, key_bits = 3 * SPL_MORTON_BITS, parts_most = 1024 };
-static const uint32_t dropped = UINT32_MAX;
-
-struct run { /* points whose keys have all but `bits` bits in common; 0: within a cube of their own */
-    size_t begin, count;
-    double low[3], size; /* of the cube that keys are counted in */
-    unsigned bits;
-};
-
-struct pair {
-    uint64_t key;
-    uint32_t index;
-};
-
-struct sorter { /* of one worker */
-    struct pair *pairs, *spare;
-    size_t capacity;
-};
+#include "pack/order_parts.h"
 
 struct order {
     struct spl_points *points;
-    struct run at;         /* the run at work */
-    uint32_t *index;       /* of all points, as sorted so far; nothing yet while `first` */
-    uint32_t *index_to;    /* of a run that is sorted again */
-    bool first;
-    struct run *runs;      /* that wait */
-    size_t run_count, run_capacity;
-    struct sorter *sorters;
+    uint32_t *index; /* of the points that are kept, as sorted */
+    size_t kept;
     void *spare_of_8, *spare_of_4; /* arrays that are left over, by the size of their elements */
-    size_t piece, part_points;     /* of a piece; at most, of a part of several leads */
-    unsigned pieces, part_count;
-    uint32_t (*leads)[leads];       /* of each piece: points by the first bits of their keys */
-    uint32_t (*to)[parts_most + 2]; /* of each piece: where its next point of a part goes */
-    uint16_t *part_of;              /* of each lead */
-    size_t begin_of[parts_most + 3]; /* of parts, from the run's begin on */
-    double low[threads_max][3], high[threads_max][3];
     struct spl_stage *stage;
-    pthread_mutex_t lock; /* of runs */
-    atomic_bool failed;
 };
-
-static uint32_t get_index(const struct order *o, size_t i)
-{
-    return o->first ? (uint32_t)i : o->index[o->at.begin + i];
-}
-
-static void bounds_piece(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct order *o = context;
-    spl_spill_keep_bound(o->points->spill);
-    for (int c = 0; c < 3; c++) {
-        double low = o->low[worker][c], high = o->high[worker][c];
-        for (size_t i = begin; i < end; i++) {
-            double at = spl_points_at(o->points, c, get_index(o, i));
-            low = at < low ? at : low;
-            high = at > high ? at : high;
-        }
-        o->low[worker][c] = low;
-        o->high[worker][c] = high;
-    }
-}
-
-/* Around the run at work; its far corner goes to `high`. */
-static void find_cube(struct order *o, double high[3])
-{
-    struct run *run = &o->at;
-    for (unsigned t = 0; t < threads_max; t++)
-        for (int c = 0; c < 3; c++)
-            o->low[t][c] = o->high[t][c] = spl_points_at(o->points, c, get_index(o, 0));
-    spl_parallel_for(o->stage->threads, run->count, grain, bounds_piece, o);
-    run->size = 0;
-    run->bits = key_bits;
-    for (int c = 0; c < 3; c++) {
-        run->low[c] = o->low[0][c];
-        high[c] = o->high[0][c];
-        for (unsigned t = 1; t < threads_max; t++) {
-            run->low[c] = fmin(run->low[c], o->low[t][c]);
-            high[c] = fmax(high[c], o->high[t][c]);
-        }
-        run->size = fmax(run->size, high[c] - run->low[c]);
-    }
-}
-
-/* Of a part: cells of all parts lie at the same places, up to those of as many levels as wires are looked for on. Where
- * coordinates are round numbers floors and walls lie: none of the larger cells may end there, for a surface on both
- * sides of such an end is ordered as two that are far apart. So all cells are moved by `aside`, which is exact. */
-static void align_cube(struct order *o)
-{
-    struct spl_points *p = o->points;
-    const double step = p->cells * SPL_CELLS_ALIGNED;
-    const double aside = 1365.0 / 4096; /* a third in few bits: of cells half as large it is one or two thirds again */
-    double size = step;
-    for (int c = 0; c < 3; c++) {
-        o->at.low[c] = p->cube_min[c] = (floor(p->bounds_min[c] / step - aside) + aside) * step;
-        while (!(size > p->bounds_max[c] - o->at.low[c]))
-            size *= 2;
-    }
-    p->cube_size = o->at.size = size;
-}
-
-static void find_whole_cube(struct order *o)
-{
-    struct spl_points *p = o->points;
-    find_cube(o, p->bounds_max);
-    memcpy(p->bounds_min, o->at.low, sizeof p->bounds_min);
-    memcpy(p->cube_min, o->at.low, sizeof p->cube_min);
-    if (p->cells > 0) {
-        align_cube(o);
-        return;
-    }
-    /* The next float up, as the container keeps it: the cube of the file is the cube of the keys. */
-    p->cube_size = o->at.size = o->at.size > 0 ? nextafterf((float)o->at.size, INFINITY) : 1;
-}
-
-uint64_t spl_points_key(const struct spl_points *points, size_t i, const double low[3], double size)
-{
-    uint32_t cell[3];
-    for (int c = 0; c < 3; c++)
-        cell[c] = spl_morton_cell(spl_points_at(points, c, i), low[c], size);
-    return spl_morton_encode(cell[0], cell[1], cell[2]);
-}
-
-/* Where runs are sorted again the stage's end has been reached by then. */
-static void add_done(struct order *o, size_t points, unsigned worker)
-{
-    if (o->first)
-        spl_stage_add(o->stage, points, worker);
-    else
-        spl_spill_keep_bound(o->points->spill);
-}
-
-/* The first bits of a key of those that the run's points do not have in common. */
-static unsigned lead_of(const struct run *run, uint64_t key)
-{
-    return (unsigned)(run->bits > lead_bits ? key >> (run->bits - lead_bits) : key) & (leads - 1);
-}
-
-static uint64_t key_of(const struct order *o, uint32_t index)
-{
-    return spl_points_key(o->points, index, o->at.low, o->at.size);
-}
-
-/* How many points of a piece begin with each lead. */
-static void count_piece(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct order *o = context;
-    uint32_t *count = o->leads[begin / o->piece];
-    memset(count, 0, sizeof *o->leads);
-    for (size_t i = begin; i < end; i++) {
-        count[lead_of(&o->at, key_of(o, get_index(o, i)))]++;
-        if (i % grain == grain - 1)
-            add_done(o, grain / 8, worker);
-    }
-}
-
-static void scatter_piece(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct order *o = context;
-    uint32_t *at = o->to[begin / o->piece], *out = o->first ? o->index : o->index_to;
-    for (size_t i = begin; i < end; i++) {
-        uint32_t index = get_index(o, i);
-        out[at[o->part_of[lead_of(&o->at, key_of(o, index))]]++] = index;
-        if (i % random_grain == 0)
-            spl_spill_keep_bound(o->points->spill);
-        if (i % grain == grain - 1)
-            add_done(o, grain / 8, worker);
-    }
-}
-
-/* Parts: runs of leads with about as many points each, however unevenly these lie. */
-static void divide(struct order *o)
-{
-    size_t most = 2 * o->at.count / parts_most + 1, in_part = 0, sum = 0;
-    o->part_count = 0;
-    o->part_points = most;
-    for (size_t lead = 0; lead < leads; lead++) {
-        size_t points = 0;
-        for (unsigned t = 0; t < o->pieces; t++)
-            points += o->leads[t][lead];
-        if (!lead || (in_part && in_part + points > most)) {
-            for (unsigned t = 0; t < o->pieces; t++)
-                o->to[t][o->part_count] = 0;
-            o->begin_of[o->part_count++] = sum;
-            in_part = 0;
-        }
-        o->part_of[lead] = (uint16_t)(o->part_count - 1);
-        in_part += points;
-        sum += points;
-        for (unsigned t = 0; t < o->pieces; t++)
-            o->to[t][o->part_count - 1] += o->leads[t][lead];
-    }
-    o->begin_of[o->part_count] = sum;
-    for (unsigned part = 0; part < o->part_count; part++) {
-        uint32_t at = (uint32_t)o->begin_of[part];
-        for (unsigned t = 0; t < o->pieces; t++) {
-            uint32_t n = o->to[t][part];
-            o->to[t][part] = at;
-            at += n;
-        }
-    }
-}
-
-static void add_run(struct order *o, const struct run *run)
-{
-    pthread_mutex_lock(&o->lock);
-    if (spl_array_reserve(o->runs, o->run_capacity, o->run_count + 1, NULL))
-        atomic_store(&o->failed, true);
-    else
-        o->runs[o->run_count++] = *run;
-    pthread_mutex_unlock(&o->lock);
-}
-
-static int compare_whole(uint32_t a, uint32_t b)
-{
-    return (a > b) - (a < b);
-}
-
-static int compare_reals(double a, double b)
-{
-    return (a > b) - (a < b);
-}
-
-static int compare_pairs(const void *a, const void *b)
-{
-    const struct pair *p = a, *q = b;
-    if (p->key != q->key)
-        return p->key < q->key ? -1 : 1;
-    return p->index < q->index ? -1 : p->index > q->index;
-}
-
-/* Which of two points at one place comes first: by what they have beside it. 0 where that is the same too. */
-static int compare_points(const struct spl_points *p, uint32_t a, uint32_t b)
-{
-    int order = p->station ? compare_whole(p->station[a], p->station[b]) : 0; /* SPL_NO_STATION is the greatest */
-    for (int c = 0; p->normal && !order && c < 3; c++)
-        order = compare_reals((double)p->normal[b][c], (double)p->normal[a][c]);
-    if (!order)
-        order = compare_whole(p->color_class[b], p->color_class[a]);
-    for (int s = 0; !order && s < SPL_POINT_SCALARS; s++)
-        if (p->scalar[s].values)
-            order = compare_whole(spl_scalar_number(&p->scalar[s], a), spl_scalar_number(&p->scalar[s], b));
-    return order;
-}
-
-/* Of points at one place. */
-static void keep_one(const struct spl_points *p, uint32_t *index, size_t n)
-{
-    for (size_t i = 1; i < n; i++) {
-        if (i % random_grain == 0)
-            spl_spill_keep_bound(p->spill);
-        index[0] = compare_points(p, index[i], index[0]) < 0 ? index[i] : index[0];
-        index[i] = dropped;
-    }
-}
-
-/* Each level divides the extent by 2^21, so doubles end the recursion after a few. `index` is ascending at first, and
- * so is each run of equal keys. */
-static void order_run(struct order *o, uint32_t *index, size_t n)
-{
-    const struct spl_points *p = o->points;
-    double low[3], size = 0;
-    spl_spill_keep_bound(p->spill);
-    for (int c = 0; c < 3; c++) {
-        double high = low[c] = spl_points_at(p, c, index[0]);
-        for (size_t i = 1; i < n; i++) {
-            double v = spl_points_at(p, c, index[i]);
-            low[c] = v < low[c] ? v : low[c];
-            high = v > high ? v : high;
-        }
-        size = fmax(size, high - low[c]);
-    }
-    if (size == 0) {
-        keep_one(p, index, n);
-        return;
-    }
-    struct pair few[short_run], *many = n <= short_run ? NULL : spl_alloc_raw(n, sizeof *many, NULL);
-    struct pair *pairs = n <= short_run ? few : many;
-    if (!pairs) {
-        atomic_store(&o->failed, true);
-        return;
-    }
-    for (size_t i = 0; i < n; i++)
-        pairs[i] = (struct pair){spl_points_key(p, index[i], low, size), index[i]};
-    qsort(pairs, n, sizeof *pairs, compare_pairs);
-    for (size_t i = 0; i < n; i++)
-        index[i] = pairs[i].index;
-    for (size_t i = 0, end; i < n; i = end) {
-        for (end = i + 1; end < n && pairs[end].key == pairs[i].key;)
-            end++;
-        if (end - i > 1)
-            order_run(o, index + i, end - i);
-    }
-    free(many);
-}
-
-/* Digit by digit from the last on, between the sorter's two arrays; returns the one that has the result. */
-static const struct pair *sort_pairs(struct sorter *s, size_t n)
-{
-    uint32_t count[8][digits] = {0};
-    struct pair *from = s->pairs, *to = s->spare;
-    for (size_t i = 0; i < n; i++)
-        for (unsigned d = 0; d < 8; d++)
-            count[d][from[i].key >> 8 * d & (digits - 1)]++;
-    for (unsigned d = 0; d < 8; d++) {
-        uint32_t *at = count[d], sum = 0;
-        if (at[from[0].key >> 8 * d & (digits - 1)] == n)
-            continue;
-        for (unsigned v = 0; v < digits; v++) {
-            uint32_t some = at[v];
-            at[v] = sum;
-            sum += some;
-        }
-        for (size_t i = 0; i < n; i++)
-            to[at[from[i].key >> 8 * d & (digits - 1)]++] = from[i];
-        struct pair *other = from;
-        from = to;
-        to = other;
-    }
-    return from;
-}
-
-static bool reserve_pairs(struct sorter *s, size_t n)
-{
-    if (n <= s->capacity)
-        return true;
-    free(s->pairs);
-    free(s->spare);
-    s->capacity = 0;
-    s->pairs = spl_alloc_raw(n, sizeof *s->pairs, NULL);
-    s->spare = spl_alloc_raw(n, sizeof *s->spare, NULL);
-    s->capacity = s->pairs && s->spare ? n : 0;
-    return s->capacity;
-}
-
-/* A part of the run at work, which begins at point `first` of all. */
-static void sort_part(struct order *o, struct sorter *s, uint32_t *index, size_t first, size_t n)
-{
-    if (n > o->part_points && n > long_run) { /* of one lead: there is more to tell its points by */
-        struct run rest = o->at;
-        rest.begin = first;
-        rest.count = n;
-        rest.bits = o->at.bits > lead_bits ? o->at.bits - lead_bits : 0;
-        add_run(o, &rest);
-        return;
-    }
-    if (!reserve_pairs(s, n)) {
-        atomic_store(&o->failed, true);
-        return;
-    }
-    for (size_t i = 0; i < n; i++) {
-        if (i % random_grain == 0)
-            spl_spill_keep_bound(o->points->spill);
-        s->pairs[i] = (struct pair){key_of(o, index[i]), index[i]};
-    }
-    const struct pair *pairs = sort_pairs(s, n);
-    for (size_t i = 0; i < n; i++)
-        index[i] = pairs[i].index;
-    for (size_t i = 0, end; i < n; i = end) {
-        for (end = i + 1; end < n && pairs[end].key == pairs[i].key;)
-            end++;
-        if (end - i > long_run)
-            add_run(o, &(struct run){.begin = first + i, .count = end - i});
-        else if (end - i > 1)
-            order_run(o, index + i, end - i);
-    }
-}
-
-static void sort_parts(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct order *o = context;
-    uint32_t *index = o->first ? o->index : o->index_to;
-    for (size_t part = begin; part < end; part++) {
-        size_t first = o->begin_of[part], n = o->begin_of[part + 1] - first;
-        if (n)
-            sort_part(o, &o->sorters[worker], index + first, o->at.begin + first, n);
-        add_done(o, n / 2, worker);
-    }
-}
-
-/* The run at work, whose points have some bits of their keys to be told by; what is left of it are runs. */
-static void sort_run(struct order *o)
-{
-    o->piece = (o->at.count + o->stage->threads - 1) / o->stage->threads;
-    o->piece = o->piece < grain ? grain : o->piece;
-    o->pieces = (unsigned)((o->at.count + o->piece - 1) / o->piece); /* fewer than threads, where there are few */
-    spl_parallel_for(o->stage->threads, o->at.count, o->piece, count_piece, o);
-    divide(o);
-    spl_parallel_for(o->stage->threads, o->at.count, o->piece, scatter_piece, o);
-    spl_parallel_for(o->stage->threads, o->part_count, 1, sort_parts, o);
-    for (size_t i = 0, some; !o->first && i < o->at.count; i += some) {
-        some = o->at.count - i < grain ? o->at.count - i : grain;
-        spl_spill_keep_bound(o->points->spill);
-        memcpy(o->index + o->at.begin + i, o->index_to + i, some * sizeof *o->index);
-    }
-}
-
-static void order_all(struct order *o)
-{
-    double high[3];
-    o->first = true;
-    find_whole_cube(o);
-    sort_run(o);
-    o->first = false;
-    while (o->run_count && !atomic_load(&o->failed)) {
-        o->at = o->runs[--o->run_count];
-        if (!o->at.bits)
-            find_cube(o, high);
-        if (!(o->at.size > 0)) {
-            keep_one(o->points, o->index + o->at.begin, o->at.count);
-            continue;
-        }
-        o->index_to = spl_spill_alloc_raw(o->points->spill, o->at.count, sizeof *o->index_to, NULL);
-        if (o->index_to)
-            sort_run(o);
-        else
-            atomic_store(&o->failed, true);
-        spl_spill_free(o->points->spill, o->index_to);
-    }
-}
 
 struct permutation {
     struct spl_spill *spill;
@@ -479,14 +48,14 @@ static int permute(struct order *o, void **array, size_t size, struct spl_error 
     p.to = spare && *spare ? *spare : spl_spill_alloc_raw(spill, o->points->count + SPL_POINTS_PAD, size, err);
     if (!p.to)
         return SPL_E_NOMEM;
-    spl_parallel_for(o->stage->threads, o->at.count, spill ? random_grain : grain, permute_piece, &p);
-    memset(p.to + o->at.count * size, 0, SPL_POINTS_PAD * size);
+    spl_parallel_for(o->stage->threads, o->kept, spill ? SPL_ORDER_RANDOM_GRAIN : SPL_ORDER_GRAIN, permute_piece, &p);
+    memset(p.to + o->kept * size, 0, SPL_POINTS_PAD * size);
     if (spare)
         *spare = *array;
     else
         spl_spill_free(spill, *array);
     *array = p.to;
-    spl_stage_add(o->stage, o->at.count / 32, 0);
+    spl_stage_add(o->stage, o->kept / 32, 0);
     return 0;
 }
 
@@ -494,63 +63,21 @@ static void drop_duplicates(struct order *o)
 {
     size_t kept = 0;
     for (size_t i = 0; i < o->points->count; i++)
-        if (o->index[i] != dropped)
+        if (o->index[i] != SPL_ORDER_DROPPED)
             o->index[kept++] = o->index[i];
     o->points->duplicates = o->points->count - kept;
-    o->at.count = kept;
-}
-
-static void finish(struct order *o, unsigned threads)
-{
-    struct spl_spill *spill = o->points->spill;
-    spl_spill_free(spill, o->index);
-    spl_spill_free(spill, o->spare_of_8);
-    spl_spill_free(spill, o->spare_of_4);
-    for (unsigned t = 0; o->sorters && t < threads; t++) {
-        free(o->sorters[t].pairs);
-        free(o->sorters[t].spare);
-    }
-    free(o->sorters);
-    free(o->leads);
-    free(o->to);
-    free(o->part_of);
-    free(o->runs);
-    pthread_mutex_destroy(&o->lock);
-}
-
-/* What sorting alone needs. */
-static void finish_sorting(struct order *o, unsigned threads)
-{
-    for (unsigned t = 0; t < threads; t++) {
-        free(o->sorters[t].pairs);
-        free(o->sorters[t].spare);
-        o->sorters[t] = (struct sorter){0};
-    }
-    free(o->leads);
-    o->leads = NULL;
+    o->kept = kept;
 }
 
 int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct spl_error *err)
 {
-    struct order o = {.points = points, .at.count = points->count, .stage = stage};
-    int rc = SPL_E_NOMEM;
-    pthread_mutex_init(&o.lock, NULL);
+    struct order o = {.points = points, .stage = stage};
     spl_stage_begin(stage, "ordering", "points", points->count);
     o.index = spl_spill_alloc_raw(points->spill, points->count, sizeof *o.index, err);
-    o.leads = spl_alloc_raw(stage->threads, sizeof *o.leads, err);
-    o.to = spl_alloc_raw(stage->threads, sizeof *o.to, err);
-    o.part_of = spl_alloc_raw(leads, sizeof *o.part_of, err);
-    o.sorters = spl_alloc(stage->threads, sizeof *o.sorters, err);
-    if (!o.index || !o.leads || !o.to || !o.part_of || !o.sorters)
+    int rc = o.index ? spl_order_sort(points, o.index, stage, err) : SPL_E_NOMEM;
+    if (rc)
         goto done;
-    order_all(&o);
-    if (atomic_load(&o.failed)) {
-        rc = spl_fail(err, SPL_E_NOMEM, "out of memory while ordering %zu points", points->count);
-        goto done;
-    }
-    finish_sorting(&o, stage->threads);
     drop_duplicates(&o);
-    rc = 0;
     for (int c = 0; c < 3 && !rc; c++)
         rc = permute(&o, (void **)&points->axis[c], spl_points_axis_bytes(points), err);
     if (!rc)
@@ -564,8 +91,10 @@ int spl_points_order(struct spl_points *points, struct spl_stage *stage, struct 
     for (int s = 0; s < SPL_POINT_SCALARS && !rc; s++)
         rc = permute(&o, &points->scalar[s].values, spl_scalar_bytes(&points->scalar[s]), err);
     spl_stage_finish(stage);
-    points->count = points->capacity = o.at.count;
+    points->count = points->capacity = o.kept;
 done:
-    finish(&o, stage->threads);
+    spl_spill_free(points->spill, o.index);
+    spl_spill_free(points->spill, o.spare_of_8);
+    spl_spill_free(points->spill, o.spare_of_4);
     return rc;
 }

@@ -23,6 +23,8 @@ void spl_renderer_set_work_a_step(struct spl_renderer *renderer, uint64_t work);
 /* How long a step may take where that is known, and how long a unit of work is said to take, 0 = not known. After
  * spl_renderer_set_work_a_step(), with which steps have so much work however long it takes. */
 void spl_renderer_set_pace(struct spl_renderer *renderer, uint64_t step_ns, double work_ns);
+/* How many more kernels are kept than a service does (render/kernels.h): each is made once where so many are enough. */
+void spl_renderer_set_kernels_more(struct spl_renderer *renderer, size_t more);
 /* Whether discs are drawn by the kernels for hardware (shaders/common/walk.glsl) or those for software drivers. */
 void spl_renderer_set_shares(struct spl_renderer *renderer, bool shares);
 

@@ -43,8 +43,8 @@ void spl_kernels_begin(struct spl_kernels *kernels, struct spl_gpu *gpu, bool pa
 {
     kernels->parallel = parallel;
     kernels->turn++;
-    if (kernels->count > SPL_KERNELS_MOST)
-        while (kernels->count > SPL_KERNELS_KEPT)
+    if (kernels->count > SPL_KERNELS_MOST + kernels->more)
+        while (kernels->count > SPL_KERNELS_KEPT + kernels->more)
             drop_oldest(kernels, gpu);
 }
 

@@ -26,6 +26,7 @@ struct spl_kernels {
     size_t count, capacity;
     uint64_t turn; /* the tile's that is recorded: when a kernel was used */
     bool parallel; /* the frame's rays are: what is got is made so */
+    size_t more;   /* than SPL_KERNELS_MOST may be kept, for whoever goes round in more */
 };
 
 enum { SPL_KERNELS_MOST = 128, SPL_KERNELS_KEPT = 96 };

@@ -206,6 +206,11 @@ void spl_renderer_set_pace(struct spl_renderer *renderer, uint64_t wanted_ns, do
         renderer->work_ns[method] = work_ns;
 }
 
+void spl_renderer_set_kernels_more(struct spl_renderer *renderer, size_t more)
+{
+    renderer->kernels.more = more;
+}
+
 void spl_renderer_set_shares(struct spl_renderer *renderer, bool shares)
 {
     renderer->shares = shares;

@@ -39,9 +39,9 @@ static void set_text(struct request *request, unsigned status, const char *type,
         spl_reply_add_header(request, MHD_HTTP_HEADER_CONTENT_TYPE, "%s", type);
 }
 
-void spl_reply_empty(struct request *request, unsigned status)
+void spl_reply_empty(struct request *request)
 {
-    request->status = status;
+    request->status = MHD_HTTP_NO_CONTENT;
     request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT);
 }
 

@@ -14,7 +14,7 @@ void spl_reply_problem(struct request *request, unsigned status, const char *typ
                        const char *detail);
 void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
-void spl_reply_empty(struct request *request, unsigned status);
+void spl_reply_empty(struct request *request); /* 204 */
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */
 /* 200; `release` gets `context` once `bytes` have been sent, not after failure. What is long is handed on in pieces:
  * the kernel takes all it is given and carries it to a near client at once, 16 MB in 18 ms of the loop. */

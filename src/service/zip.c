@@ -35,8 +35,8 @@ bool spl_zip_append(struct archive *zip, const void *bytes, size_t length)
     return !length || archive_write_data(zip, bytes, length) == (la_ssize_t)length;
 }
 
-bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length, time_t seconds)
+bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length)
 {
-    return spl_zip_begin(zip, name, length, seconds) && spl_zip_append(zip, bytes, length) &&
+    return spl_zip_begin(zip, name, length, 0) && spl_zip_append(zip, bytes, length) &&
            archive_write_finish_entry(zip) == ARCHIVE_OK;
 }

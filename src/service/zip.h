@@ -12,10 +12,11 @@
  * which calls `write` once more where archive_write_close() has not been called. */
 struct archive *spl_zip_open(void *context, archive_write_callback *write);
 
-/* Adds a file of mode 0644; `seconds` is its time, 0 = none. False without memory, or when `write` failed. */
-bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length, time_t seconds);
+/* Adds a file of mode 0644 without a time. False without memory, or when `write` failed. */
+bool spl_zip_add(struct archive *zip, const char *name, const void *bytes, size_t length);
 
-/* The same piece by piece: append `length` bytes in all; the next entry, or the archive's end, ends it. */
+/* The same piece by piece: append `length` bytes in all; the next entry, or the archive's end, ends it. `seconds` is
+ * its time, 0 = none. */
 bool spl_zip_begin(struct archive *zip, const char *name, uint64_t length, time_t seconds);
 bool spl_zip_append(struct archive *zip, const void *bytes, size_t length);
 

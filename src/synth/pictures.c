@@ -122,8 +122,7 @@ static int open_text(struct text *text, struct spl_error *err)
 }
 
 /* Closes and frees the text and, unless `result` says that something failed before, writes it. */
-static int write_text(const struct run *r, struct text *text, const char *name, const char *extension, int result,
-                      struct spl_error *err)
+static int write_text(const struct run *r, struct text *text, const char *name, int result, struct spl_error *err)
 {
     if (!text->stream)
         return result;
@@ -131,7 +130,7 @@ static int write_text(const struct run *r, struct text *text, const char *name, 
     if ((fclose(text->stream) || failed) && !result)
         result = spl_fail(err, SPL_E_NOMEM, "out of memory for a list of poses");
     if (!result)
-        result = write_bytes(r, name, extension, text->bytes, text->count, err);
+        result = write_bytes(r, name, "txt", text->bytes, text->count, err);
     free(text->bytes);
     return result;
 }
@@ -171,9 +170,9 @@ static int write_photos(struct run *r, struct spl_error *err)
     }
     if (!result)
         result = begin(r, "photos/sparse/0", "poses", 0, err);
-    result = write_text(r, &cameras, "cameras", "txt", result, err);
-    result = write_text(r, &points, "points3D", "txt", result, err);
-    return write_text(r, &poses, "images", "txt", result, err);
+    result = write_text(r, &cameras, "cameras", result, err);
+    result = write_text(r, &points, "points3D", result, err);
+    return write_text(r, &poses, "images", result, err);
 }
 
 static json_t *numbers(const double *values, int count)

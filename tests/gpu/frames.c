@@ -13,6 +13,7 @@
 
 #include "gpu/frames.h"
 #include "gpu/gpu.h"
+#include "render/fault.h"
 #include "support/reference.h"
 
 enum { all_layers = (1 << SPL_LAYER_COUNT) - 1 };
@@ -151,6 +152,13 @@ struct spl_view looking(const double center[3], double distance, uint32_t width,
     return view;
 }
 
+/* Tests go round in all methods and layers, which are more kernels than a renderer keeps: each would be made anew every
+ * time, which takes longer than what it draws. */
+void keep_kernels(struct spl_renderer *of)
+{
+    spl_renderer_set_kernels_more(of, 1000);
+}
+
 int frames_run(int argc, char **argv, const char *name, const struct CMUnitTest *tests, size_t count)
 {
     device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
@@ -160,6 +168,7 @@ int frames_run(int argc, char **argv, const char *name, const struct CMUnitTest 
         fprintf(stderr, "skipped: %s\n", err.message);
         return 77;
     }
+    keep_kernels(renderer);
     int failed = _cmocka_run_group_tests(name, tests, count, NULL, NULL);
     spl_renderer_destroy(renderer);
     if (spl_gpu_count_complaints())

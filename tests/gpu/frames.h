@@ -28,6 +28,9 @@ int frames_seed(void **state);
 /* Runs the tests on the device that the command line or SPLATD_TEST_DEVICE names; the exit code, 77 without it. */
 int frames_run(int argc, char **argv, const char *name, const struct CMUnitTest *tests, size_t count);
 
+/* The program's renderer keeps all its kernels; so does this one then. */
+void keep_kernels(struct spl_renderer *of);
+
 struct tally {
     size_t pixels, covered_differs, depth_differs, color_differs, id_differs, normal_differs, primitive_differs;
     double depth_worst;

@@ -300,6 +300,7 @@ static void tiles_leave_no_seams(void **state)
     struct spl_renderer_options options = {.size = sizeof options, .device = device, .scratch_samples = 160 * 160};
     struct spl_renderer *small;
     assert_int_equal(spl_renderer_create(&options, &small, NULL), SPL_OK);
+    keep_kernels(small);
     for (uint64_t seed = 1; seed <= TEST_SIZE(2, 1); seed++) {
         random_state = seed;
         struct spl_dataset *dataset = random_panels(seed % 2 ? 30 : 4, 500, origin, seed % 2 ? 0.004 : 0.03,

@@ -44,7 +44,8 @@ static void fail_memory(struct spl_e57_parser *p)
     XML_StopParser(p->xml, XML_FALSE);
 }
 
-const char *spl_e57_parser_below(const struct spl_e57_parser *p, const char *place)
+/* What of the path lies below `place`: "" for the place itself, NULL elsewhere. */
+static const char *path_below(const struct spl_e57_parser *p, const char *place)
 {
     size_t length = strlen(place);
     return strncmp(p->path, place, length) == 0 && (p->path[length] == '/' || !p->path[length]) ? p->path + length
@@ -218,9 +219,9 @@ static void XMLCALL begin_element(void *context, const char *name, const char **
         begin_scan(p);
     else if (!strcmp(p->path, image_path))
         begin_image(p);
-    else if ((below = spl_e57_parser_below(p, scan_path)))
+    else if ((below = path_below(p, scan_path)))
         begin_in_scan(p, below, attributes);
-    else if ((below = spl_e57_parser_below(p, image_path)))
+    else if ((below = path_below(p, image_path)))
         begin_in_image(p, below, attributes);
 }
 
@@ -246,9 +247,9 @@ static void XMLCALL end_element(void *context, const char *name)
     const char *below;
     if (p->code < 0)
         return;
-    if (p->leaf && (below = spl_e57_parser_below(p, scan_path)))
+    if (p->leaf && (below = path_below(p, scan_path)))
         spl_e57_parser_set_scan(p, &d->scans[d->scan_count - 1], below);
-    else if (p->leaf && (below = spl_e57_parser_below(p, image_path)))
+    else if (p->leaf && (below = path_below(p, image_path)))
         spl_e57_parser_set_image(p, &d->images[d->image_count - 1], below);
     else if (p->leaf && !strcmp(p->path, "/e57Root/coordinateMetadata") && p->text_length && !d->coordinates) {
         d->coordinates = spl_alloc_raw(p->text_length + 1, 1, p->err);

@@ -25,9 +25,6 @@ struct spl_e57_parser {
 int spl_e57_parser_fail(struct spl_e57_parser *p, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* What of the path lies below `place`: "" for the place itself, NULL elsewhere. */
-const char *spl_e57_parser_below(const struct spl_e57_parser *p, const char *place);
-
 /* Values from text; "" is the number 0. False: the parser has failed, naming `name`. */
 bool spl_e57_parser_number(struct spl_e57_parser *p, const char *name, const char *text, double *value);
 bool spl_e57_parser_integer(struct spl_e57_parser *p, const char *name, const char *text, int64_t *value);

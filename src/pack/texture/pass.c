@@ -38,7 +38,7 @@ static int allocate(struct spl_photo_pass *pass, const struct spl_dataset *datas
     uint64_t memory = pass->options->memory_bytes ? pass->options->memory_bytes : memory_default, largest = 0;
     bool colored = spl_dataset_get_info(dataset)->has_color;
     for (uint32_t i = 0; i < pass->report->photographs; i++) {
-        uint64_t bytes = spl_photo_bytes(&pass->list->views[i], SPL_PHOTO_DEPTH_SIDE);
+        uint64_t bytes = spl_photo_bytes(&pass->list->views[i]);
         largest = bytes > largest ? bytes : largest;
     }
     uint64_t each = sizeof *pass->chosen.photo + 3 + (colored ? 3 : 0), depth = SPL_CANDIDATES_MAX;
@@ -75,7 +75,7 @@ static int look(struct spl_photo_pass *pass, const struct spl_dataset *dataset, 
         const struct spl_named_view *view = &pass->list->views[i];
         struct spl_photo photo;
         struct spl_error why = {0};
-        if (!(rc = spl_photo_open(&photo, view, &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, &why))) {
+        if (!(rc = spl_photo_open(&photo, view, &whole, pass->renderer, dataset, &why))) {
             uint64_t seen = spl_candidates_look(&pass->candidates, &pass->splats, &photo, (uint16_t)i, pass->stage);
             spl_photo_close(&photo);
             if (!seen && spl_photo_is_face(view))

@@ -8,8 +8,6 @@
 #include "pack/texture/pass.h"
 #include "pack/texture/textures.h"
 
-enum { SPL_PHOTO_DEPTH_SIDE = 1600 };
-
 /* Owned by the thread that owns the renderer. */
 struct spl_photo_pass {
     const struct spl_photo_options *options;

@@ -11,7 +11,7 @@
 #include "base/memory.h"
 #include "geom/size.h"
 
-enum { black = 6, border_steps = 32 };
+enum { black = 6, border_steps = 32, depth_side = 1600 /* samples, at most */ };
 static const double widest = 5; /* tangent of the angle off the axis to which depth is drawn */
 
 /* Mean difference of neighbours in green. */
@@ -91,13 +91,13 @@ static void find_extent(const struct spl_named_view *view, double low[2], double
     }
 }
 
-static struct spl_camera find_depth_camera(const struct spl_named_view *view, uint32_t side)
+static struct spl_camera find_depth_camera(const struct spl_named_view *view)
 {
     struct spl_camera camera = view->camera;
     double low[2], high[2];
     find_extent(view, low, high);
     double span = fmax((high[0] - low[0]) * camera.fx, (high[1] - low[1]) * camera.fy);
-    double scale = fmin(1, side / span);
+    double scale = fmin(1, depth_side / span);
     spl_camera_scale(&camera, scale, scale);
     camera.cx = -low[0] * camera.fx;
     camera.cy = -low[1] * camera.fy;
@@ -106,9 +106,9 @@ static struct spl_camera find_depth_camera(const struct spl_named_view *view, ui
     return camera;
 }
 
-uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side)
+uint64_t spl_photo_bytes(const struct spl_named_view *view)
 {
-    struct spl_camera depth = find_depth_camera(view, depth_side);
+    struct spl_camera depth = find_depth_camera(view);
     uint64_t whole = spl_photo_is_face(view) ? (uint64_t)view->inner->width * view->inner->height * 4 : 0;
     return whole + (uint64_t)view->camera.width * view->camera.height * 4 * 4 / 3 +
            (uint64_t)depth.width * depth.height * 4;
@@ -149,8 +149,7 @@ static int render_depth(struct spl_photo *photo, struct spl_renderer *renderer, 
 }
 
 int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_photo_whole *whole,
-                   struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t depth_side,
-                   struct spl_error *err)
+                   struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_image pixels = {0};
     struct spl_image_info info;
@@ -159,7 +158,7 @@ int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, s
     if (rc || (rc = spl_photo_image_load_of(whole, view, &pixels, err)) ||
         (rc = spl_photo_init(photo, view, &pixels, err)))
         return rc;
-    photo->depth_camera = find_depth_camera(view, depth_side);
+    photo->depth_camera = find_depth_camera(view);
     if ((rc = render_depth(photo, renderer, dataset, err)))
         spl_photo_close(photo);
     return rc;

@@ -25,14 +25,12 @@ static inline bool spl_photo_is_face(const struct spl_named_view *view)
     return view->inner && view->inner->is_panorama;
 }
 
-/* Loads the view's photograph (a panorama stays in `whole` for its next face) and renders the dataset's depth, at most
- * `depth_side` samples a side. Refuses what is no photograph of this pose: other sizes than the camera's, CMYK, 16 bit
- * channels, nothing but black, an eye that stands within splats, a view without any; SPL_PHOTO_EMPTY instead of a fault
- * for a face of a panorama that shows nothing or sees no splat. Errors name the file. Unless it is SPL_OK nothing is
- * held. Blocks. */
+/* Loads the view's photograph (a panorama stays in `whole` for its next face) and renders the dataset's depth. Refuses
+ * what is no photograph of this pose: other sizes than the camera's, CMYK, 16 bit channels, nothing but black, an eye
+ * that stands within splats, a view without any; SPL_PHOTO_EMPTY instead of a fault for a face of a panorama that shows
+ * nothing or sees no splat. Errors name the file. Unless it is SPL_OK nothing is held. Blocks. */
 int spl_photo_open(struct spl_photo *photo, const struct spl_named_view *view, struct spl_photo_whole *whole,
-                   struct spl_renderer *renderer, const struct spl_dataset *dataset, uint32_t depth_side,
-                   struct spl_error *err);
+                   struct spl_renderer *renderer, const struct spl_dataset *dataset, struct spl_error *err);
 void spl_photo_close(struct spl_photo *photo);
 
 /* The same without a renderer, for pixels (taken over, also on failure) and depth that are there already; `depth` may
@@ -41,7 +39,7 @@ int spl_photo_init(struct spl_photo *photo, const struct spl_named_view *view, s
                    struct spl_error *err);
 
 /* What an opened photograph holds, and the panorama that it is a face of. */
-uint64_t spl_photo_bytes(const struct spl_named_view *view, uint32_t depth_side);
+uint64_t spl_photo_bytes(const struct spl_named_view *view);
 
 /* How world point `p` at view depth `depth` lies to the splats in front of it. `slack`: metres that count as the same
  * surface. */

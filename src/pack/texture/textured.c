@@ -33,8 +33,7 @@ static int choose_size(struct spl_photo_pass *pass, const struct spl_dataset *da
     uint32_t best = 0;
     for (uint32_t i = 0; i < pass->report->photographs; i++)
         best = pass->uses[i] > pass->uses[best] ? i : best;
-    int rc = spl_photo_open(&photo, &pass->list->views[best], &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE,
-                            err);
+    int rc = spl_photo_open(&photo, &pass->list->views[best], &whole, pass->renderer, dataset, err);
     spl_photo_whole_finish(&whole);
     if (rc)
         return rc;
@@ -67,7 +66,7 @@ static int take_textures(struct spl_photo_pass *pass, const struct spl_dataset *
             spl_stage_add(pass->stage, pass->splats.chunk_count, 0);
             continue;
         }
-        rc = spl_photo_open(&photo, &pass->list->views[i], &whole, pass->renderer, dataset, SPL_PHOTO_DEPTH_SIDE, err);
+        rc = spl_photo_open(&photo, &pass->list->views[i], &whole, pass->renderer, dataset, err);
         if (rc)
             break;
         rc = spl_textures_take(textures, &pass->splats, &pass->candidates, &pass->chosen, pass->gains, &photo,

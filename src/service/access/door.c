@@ -88,7 +88,7 @@ bool spl_door_check_preflight(struct request *request, const char *method)
     if (strcmp(method, MHD_HTTP_METHOD_OPTIONS) || !allowed_origin(request) ||
         !get_header(request, "Access-Control-Request-Method"))
         return true;
-    spl_reply_empty(request, MHD_HTTP_NO_CONTENT);
+    spl_reply_empty(request);
     if (!request->response)
         return false;
     MHD_add_response_header(request->response, "Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, DELETE");

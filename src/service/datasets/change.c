@@ -145,7 +145,7 @@ static void remove_slot(struct change *change, struct spl_catalog_slot *slot)
     if (slot)
         spl_catalog_remove_slot(&change->service->library->catalog, slot);
     if (change->request)
-        spl_reply_empty(change->request, MHD_HTTP_NO_CONTENT);
+        spl_reply_empty(change->request);
     spl_change_finish(change);
 }
 

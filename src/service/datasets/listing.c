@@ -33,12 +33,12 @@ static int compare(const void *a, const void *b)
     return order ? order : (p->place > q->place) - (p->place < q->place);
 }
 
-/* The first of them stay. */
-static void keep(struct spl_catalog_files *files, size_t most)
+/* The first SPL_CATALOG_MAX of them stay. */
+static void keep_first(struct spl_catalog_files *files)
 {
     if (files->count)
         qsort(files->items, files->count, sizeof *files->items, compare);
-    for (; files->count > most; files->left_out++)
+    for (; files->count > SPL_CATALOG_MAX; files->left_out++)
         free(files->items[--files->count].path);
 }
 
@@ -47,7 +47,7 @@ static int add_file(struct spl_catalog_files *files, const char *directory, cons
 {
     char *path = NULL;
     if (files->count == 2 * SPL_CATALOG_MAX)
-        keep(files, SPL_CATALOG_MAX);
+        keep_first(files);
     if (spl_array_reserve(files->items, files->capacity, files->count + 1, err))
         return SPL_E_NOMEM;
     if (asprintf(&path, "%s%s%s", directory, *directory ? "/" : "", name) < 0)
@@ -130,7 +130,7 @@ int spl_catalog_list(char *const *paths, size_t path_count, struct spl_catalog_f
             files->unlisted[files->unlisted_count++] = paths[i];
         spl_fail(&files->why, why.code, "%s", why.message);
     }
-    keep(files, SPL_CATALOG_MAX);
+    keep_first(files);
     size_t there = 0;
     for (size_t i = 0; i < files->count; i++)
         if (look(&files->items[i]))

@@ -75,7 +75,7 @@ static int parse_file(struct spl_saved *saved, struct spl_error *err)
     json_t *json = json_load_file(saved->path, JSON_REJECT_DUPLICATES, &where);
     if (!json)
         return spl_fail(err, SPL_E_CORRUPT, "%s in line %d", where.text, where.line);
-    int rc = spl_saved_views_from_json(json_object_get(json, "views"), saved->info->default_up, false, saved->views,
+    int rc = spl_saved_views_from_json(json_object_get(json, "views"), saved->info->default_up, saved->views,
                                        &saved->count, err);
     json_decref(json);
     return rc;

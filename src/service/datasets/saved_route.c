@@ -78,7 +78,7 @@ static void after(uv_work_t *work, int status)
         if (saving->err.code) {
             spl_reply_error(request, &saving->err);
         } else if (saving->removes) {
-            spl_reply_empty(request, MHD_HTTP_NO_CONTENT);
+            spl_reply_empty(request);
         } else {
             spl_reply_json(request, describe(saving));
             request->status = saving->fresh ? MHD_HTTP_CREATED : MHD_HTTP_OK;

@@ -85,7 +85,7 @@ static void sweep(struct spl_pipeline *pipeline, struct spl_queue *queue)
 int spl_pipeline_let_in(struct spl_pipeline *pipeline, struct spl_job *job, struct spl_error *err)
 {
     job->large = spl_request_is_large(&job->request);
-    const unsigned of = job->whole ? job->whole->of : 1; // that share what it counts for
+    const unsigned of = job->part.whole ? job->part.whole->spread.of : 1; // that share what it counts for
     job->samples = job->samples_left = (get_samples(&job->request) + of - 1) / of;
     job->bytes = (spl_view_get_frame_bytes(&job->request.view) + of - 1) / of;
     struct spl_load *load = get_load(pipeline, job);

@@ -76,8 +76,8 @@ static int write_zip(FILE *stream, const struct spl_part *parts, size_t count, s
     char *index = make_index(parts, count);
     bool good = zip && index;
     for (size_t i = 0; good && i < count; i++)
-        good = spl_zip_add(zip, parts[i].name, parts[i].bytes, parts[i].length, 0);
-    good = good && spl_zip_add(zip, "index.json", index, strlen(index), 0) && archive_write_close(zip) == ARCHIVE_OK;
+        good = spl_zip_add(zip, parts[i].name, parts[i].bytes, parts[i].length);
+    good = good && spl_zip_add(zip, "index.json", index, strlen(index)) && archive_write_close(zip) == ARCHIVE_OK;
     int rc = good ? 0 : spl_fail(err, SPL_E_NOMEM, "out of memory for a ZIP file of %zu images", count);
     archive_write_free(zip);
     free(index);

@@ -240,10 +240,10 @@ static bool submit_parts(struct spl_fleet *fleet, struct spl_job *job)
     if (count < 2 || spl_parts_begin(job, count, NULL))
         return false;
     for (unsigned i = 0; i < count; i++)
-        spl_parts_submit(job, i, idle[i], NULL); // the others draw what one has no room for
-    if (!job->away)
+        spl_parts_submit(job, i, idle[i]); // the others draw what one has no room for
+    if (!job->spread.away)
         spl_parts_undo(job);
-    return job->away;
+    return job->spread.away;
 }
 
 int spl_fleet_submit(struct spl_fleet *fleet, struct spl_job *job, struct spl_error *err)
@@ -274,11 +274,11 @@ static struct spl_job *take_part(struct spl_fleet *fleet, struct spl_job *part, 
     struct spl_job *whole;
     unsigned number;
     enum spl_parts_state state = spl_parts_take(part, &whole, &number);
-    whole->lost |= part->err.code == SPL_E_DEVICE_LOST ? 1u << device : 0;
+    whole->spread.lost |= part->err.code == SPL_E_DEVICE_LOST ? 1u << device : 0;
     if (state == SPL_PARTS_LEFT) {
-        struct spl_pipeline *pipeline = whole->again ? NULL : choose(fleet, whole, whole->lost);
-        whole->again = true;
-        if (pipeline && !spl_parts_submit(whole, number, pipeline, NULL))
+        struct spl_pipeline *pipeline = whole->spread.again ? NULL : choose(fleet, whole, whole->spread.lost);
+        whole->spread.again = true;
+        if (pipeline && spl_parts_submit(whole, number, pipeline))
             state = SPL_PARTS_INSIDE;
         else
             spl_parts_give_back(whole);
@@ -291,7 +291,7 @@ struct spl_job *spl_fleet_take(struct spl_fleet *fleet)
 {
     for (size_t i = 0; i < fleet->count; i++)
         for (struct spl_job *job; (job = spl_pipeline_take(fleet->pipelines[i]));)
-            if (!job->whole || (job = take_part(fleet, job, i)))
+            if (!job->part.whole || (job = take_part(fleet, job, i)))
                 return job;
     return NULL;
 }

@@ -85,9 +85,10 @@ static int begin(struct gpu *gpu, struct spl_job *job)
         return spl_fail(&job->err, replica->err.code, "%s", replica->err.message);
     spl_gpu_inject(gpu);
     const struct spl_view *view = &job->request.view;
-    int rc = job->whole ? spl_frame_begin_spread(gpu->renderer, job->dataset, view, job->whole->spread, job->number,
-                                                 &job->steps, &job->err)
-                        : spl_frame_begin(gpu->renderer, job->dataset, view, &job->steps, &job->err);
+    const struct spl_job_part *part = &job->part;
+    int rc = part->whole ? spl_frame_begin_spread(gpu->renderer, job->dataset, view, part->whole->spread.frame,
+                                                  part->number, &job->steps, &job->err)
+                         : spl_frame_begin(gpu->renderer, job->dataset, view, &job->steps, &job->err);
     if (!rc) {
         spl_frame_set_cancel(job->steps, &spl_job_get_whole(job)->dropped);
         spl_frame_set_gives_way(job->steps, gives_way, gpu);
@@ -113,16 +114,16 @@ static void follow(_Atomic uint64_t *mean, uint64_t took)
 static void complete(struct gpu *gpu, struct spl_job *job)
 {
     struct spl_pipeline *pipeline = gpu->pipeline;
-    job->drew_last = job->whole && spl_frame_drew_last(job->steps);
+    job->part.drew_last = job->part.whole && spl_frame_drew_last(job->steps);
     spl_frame_end(job->steps, &job->frame);
     job->steps = NULL;
-    if (!job->whole || job->drew_last) {
+    if (!job->part.whole || job->part.drew_last) {
         gpu->frames++;
         atomic_store(&pipeline->frames, gpu->frames);
         spl_count(pipeline->options.counters, frames);
         follow(&pipeline->frame_ns, job->frame_ns);
     }
-    if (job->whole || job->frame.stats.pages_loaded)
+    if (job->part.whole || job->frame.stats.pages_loaded)
         spl_gpu_publish_residency(gpu);
     else
         atomic_store(&pipeline->device_bytes, spl_renderer_get_memory(gpu->renderer));
@@ -219,7 +220,7 @@ static bool serve(struct gpu *gpu, struct spl_job *job)
     }
     complete(gpu, job);
     detach(gpu, job);
-    if ((job->whole && !job->drew_last) || spl_pipeline_pass_on(pipeline, job))
+    if ((job->part.whole && !job->part.drew_last) || spl_pipeline_pass_on(pipeline, job))
         spl_pipeline_finish_job(pipeline, job);
     return true;
 }

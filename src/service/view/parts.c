@@ -20,42 +20,39 @@ bool spl_parts_can(const struct spl_job *job)
 
 int spl_parts_begin(struct spl_job *job, unsigned of, struct spl_error *err)
 {
-    int rc = spl_spread_create(&job->request.view, of, &job->spread, err);
-    job->of = rc ? 0 : of;
+    int rc = spl_spread_create(&job->request.view, of, &job->spread.frame, err);
+    job->spread.of = rc ? 0 : of;
     return rc;
 }
 
 void spl_parts_undo(struct spl_job *job)
 {
-    spl_assert(!job->parts);
-    spl_spread_destroy(job->spread);
-    job->spread = NULL;
-    job->of = 0;
+    spl_assert(!job->spread.parts);
+    spl_spread_destroy(job->spread.frame);
+    job->spread = (struct spl_job_spread){0};
 }
 
-int spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline, struct spl_error *err)
+bool spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline)
 {
-    struct spl_job *part = spl_alloc(1, sizeof *part, err);
+    struct spl_job *part = spl_alloc(1, sizeof *part, NULL);
     if (!part)
-        return SPL_E_NOMEM;
-    part->whole = whole;
-    part->number = number;
-    whole->parts++;
+        return false;
+    part->part = (struct spl_job_part){.whole = whole, .number = number};
+    whole->spread.parts++;
     if (whole->entry)
         part->entry = spl_catalog_entry_ref(whole->entry);
     part->dataset = whole->dataset;
     part->request = whole->request;
     part->accepted_ns = whole->accepted_ns;
     part->deadline_ns = SPL_NEVER; // the whole's counts
-    int rc = spl_pipeline_submit(pipeline, part, err);
-    if (rc) {
+    if (spl_pipeline_submit(pipeline, part, NULL)) {
         spl_job_destroy(part);
-        return rc;
+        return false;
     }
-    whole->away = true;
-    whole->inside++;
+    whole->spread.away = true;
+    whole->spread.inside++;
     whole->large = part->large;
-    return SPL_OK;
+    return true;
 }
 
 /* What the loop says and counts of the job. */
@@ -76,27 +73,29 @@ static void take_result(struct spl_job *whole, struct spl_job *part)
 
 void spl_parts_give_back(struct spl_job *whole)
 {
-    whole->away = false;
+    whole->spread.away = false;
     spl_cancel_set(&whole->dropped); // parts that are inside have nothing left to do
 }
 
 enum spl_parts_state spl_parts_take(struct spl_job *part, struct spl_job **out, unsigned *number)
 {
-    struct spl_job *whole = *out = part->whole;
+    const struct spl_job_part *of = &part->part;
+    struct spl_job *whole = *out = of->whole;
+    struct spl_job_spread *spread = &whole->spread;
     enum spl_parts_state state = SPL_PARTS_INSIDE;
     bool lost = part->err.code == SPL_E_DEVICE_LOST;
-    *number = part->number;
-    whole->inside--;
-    if (whole->away && (part->drew_last || (part->err.code && !lost))) {
-        if (part->drew_last)
+    *number = of->number;
+    spread->inside--;
+    if (spread->away && (of->drew_last || (part->err.code && !lost))) {
+        if (of->drew_last)
             take_result(whole, part);
         whole->err = part->err;
         spl_parts_give_back(whole);
         state = SPL_PARTS_BACK;
-    } else if (whole->away && lost) {
+    } else if (spread->away && lost) {
         whole->err = part->err; // as long as nobody has drawn what it left
     }
-    if (whole->away && !whole->inside)
+    if (spread->away && !spread->inside)
         state = SPL_PARTS_LEFT;
     return state;
 }

@@ -17,8 +17,8 @@ bool spl_parts_can(const struct spl_job *job);
 int spl_parts_begin(struct spl_job *job, unsigned of, struct spl_error *err);
 void spl_parts_undo(struct spl_job *job);
 
-/* Gives its part `number` to a device; fails as spl_pipeline_submit() does. */
-int spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline, struct spl_error *err);
+/* Gives its part `number` to a device; false: that has no room, or there is no memory. */
+bool spl_parts_submit(struct spl_job *whole, unsigned number, struct spl_pipeline *pipeline);
 
 enum spl_parts_state {
     SPL_PARTS_INSIDE, /* others go on */

@@ -18,19 +18,19 @@ void spl_job_destroy(struct spl_job *job)
 {
     if (!job)
         return;
-    if (job->parts) {
-        job->given_up = true;
+    if (job->spread.parts) {
+        job->spread.given_up = true;
         spl_cancel_set(&job->dropped);
         return;
     }
-    struct spl_job *whole = job->whole;
-    spl_spread_destroy(job->spread);
+    struct spl_job *whole = job->part.whole;
+    spl_spread_destroy(job->spread.frame);
     spl_frame_finish(&job->frame);
     spl_encoded_finish(&job->encoded);
     spl_catalog_entry_unref(job->entry);
     spl_rays_destroy((struct spl_rays *)job->request.view.rays);
     free(job);
-    if (whole && !--whole->parts && (whole->given_up || whole->away))
+    if (whole && !--whole->spread.parts && (whole->spread.given_up || whole->spread.away))
         spl_job_destroy(whole);
 }
 

@@ -24,6 +24,25 @@
 #include "service/request/request.h"
 #include "service/view/plan.h"
 
+struct spl_job;
+
+/* Of a part of a view that several devices draw, see parts.h. */
+struct spl_job_part {
+    struct spl_job *whole; // which holds it; NULL: it is none
+    unsigned number;       /* of its stretch of the image, below the whole's `of` */
+    bool drew_last;        /* it has the whole's frame, or bytes of it */
+};
+
+/* Of a whole. Owned by the loop but for the frame, which parts draw into. */
+struct spl_job_spread {
+    struct spl_spread *frame; // NULL: it is none
+    unsigned of, parts;       /* how many draw it; parts that there are */
+    unsigned inside;          /* parts in pipelines */
+    bool away, given_up;      /* it is with its parts; it was destroyed, and goes with them */
+    uint32_t lost;            /* bit per device that a part of it was lost with */
+    bool again;               /* a part was made anew */
+};
+
 struct spl_job {
     struct spl_catalog_entry *entry;   /* one reference; may be NULL in tests, as may `plan` */
     const struct spl_dataset *dataset; /* of it */
@@ -35,17 +54,8 @@ struct spl_job {
     size_t frame_number;               /* of it */
     void *owner;                       // owned by: loop
     void (*done)(struct spl_job *job); /* takes the job when it has come back to the loop; NULL: it is destroyed */
-
-    /* Of a frame that several devices draw, see parts.h. */
-    struct spl_job *whole;     // of a part, which holds it; NULL: it is none
-    unsigned number;           /* of a part, below of */
-    bool drew_last;            /* a part that has the whole's frame, or bytes of it */
-    struct spl_spread *spread; // of a whole
-    unsigned of, parts;        /* of a whole: how many draw it; parts that there are. Owned by the loop, as the next */
-    unsigned inside;           /* parts in pipelines */
-    bool away, given_up;       /* it is with its parts; it was destroyed, and goes with them */
-    uint32_t lost;             /* bit per device that a part of it was lost with */
-    bool again;                /* a part was made anew */
+    struct spl_job_part part;
+    struct spl_job_spread spread;
 
     TAILQ_ENTRY(spl_job) turn; // owned by: gpu, as the next three; while it waits for one
     bool in_turns;
@@ -79,7 +89,7 @@ void spl_job_destroy(struct spl_job *job);
 /* Who says whether it is dropped, and how long it has: the job, or what it is part of. */
 static inline struct spl_job *spl_job_get_whole(struct spl_job *job)
 {
-    return job->whole ? job->whole : job;
+    return job->part.whole ? job->part.whole : job;
 }
 
 struct spl_pipeline_options {

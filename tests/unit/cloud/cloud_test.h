@@ -76,7 +76,7 @@ struct loaded {
     struct spl_error err;
     char format[8];
     uint32_t attributes, station_count;
-    uint64_t points, skipped, expected, end_offset;
+    uint64_t points, skipped, expected;
     bool at_most, surveyors;
     char guessed[192], unused[200], footer[192];
     const char *north; /* static */
@@ -128,7 +128,6 @@ static inline void load_path(const char *path, const char *columns, size_t capac
         snprintf(l->footer, sizeof l->footer, "%s", info->footer);
         snprintf(l->unused, sizeof l->unused, "%s", info->unused);
         l->colors = info->colors;
-        l->end_offset = spl_cloud_get_offset(cloud);
         for (uint32_t s = 0; s < info->station_count && s < 4; s++)
             memcpy(l->station[s], info->stations[s], sizeof l->station[s]);
         spl_cloud_destroy(cloud);

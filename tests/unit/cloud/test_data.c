@@ -220,8 +220,8 @@ static void large_scans(void **state)
 {
     static const struct {
         const char *path;
-        uint64_t points, bytes;
-    } large[] = {{"grenoble.ply", 11605395, 197291923}, {"street.las", 1460879, 49670113}};
+        uint64_t points;
+    } large[] = {{"grenoble.ply", 11605395}, {"street.las", 1460879}};
     const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     (void)state;
     for (size_t i = 0; i < sizeof large / sizeof *large; i++) {
@@ -238,7 +238,6 @@ static void large_scans(void **state)
         assert_int_equal(l.code, 0);
         assert_int_equal(l.points, large[i].points);
         assert_int_equal(l.expected, large[i].points);
-        assert_int_equal(l.end_offset, large[i].bytes);
         assert_true(l.attributes & SPL_CLOUD_COLOR);
         loaded_finish(&l);
     }

@@ -84,6 +84,28 @@ static void test_the_oldest_go(void **state)
     assert_int_equal(fake.kernels, before); // all of them were still there
 }
 
+/* Who asks for more goes round in as many without making one twice. */
+static void test_more_are_kept(void **state)
+{
+    (void)state;
+    enum { many = 2 * SPL_KERNELS_MOST };
+    struct spl_gpu_kernel *got[many];
+    kernels.more = many;
+    for (uint32_t round = 0; round < 2; round++)
+        for (uint32_t i = 0; i < many; i++) {
+            spl_kernels_begin(&kernels, &gpu, false);
+            if (round)
+                assert_ptr_equal(get(i), got[i]);
+            got[i] = get(i);
+        }
+    assert_int_equal(fake.kernels, many);
+    for (uint32_t i = 0; i <= many; i++) {
+        spl_kernels_begin(&kernels, &gpu, false);
+        get(many + i);
+    }
+    assert_true(fake.kernels <= SPL_KERNELS_MOST + many + 1);
+}
+
 /* Rays that are parallel are other kernels. */
 static void test_parallel_ones_are_others(void **state)
 {
@@ -100,6 +122,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_a_bound, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_a_tile_of_many, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_the_oldest_go, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_more_are_kept, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_parallel_ones_are_others, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

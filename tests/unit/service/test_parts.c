@@ -100,13 +100,13 @@ static void others_have_one_device(void **state)
     jobs[2]->request.planned = true;
     for (int i = 0; i < 3; i++) {
         submit(fleet, jobs[i]);
-        assert_null(jobs[i]->spread);
+        assert_null(jobs[i]->spread.frame);
         finish(fleet, jobs[i]);
     }
     struct spl_job *small = make_small();
     submit(fleet, small);
     submit(fleet, jobs[3]);
-    assert_null(jobs[3]->spread);
+    assert_null(jobs[3]->spread.frame);
     assert_int_equal(look(fleet, 1).samples_inside, 1280 * 1024);
     for (int i = 0; i < 2; i++)
         spl_job_destroy(take_job(fleet));
@@ -125,7 +125,7 @@ static void what_a_lost_device_had_others_draw(void **state)
     assert_int_equal(finish(fleet, job), 0); // by the first device, which is lost in its next frame
     job = make_large(60000);
     submit(fleet, job);
-    assert_non_null(job->spread);
+    assert_non_null(job->spread.frame);
     assert_int_equal(finish(fleet, job), 0);
     assert_int_equal(counters.device_losses, 1);
     unsetenv("SPLATD_INJECT_LOSS_AFTER");
