@@ -9,7 +9,13 @@
  * each joins the one that it has most votes with, all edges between the two together; then votes are counted again,
  * until no two pieces touch. So two halves of a road are not joined by way of the bush that stands on both. Votes are
  * integers: what comes of them depends on nothing but the points. Blocks are done in parallel, then their pieces are
- * joined in the same way. */
+ * joined in the same way.
+ *
+ * Where nobody says what is seen, what is level mostly is ground or a roof, and shows upwards. A wall with ground on
+ * both of its sides tells one of them to show downwards, and so does a bush half of the time. So level points and
+ * others make pieces of their own, and where two trees join that hold large level pieces, "both up" has votes of its
+ * own: a fraction of what the whole border of these would have. A ceiling hangs on its walls by all of its border, and
+ * they still tell it to show down. */
 #include "pack/orient.h"
 
 #include <math.h>
@@ -17,19 +23,24 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "pack/eyes.h"
 
 #define SPL_INLINE static inline __attribute__((always_inline))
 
 static const float certain = 0.8f; /* agreement of an edge */
 #define ORIENT_VOTE (1 << 20)      /* of an edge whose normals agree */
+static const double level = 0.8;   /* how far a normal shows up or down; a roof's, too */
+enum { large = 1024 };             /* points of a level piece that counts */
+static const double border = 1; /* votes for "both up" of what is level and has a point; sqrt(n) times as many of n */
 
 /* Trees of points, or of pieces: all that know their signs relative to each other. */
 struct forest {
     uint32_t *parent;
     uint8_t *flip;     /* sign relative to the parent */
     uint8_t *anchored; /* of roots: the tree is never turned */
+    int64_t *level;    /* of roots: points of large level pieces that show upwards, less those that show downwards */
     uint32_t *best;    /* scratch: the edge of each root that has most votes */
-    uint32_t *place;   /* scratch: where the edges of each root lie */
+    uint32_t *place;   /* scratch: where the edges of each root lie, then whether it has joined another in this round */
     uint32_t count;    /* of all of these */
 };
 
@@ -40,8 +51,10 @@ int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, stru
     orient->label = spl_alloc_raw(capacity, sizeof *orient->label, err);
     orient->anchored = spl_alloc_raw(capacity, sizeof *orient->anchored, err);
     orient->place = spl_alloc_raw(capacity, sizeof *orient->place, err);
+    orient->level = spl_alloc_raw(capacity, sizeof *orient->level, err);
     orient->edges = spl_alloc_raw(2 * capacity * k, sizeof *orient->edges, err);
-    bool enough = orient->parent && orient->flip && orient->label && orient->anchored && orient->place && orient->edges;
+    bool enough = orient->parent && orient->flip && orient->label && orient->anchored && orient->place &&
+                  orient->level && orient->edges;
     return enough ? 0 : SPL_E_NOMEM;
 }
 
@@ -52,6 +65,7 @@ void spl_orient_finish(struct spl_orient *orient)
     free(orient->label);
     free(orient->anchored);
     free(orient->place);
+    free(orient->level);
     free(orient->edges);
 }
 
@@ -132,6 +146,8 @@ static void join(struct forest *f, uint32_t a, uint32_t b, bool opposed)
     }
     f->parent[rb] = ra;
     f->flip[rb] = sa ^ sb ^ opposed;
+    if (!f->anchored[ra])
+        f->level[ra] += f->flip[rb] ? -f->level[rb] : f->level[rb];
 }
 
 static int compare_edges(const void *a, const void *b)
@@ -206,20 +222,44 @@ static void take_best(struct forest *f, const struct spl_orient_edge *edges, uin
         f->best[root] = (uint32_t)edge;
 }
 
+/* Votes for two roots to show to the same side, by what is level in their trees. */
+static int64_t count_up(const struct forest *f, uint32_t a, uint32_t b)
+{
+    int64_t x = f->level[a], y = f->level[b], least = llabs(x) < llabs(y) ? llabs(x) : llabs(y);
+    int64_t votes = llrint(border * sqrt((double)least) * ORIENT_VOTE);
+    return (x < 0) == (y < 0) ? votes : -votes;
+}
+
+/* Joins the trees of an edge's ends. Where up says something else than the edge, and one of the two trees has joined
+ * another in this round, there may be more edges between them: then it waits until these are counted together. */
+static void join_ends(struct forest *f, const struct spl_orient_edge *edge)
+{
+    uint8_t sa, sb;
+    uint32_t a = find_root(f, edge->a, &sa), b = find_root(f, edge->b, &sb);
+    int64_t up = sa == sb ? count_up(f, a, b) : -count_up(f, a, b);
+    bool opposed = edge->votes + up < 0;
+    if (opposed != (edge->votes < 0) && (f->place[a] || f->place[b]))
+        return;
+    join(f, edge->a, edge->b, opposed);
+    f->place[a] = f->place[b] = 1;
+}
+
 /* Joins all that touches, as the head of this file says. Each round joins at least the two whose edge is the first of
  * those with most votes, and mostly halves the number of trees. */
 static void vote(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
 {
     while ((count = unite(f, edges, spare, count)) > 0) {
-        for (size_t e = 0; e < count; e++)
+        for (size_t e = 0; e < count; e++) {
             f->best[edges[e].a] = f->best[edges[e].b] = UINT32_MAX;
+            f->place[edges[e].a] = f->place[edges[e].b] = 0;
+        }
         for (size_t e = 0; e < count; e++) {
             take_best(f, edges, edges[e].a, e);
             take_best(f, edges, edges[e].b, e);
         }
         for (size_t e = 0; e < count; e++)
             if (f->best[edges[e].a] == e || f->best[edges[e].b] == e)
-                join(f, edges[e].a, edges[e].b, edges[e].votes < 0);
+                join_ends(f, &edges[e]);
     }
 }
 
@@ -302,7 +342,18 @@ static void find_agreements(const struct graph *g, uint32_t *surface)
     agree_all(g, surface);
 }
 
-/* Joins what lies on surfaces; `surface` says of each point whether it does. */
+/* Fills in which way each point is level, if anybody cares, and has `surface` tell those that are from others. */
+static void find_level(const struct graph *g, int64_t *levels, bool cares, uint32_t *surface)
+{
+    for (uint32_t i = 0; i < g->count; i++) {
+        double outward = cares ? spl_eyes_get_outward(g->points, g->begin + i) : 0;
+        levels[i] = (outward > level) - (outward < -level);
+        if (surface[i] && levels[i])
+            surface[i] = 2;
+    }
+}
+
+/* Joins what lies on surfaces; `surface` says of each point on which kind it does, 0 = on none. */
 static void join_surfaces(const struct graph *g, struct forest *f, const uint32_t *surface)
 {
     for (uint32_t i = 0; i < g->count; i++) {
@@ -311,8 +362,8 @@ static void join_surfaces(const struct graph *g, struct forest *f, const uint32_
         for (unsigned a = 0; surface[i] && a < g->k; a++) {
             uint32_t j;
             float agreement = g->agreement[(size_t)i * g->k + a];
-            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] && f->parent[j] != root &&
-                find_root(f, j, &sign) != root) {
+            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] == surface[i] &&
+                f->parent[j] != root && find_root(f, j, &sign) != root) {
                 join(f, i, j, agreement < 0);
                 root = find_root(f, i, &sign);
             }
@@ -347,7 +398,8 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 {
     uint32_t n = (uint32_t)(end - begin), components = 0, first_anchored = UINT32_MAX;
     const struct graph graph = {points, begin, n, neighbours, (float *)(orient->edges + (size_t)n * k), k};
-    struct forest forest = {orient->parent, orient->flip, orient->anchored, orient->label, orient->place, n};
+    struct forest forest = {
+        orient->parent, orient->flip, orient->anchored, orient->level, orient->label, orient->place, n};
     for (uint32_t i = 0; i < n; i++) {
         if (orient->anchored[i] && first_anchored == UINT32_MAX)
             first_anchored = i;
@@ -355,7 +407,11 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
         orient->flip[i] = 0;
     }
     find_agreements(&graph, orient->label);
+    find_level(&graph, orient->level, first_anchored == UINT32_MAX && !points->eye_count, orient->label);
     join_surfaces(&graph, &forest, orient->label);
+    for (uint32_t i = 0; i < n; i++)
+        if (orient->parent[i] != i || llabs(orient->level[i]) < large)
+            orient->level[i] = 0;
     vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
     for (uint32_t i = 0; i < n; i++) {
         uint8_t sign;
@@ -365,8 +421,10 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
     }
     /* Roots are numbered where they stand; parent is free to hold the numbers now. */
     for (uint32_t i = 0; i < n; i++)
-        if (orient->label[i] == i)
+        if (orient->label[i] == i) {
+            orient->level[components] = orient->level[i];
             orient->parent[i] = components++;
+        }
     for (uint32_t i = 0; i < n; i++)
         orient->label[i] = orient->parent[orient->label[i]];
     return components;
@@ -378,15 +436,18 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
     struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err),
                             spl_alloc(count, 1, err),
                             spl_alloc_raw(count, 1, err),
+                            spl_alloc_raw(count, sizeof *forest.level, err),
                             spl_alloc(count, sizeof *forest.best, err),
                             spl_alloc_raw(count, sizeof *forest.place, err),
                             (uint32_t)count};
     struct spl_orient_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
     double *outward = spl_alloc(count, sizeof *outward, err);
-    bool enough = forest.parent && forest.flip && forest.anchored && forest.best && forest.place && spare && outward;
+    bool enough = forest.parent && forest.flip && forest.anchored && forest.level && forest.best && forest.place &&
+                  spare && outward;
     for (size_t i = 0; enough && i < count; i++) {
         forest.parent[i] = (uint32_t)i;
         forest.anchored[i] = components[i].anchored;
+        forest.level[i] = components[i].anchored ? 0 : components[i].level;
     }
     if (enough)
         vote(&forest, edges, spare, edge_count);
@@ -403,6 +464,7 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
     free(forest.parent);
     free(forest.flip);
     free(forest.anchored);
+    free(forest.level);
     free(forest.best);
     free(forest.place);
     spl_spill_free(spill, spare);

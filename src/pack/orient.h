@@ -7,8 +7,9 @@
 /* A set of points whose normals have settled signs relative to each other: all within one block. */
 struct spl_component {
     double outward; /* sum over its normals of spl_eyes_get_outward() */
-    bool anchored; /* holds a point whose normal was given or faces its station: the set is never turned */
-    uint8_t flip;  /* result of spl_orient_components(): 1 = turn the set's normals */
+    int64_t level;  /* points of its large level pieces that show up, less those that show down; 0: it has no say */
+    bool anchored;  /* holds a point whose normal was given or faces its station: the set is never turned */
+    uint8_t flip;   /* result of spl_orient_components(): 1 = turn the set's normals */
 };
 
 /* What neighbours say of the signs of two points, or of two components. */
@@ -28,6 +29,7 @@ struct spl_orient {
     uint32_t *label;               /* out: component of each point, numbered from 0 in the block */
     uint8_t *anchored;             /* in: 1 where the normal's side is known */
     uint32_t *place;               /* where the edges of each root lie */
+    int64_t *level;                /* out: of each component, as in struct spl_component */
     struct spl_orient_edge *edges; /* 2 * capacity * k of them */
 };
 

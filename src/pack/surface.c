@@ -94,6 +94,8 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
     block->components = spl_alloc(block->component_count, sizeof *block->components, NULL);
     if (!block->components)
         return false;
+    for (uint32_t c = 0; c < block->component_count; c++)
+        block->components[c].level = o->level[c];
     for (size_t i = begin; i < end; i++) {
         struct spl_component *c = &block->components[o->label[i - begin]];
         c->outward += spl_eyes_get_outward(s->points, i);

@@ -495,7 +495,7 @@ static void what_is_asked_for_is_left(void **state)
         double within;
         enum spl_pack_primitives primitives;
     } rows[] = {{6000, 10, 1.1, SPL_PRIMITIVES_OFF},  {6000, 30, 1.1, SPL_PRIMITIVES_OFF},
-                {6000, 100, 1.2, SPL_PRIMITIVES_OFF}, {30000, 100, 1.1, SPL_PRIMITIVES_OFF},
+                {6000, 100, 1.2, SPL_PRIMITIVES_OFF}, {30000, 100, 1.2, SPL_PRIMITIVES_OFF},
                 {60000, 10, TEST_SIZE(1.1, 1.15), SPL_PRIMITIVES_ALL}, {40, 1000, 60, SPL_PRIMITIVES_OFF}};
     (void)state;
     skip_under_tsan();

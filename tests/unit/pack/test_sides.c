@@ -1,0 +1,208 @@
+/* Which way what is level shows where nobody says so: ground upwards, whatever stands on it; ceilings into their room.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "clouds.h"
+#include "pack/order.h"
+#include "pack/orient.h"
+
+enum { points_most = 60000 };
+static const double step = 0.05, noise = 0.003;
+
+/* A cloud in the making, upright; `up` says which axis becomes its z. */
+struct scene {
+    double (*position)[3];
+    size_t count;
+    uint64_t random;
+    int up;
+};
+
+static struct scene begin(int up)
+{
+    struct scene s = {spl_alloc(points_most, sizeof(double[3]), NULL), 0, 7, up};
+    assert_non_null(s.position);
+    return s;
+}
+
+static void add(struct scene *s, double x, double y, double z)
+{
+    const double at[3] = {x, y, z};
+    assert_true(s->count < points_most);
+    for (int c = 0; c < 3; c++)
+        s->position[s->count][(c + s->up + 1) % 3] = at[c] + noise * (2 * uniform(&s->random) - 1);
+    s->count++;
+}
+
+/* The rectangle from `low` to `high`, which are the same in one coordinate. */
+static void add_sheet(struct scene *s, const double low[3], const double high[3])
+{
+    int flat = low[0] == high[0] ? 0 : low[1] == high[1] ? 1 : 2, u = (flat + 1) % 3, v = (flat + 2) % 3;
+    for (double a = low[u]; a <= high[u]; a += step)
+        for (double b = low[v]; b <= high[v]; b += step) {
+            double at[3];
+            at[flat] = low[flat];
+            at[u] = a + 0.4 * step * uniform(&s->random);
+            at[v] = b + 0.4 * step * uniform(&s->random);
+            add(s, at[0], at[1], at[2]);
+        }
+}
+
+/* Normals of the scene, of which nothing is left; the caller finishes the points. */
+static struct spl_points finish(struct scene *s, int threads)
+{
+    struct spl_points p = cloud_of((const double(*)[3])s->position, s->count);
+    struct spl_stage stage = quiet_stage((unsigned)threads);
+    for (int c = 0; c < 3; c++)
+        p.up[c] = c == s->up;
+    free(s->position);
+    assert_int_equal(spl_points_order(&p, &stage, NULL), 0);
+    assert_int_equal(spl_surface(&p, 12, true, &stage, NULL), 0);
+    return p;
+}
+
+/* Of the points below `height`, how many of those that are level show downwards. */
+static size_t count_down(const struct spl_points *p, int up, double height, size_t *level)
+{
+    size_t down = 0;
+    *level = 0;
+    for (size_t i = 0; i < p->count; i++)
+        if (p->axis[up][i] < height && fabsf(p->normal[i][up]) > 0.9f) {
+            ++*level;
+            down += p->normal[i][up] < 0;
+        }
+    return down;
+}
+
+static void check_ground(struct scene *s, int threads)
+{
+    int up = s->up;
+    size_t level;
+    struct spl_points p = finish(s, threads);
+    size_t down = count_down(&p, up, 0.05, &level);
+    assert_true(level > 10000);
+    if (down > level / 100)
+        fail_msg("axis %d: %zu of the ground's %zu points show downwards", up, down, level);
+    spl_points_finish(&p);
+}
+
+/* Ground beside a wall at x = 0, from 0.3 on; it reaches the wall in one place, flat or bending upwards. */
+static void add_yard(struct scene *s, int side, bool bends)
+{
+    double near = side * step, away = side * 0.3, far = side * 4;
+    add_sheet(s, (double[3]){fmin(away, far), 0, 0}, (double[3]){fmax(away, far), 4, 0});
+    if (!bends)
+        add_sheet(s, (double[3]){fmin(near, away), 1.5, 0}, (double[3]){fmax(near, away), 2.5, 0});
+    for (double angle = 0; bends && angle < M_PI / 2; angle += step / 0.3)
+        for (double y = 1.9; y <= 2.1; y += step)
+            add(s, away * (1 - sin(angle)), y + 0.4 * step * uniform(&s->random), 0.3 * (1 - cos(angle)));
+}
+
+/* A wall of one sheet between two yards: as a surface it has one side, so it tells one of the yards to show downwards.
+ * It was half of the ground that did. */
+static void test_a_wall_turns_no_yard(void **state)
+{
+    (void)state;
+    for (int up = 0; up < 3; up++)
+        for (int bends = 0; bends < 2; bends++) {
+            struct scene s = begin(up);
+            add_yard(&s, -1, bends);
+            add_yard(&s, 1, bends);
+            add_sheet(&s, (double[3]){0, 0, bends ? 0.3 : -step}, (double[3]){0, 4, 2});
+            check_ground(&s, 1 + up % 2);
+        }
+}
+
+/* Two patches of a road, and bushes on the strip between them, of which most points have any normal. */
+static void test_bushes_turn_no_road(void **state)
+{
+    (void)state;
+    for (int seed = 0; seed < 8; seed++) {
+        struct scene s = begin(2);
+        s.random = 1000 + (uint64_t)seed;
+        add_sheet(&s, (double[3]){-4, 0, 0}, (double[3]){-0.25, 4, 0});
+        add_sheet(&s, (double[3]){0.25, 0, 0}, (double[3]){4, 4, 0});
+        for (int i = 0; i < 3000; i++)
+            add(&s, 0.35 * (2 * uniform(&s.random) - 1), 4 * uniform(&s.random), 0.06 + 0.5 * uniform(&s.random));
+        check_ground(&s, 1);
+    }
+}
+
+/* A room shows one of its sides all over, also where its ceiling is as large as its floor. */
+static void test_ceilings_agree_with_their_room(void **state)
+{
+    (void)state;
+    struct scene s = begin(2);
+    size_t inwards = 0;
+    for (int c = 0; c < 3; c++)
+        for (int end = 0; end < 2; end++) {
+            double low[3] = {0}, high[3] = {5, 4, 2.5};
+            low[c] = high[c] = end ? high[c] : 0;
+            add_sheet(&s, low, high);
+        }
+    struct spl_points p = finish(&s, 2);
+    for (size_t i = 0; i < p.count; i++) {
+        double dot = 0;
+        for (int c = 0; c < 3; c++)
+            dot += p.normal[i][c] * ((double[3]){2.5, 2, 1.25}[c] - p.axis[c][i]);
+        inwards += dot > 0;
+    }
+    inwards = inwards < p.count / 2 ? p.count - inwards : inwards;
+    if (inwards < p.count - p.count / 200)
+        fail_msg("%zu of the room's %zu points agree", inwards, p.count);
+    spl_points_finish(&p);
+}
+
+/* Of two pieces of ground as large as each other, the second of which shows downwards. */
+static bool turns_second(int64_t votes, bool anchored)
+{
+    struct spl_component pieces[2] = {{.outward = 10000, .level = 10000, .anchored = anchored},
+                                      {.outward = -9999, .level = -9999}};
+    struct spl_orient_edge edge = {0, 1, votes * (1 << 20)};
+    assert_int_equal(spl_orient_components(pieces, 2, &edge, 1, NULL, NULL), 0);
+    assert_false(pieces[0].flip);
+    return pieces[1].flip;
+}
+
+/* Up has votes of its own, which strong ones outdo; it has none beside what was given a side. */
+static void test_strong_votes_outdo_up(void **state)
+{
+    (void)state;
+    assert_true(turns_second(-50, false));
+    assert_true(turns_second(50, false));
+    assert_false(turns_second(50, true));
+    assert_true(turns_second(-50, true));
+    assert_false(turns_second(400, false));
+}
+
+/* No wall alone outdoes up, all four do: a ceiling waits for those that hang together with its floor. */
+static void test_a_ceiling_hears_all_its_walls(void **state)
+{
+    (void)state;
+    enum { floor, ceiling, walls, pieces = walls + 4 };
+    struct spl_component room[pieces] = {{.outward = 10001, .level = 10001}, {.outward = 10000, .level = 10000}};
+    struct spl_orient_edge edges[8];
+    for (uint32_t w = 0; w < 4; w++) {
+        edges[w] = (struct spl_orient_edge){floor, walls + w, (200 - (int64_t)w) * (1 << 20)};
+        edges[4 + w] = (struct spl_orient_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
+    }
+    assert_int_equal(spl_orient_components(room, pieces, edges, 8, NULL, NULL), 0);
+    assert_int_not_equal(room[ceiling].flip, room[floor].flip);
+    for (int w = walls; w < pieces; w++)
+        assert_int_equal(room[w].flip, room[floor].flip);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_a_wall_turns_no_yard),           cmocka_unit_test(test_bushes_turn_no_road),
+        cmocka_unit_test(test_ceilings_agree_with_their_room), cmocka_unit_test(test_strong_votes_outdo_up),
+        cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
