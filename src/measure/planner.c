@@ -15,7 +15,7 @@
 #include "render/method.h"
 #include "shared.h"
 
-static const double spread_quantile = 0.97, spread_step = 0.08;
+static const double spread_quantile = 0.98, spread_step = 0.08;
 static const double spread_least = 0.02, spread_most = 1.5;
 static const double shared_gain = 0.1, setting_gain = 0.1, layer_gain = 0.1, fade = 0.99;
 static const double learned_most = 6.9; /* ln 1000 */
@@ -115,8 +115,8 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
                                                                        .bound = spl_profile_psnr_bound(profile, p)};
         tail += log(p->ms_q90 / p->ms);
     }
-    /* From the 90 % quantile of a normal distribution to its 97 %: 1.88 / 1.28. */
-    planner->spread = planner->count ? fmin(fmax(1.47 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
+    /* From the 90 % quantile of a normal distribution to its 98 %: 2.05 / 1.28. */
+    planner->spread = planner->count ? fmin(fmax(1.6 * tail / (double)planner->count, 0.1), spread_most) : 0.5;
     planner->device = compare_devices(planner);
     if (!planner->count)
         planner->count = add_guesses(planner->candidates, usable);

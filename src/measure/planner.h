@@ -12,8 +12,8 @@
 #include "measure/planner_soft.h"
 #include "measure/profile.h"
 
-/* Of a budget: frames may take up to this multiple, and one in twenty longer. */
-#define SPL_BUDGET_TOLERANCE 1.2
+/* Of a budget: frames may take up to this multiple, and one in fifty longer. */
+#define SPL_BUDGET_TOLERANCE 1.1
 
 struct spl_demand {
     double budget_ms; /* > 0; NAN: any time */
@@ -63,7 +63,7 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err);
 void spl_planner_finish(struct spl_planner *planner);
 
-/* budget alone: the most accurate setting whose 97 % quantile stays below 1.2 times the budget and whose expected time
+/* budget alone: the most accurate setting whose 98 % quantile stays below 1.1 times the budget and whose expected time
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the most
  * accurate (psnr), and `meets` is false. All settings of the profile are candidates, those behind its front too:

@@ -87,7 +87,7 @@ static void test_budget_takes_the_most_accurate_that_fits(void **state)
     expect(&planner, small, 3, true);
     planner.spread = log(2); // 80 ms may become 160
     expect(&planner, demand(120, NAN), 1, true);
-    expect(&planner, demand(140, NAN), 2, true);
+    expect(&planner, demand(146, NAN), 2, true);
     spl_planner_finish(&planner);
 }
 
@@ -494,14 +494,14 @@ static double share_kept(unsigned short seed[3], double speed, double noise)
         if (i < 20 || !choice.meets)
             continue;
         counted++;
-        kept += ms <= 1.2 * wanted.budget_ms;
+        kept += ms <= SPL_BUDGET_TOLERANCE * wanted.budget_ms;
     }
     spl_planner_finish(&planner);
     assert_true(counted > 100);
     return (double)kept / counted;
 }
 
-static void test_budgets_are_kept_by_95_of_100(void **state)
+static void test_budgets_are_kept(void **state)
 {
     (void)state;
     unsigned short seed[3] = {4, 5, 6};
@@ -510,7 +510,7 @@ static void test_budgets_are_kept_by_95_of_100(void **state)
         double sum = 0;
         for (int run = 0; run < 20; run++)
             sum += share_kept(seed, speeds[i], 0.25);
-        if (sum / 20 < 0.95)
+        if (sum / 20 < 0.98)
             fail_msg("speed %g: %.3f of the budgets kept", speeds[i], sum / 20);
     }
 }
@@ -549,7 +549,7 @@ int main(void)
         cmocka_unit_test(test_a_slower_machine_is_learned_through_noise),
         cmocka_unit_test(test_layers_learn_apart),
         cmocka_unit_test(test_outliers_and_nonsense_are_bounded),
-        cmocka_unit_test(test_budgets_are_kept_by_95_of_100),
+        cmocka_unit_test(test_budgets_are_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
