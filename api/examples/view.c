@@ -101,7 +101,6 @@ int main(int argc, char **argv)
     spl_view_init(&view);
     if ((rc = spl_dataset_get_default_camera(dataset, 640, 360, &view.camera, &err)))
         goto done;
-    spl_view_choose(&view, spl_dataset_get_info(dataset)); /* as 'splatd render' draws it */
     struct spl_render_options how;
     spl_render_options_init(&how);
     how.cancel = &cancel;

@@ -19,11 +19,9 @@ export class Picture {
   open(dataset, wanted) {
     this.dataset = dataset;
     choices($("layer"), dataset.layers, wanted.layer ?? "color");
-    const said = wanted.method !== undefined || wanted.supersample !== undefined;
-    const usual = said ? {supersample: 1} : dataset.picture; // what the service would draw
-    choices($("method"), dataset.methods, offered(wanted.method ?? usual.method, dataset));
+    choices($("method"), dataset.methods, offered(wanted.method, dataset));
     $("lod").value = wanted.lod ?? 1;
-    choose($("supersample"), wanted.supersample ?? usual.supersample);
+    choose($("supersample"), wanted.supersample ?? 1);
     for (const parameter of listed()) this.parameters.set(parameter, wanted[parameter.name]);
     choose($("budget"), wanted.budget ?? "");
   }

@@ -30,8 +30,6 @@ enum spl_method {
 #define SPL_METHOD_DEFAULT ((enum spl_method)0)
 /* Shows each splat in the one sample it falls on: what measuring looks through. */
 #define SPL_METHOD_RAW SPL_METHOD_POINTS
-/* Draws pictures of which nobody says how: see spl_view_choose(). */
-#define SPL_METHOD_PICTURE SPL_METHOD_NEAREST
 
 /* Discs. */
 struct spl_disc_params {

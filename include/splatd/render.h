@@ -54,13 +54,6 @@ static inline void spl_view_init(struct spl_view *view)
     spl_view_init_sized(view, sizeof *view);
 }
 
-/* How a picture is drawn where nobody says how: by SPL_METHOD_PICTURE with SPL_PICTURE_SUPERSAMPLE samples a pixel
- * side, which take less time than spl_view_init()'s and are more accurate. A picture is of colours alone, by a pinhole
- * or parallel rays, of a dataset with normals and without textures and maps of stations. Sets both and returns true;
- * other views stay as they are. */
-#define SPL_PICTURE_SUPERSAMPLE 1.25
-SPL_API bool spl_view_choose(struct spl_view *view, const struct spl_dataset_info *info);
-
 /* A method's parameter by its place in the table, of a view that spl_view_init() has made whole; whole numbers and
  * choices as doubles (what is none becomes one that spl_view_check() refuses). */
 SPL_API double spl_view_get_param(const struct spl_view *view, enum spl_method_param param);

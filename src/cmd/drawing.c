@@ -19,12 +19,6 @@ void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint3
     drawing->view.layers = 1u << SPL_LAYER_COLOR;
 }
 
-void spl_cmd_drawing_choose(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset)
-{
-    if (!drawing->has_method && !drawing->has_supersample)
-        spl_view_choose(&drawing->view, spl_dataset_get_info(dataset));
-}
-
 void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset)
 {
     snprintf(drawing->encode.unit, sizeof drawing->encode.unit, "%s",
@@ -58,18 +52,9 @@ int spl_cmd_take_method(void *drawing, const char *option, char *text, struct sp
 {
     int method = 0;
     int rc = spl_cmd_take_name(option, text, spl_method_from_name, name_of_method, SPL_METHOD_COUNT, &method, err);
-    struct spl_cmd_drawing *d = drawing;
-    d->has_method = true;
     if (!rc)
-        d->view.method = (enum spl_method)method;
+        ((struct spl_cmd_drawing *)drawing)->view.method = (enum spl_method)method;
     return rc;
-}
-
-int spl_cmd_take_supersample(void *drawing, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_drawing *d = drawing;
-    d->has_supersample = true;
-    return spl_cmd_parse_real(option, text, 0.25, 4, &d->view.supersample, err);
 }
 
 static void replace(char *text, char from, char to)

@@ -18,16 +18,12 @@ struct spl_cmd_drawing {
     const char *output;               /* argument of -o; NULL = not given */
     char soft_option[24];             /* the last of those that say how what is soft is drawn; "" = none */
     char ramp_option[16];             /* the last of those that say what values look like; "" = none */
-    bool has_method, has_supersample; /* were given */
     struct spl_view view;             /* all but the camera */
     struct spl_encode_options encode; /* all but the format */
     struct spl_renderer_options renderer;
 };
 
 void spl_cmd_drawing_init(struct spl_cmd_drawing *drawing, uint32_t width, uint32_t height);
-
-/* How a picture is drawn where no option says how; after the camera is known. */
-void spl_cmd_drawing_choose(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
 
 /* What a depth PNG says that its steps are of. */
 void spl_cmd_drawing_set_unit(struct spl_cmd_drawing *drawing, const struct spl_dataset *dataset);
@@ -44,7 +40,6 @@ void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *da
 /* `take` of rows. */
 int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err);
-int spl_cmd_take_supersample(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_param(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_format(void *drawing, const char *option, char *text, struct spl_error *err);
@@ -64,8 +59,8 @@ void spl_cmd_print_methods(FILE *out, size_t column);
 #define SPL_CMD_DRAWING_ROWS                                                                                           \
     {"lod", "L", "wanted spacing of splats in pixels; 0 = every splat", .otherwise = "1",                              \
      SPL_CMD_REAL(struct spl_cmd_drawing, view.lod, 0, 64)},                                                           \
-        {"supersample", "N", "samples per pixel side: 1, 1.25, 1.5, 2, 4; 0.5, 0.25 are enlarged",                     \
-         .otherwise = "1, of a picture by nearest 1.25", .take = spl_cmd_take_supersample},                            \
+        {"supersample", "N", "samples per pixel side: 1, 1.25, 1.5, 2, 4; 0.5, 0.25 are enlarged", .otherwise = "1",   \
+         SPL_CMD_REAL(struct spl_cmd_drawing, view.supersample, 0.25, 4)},                                             \
         {"background", "COLOUR", "a CSS name (white), #rrggbb, #rrggbbaa or transparent",                              \
          .otherwise = "black, of a GeoTIFF transparent", .take = spl_cmd_take_background},                             \
         {.help = "Methods, and what each takes:", .print = spl_cmd_print_methods},                                     \

@@ -141,8 +141,6 @@ static int render(struct spl_cmd_render *a, struct spl_error *err)
     if (!rc)
         rc = spl_cmd_render_set_camera(a, dataset, err);
     if (!rc)
-        spl_cmd_drawing_choose(&a->drawing, dataset);
-    if (!rc)
         rc = find_ground(a, spl_dataset_get_info(dataset), err);
     if (!rc)
         spl_cmd_drawing_set_unit(&a->drawing, dataset);

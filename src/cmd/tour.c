@@ -162,7 +162,6 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
                             "with --soft, as in --soft 'class:3-5'");
     if (!rc) {
         a->drawing.view.camera = a->cameras[0];
-        spl_cmd_drawing_choose(&a->drawing, dataset);
         rc = spl_view_check(&a->drawing.view, err);
     }
 done:

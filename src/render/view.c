@@ -35,16 +35,6 @@ void spl_view_init_sized(struct spl_view *view, size_t size)
         memcpy((char *)view + sizeof size, (const char *)&known + sizeof size, bytes - sizeof size);
 }
 
-bool spl_view_choose(struct spl_view *view, const struct spl_dataset_info *info)
-{
-    if (view->layers != 1u << SPL_LAYER_COLOR || spl_camera_is_bent(&view->camera) || !info->has_surface ||
-        info->atoms || info->maps)
-        return false;
-    view->method = SPL_METHOD_PICTURE;
-    view->supersample = SPL_PICTURE_SUPERSAMPLE;
-    return true;
-}
-
 /* But for the pose. */
 static bool is_same_lens(const struct spl_camera *a, const struct spl_camera *b)
 {

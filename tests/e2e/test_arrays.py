@@ -50,7 +50,7 @@ def test_layers_are_arrays():
         together, camera = w.arrays("color", "depth", "normal", "id", **POSE, fov=60, **SIZE)
         assert set(together) == {"color", "depth", "normal", "id"} and camera["width"] == 65
         for layer in together:  # one frame, the same pixels
-            assert np.array_equal(together[layer], w.array(layer, **POSE, fov=60, **SIZE, supersample=1), equal_nan=layer != "id" and layer != "color"), layer
+            assert np.array_equal(together[layer], w.array(layer, **POSE, fov=60, **SIZE), equal_nan=layer != "id" and layer != "color"), layer
         assert abs(together["depth"][24, 32] - 3) < 0.01 and np.isnan(together["depth"][0, 0])
         picked = w.pick(32.5, 24.5, **POSE, fov=60, **SIZE)
         assert np.allclose(together["normal"][24, 32], picked["normal"], atol=1e-5) and together["id"][24, 32] == picked["splat"]
@@ -143,7 +143,7 @@ def test_clouds_are_scans_again():
         cloud = w.cloud(**POSE, fov=60, **SIZE, normals=True, ids=True)
         assert cloud.points.shape == cloud.colors.shape == cloud.normals.shape == (len(cloud), 3) and len(cloud.ids) == len(cloud) > 500
         assert cloud.points.dtype == np.float64 and cloud.colors.dtype == np.uint8
-        color = w.array("color", **POSE, fov=60, **SIZE, supersample=1)
+        color = w.array("color", **POSE, fov=60, **SIZE)
         assert np.array_equal(cloud.colors, color[np.isfinite(w.array("depth", **POSE, fov=60, **SIZE))][:, :3])
         file = pathlib.Path(folder, "cloud.ply")
         cloud.save(file)

@@ -181,7 +181,7 @@ def test_references(folder, dataset):
     for name, eye in EYES.items():
         for layer, ending in (("color", "png"), ("depth", "npy")):
             splatd("render", dataset, f"--eye={','.join(map(str, eye))}", "--target=0,0,1.5", "--fov=60", "--size=160x90",
-                   "--near=0.01", "--far=1e12", "--background=transparent", "--method=splat", f"--layer={layer}", "-o",
+                   "--near=0.01", "--far=1e12", "--background=transparent", f"--layer={layer}", "-o",
                    truth / f"{name}.{layer}.{ending}")
     splatd("bench", dataset, "--views", cams, "--reference", truth, "--method", "splat", "--lod", "1,2", "--supersample", "1",
            "--repeats", "1", "--no-profile", "-o", folder / "r")

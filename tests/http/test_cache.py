@@ -44,13 +44,13 @@ def test_requests_that_mean_the_same_share_an_etag():
             return d.ask(f"{VIEW}?{query}", "HEAD").headers["ETag"]
         plain = tag("eye=3,0,1&target=0,0,1&fov=50&width=64&height=48")
         for same in ["height=48&width=64&FOVY=50&POI=0,0,1.0&poc=3e0,-0,1", "eye=3,0,1&target=0,0,1&fov=5e1&width=64&"
-                     "height=48&method=nearest&supersample=1.25&lod=1&layer=color&format=jpg&quality=90&margin=1&transparent=false&"
+                     "height=48&method=splat&lod=1&layer=color&format=jpg&quality=90&margin=1&transparent=false&"
                      "background=%23000000&depth_scale=77",
                      "eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&soft_opacity=0.9&soft_model=base",  # of nothing
                      "eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&atoms=3"]:  # the wall has no textures
             assert tag(same) == plain, same
         for other in ["lod=2", "quality=91", "format=png", "method=points", "background=000001", "layer=depth",
-                      "near=0.5", "method=splat", "method=nearest", "supersample=1",
+                      "near=0.5",
                       "up=0,1,0", "cx=32.5", "supersample=2", "margin=1.5", "transparent=true", "soft=axis:0,0,0,0,0,1<0.1"]:
             assert tag("eye=3,0,1&target=0,0,1&fov=50&width=64&height=48&" + other) != plain, other
         for left_out, whole in [("width=320", "width=320&height=180"), ("height=45", "width=80&height=45"),

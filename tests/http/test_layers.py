@@ -1,5 +1,4 @@
-"""Several layers of one frame, as multipart/mixed and as ZIP; how a picture is drawn of which nothing is said; WebP,
-quality and chroma."""
+"""Several layers of one frame, as multipart/mixed and as ZIP; WebP, quality and chroma."""
 import io
 import json
 import os
@@ -17,7 +16,6 @@ LAYERS = ["color", "depth", "range", "normal", "id", "coverage", "primitive"]
 
 def each_part_is_the_layer_by_itself(d):
     for extra in ({}, {"format": "npy"}, {"format": "raw"}, {"format": "jpeg", "quality": 70, "chroma": 444}):
-        extra["supersample"] = 1  # left out, a picture alone is drawn another way
         singles = {layer: d.view(**LOOK, layer=layer, **extra) for layer in LAYERS}
         before = d.status()["counters"]["frames"]
         got = list(parts(d.view(**LOOK, layers=",".join(LAYERS), **extra)))
@@ -55,29 +53,6 @@ def containers_are_cached_like_any_view(d):
     again = d.ask(VIEW + "?layers=color,depth&eye=3,0.2,1&target=0,0,1&width=64&height=48",
                   headers={"If-None-Match": first.headers["ETag"]})
     assert again.status == 304
-
-
-def test_a_picture_of_which_nothing_is_said():
-    """By the method and with the samples that its dataset names; what is no picture by splat, with one."""
-    small = dict(LOOK, format="png")
-    with Daemon(REAL) as d:
-        def tag(**query):
-            return d.view(**dict(small, **query)).headers["ETag"]
-        picture = d.ask("/v1/datasets/wall").json()["picture"]
-        assert picture == {"method": "nearest", "supersample": 1.25}
-        assert tag() == tag(**picture) and tag(lod=2) == tag(lod=2, **picture)
-        assert tag(projection="orthographic") == tag(projection="orthographic", **picture)
-        plain = {"method": "splat", "supersample": 1}
-        for other in ({"layer": "depth"}, {"layers": "color,depth"}, {"projection": "equirectangular", "width": 96}):
-            assert tag(**other) == tag(**other, **plain) != tag(**other, **picture), other
-        assert tag(supersample=2) == tag(method="splat", supersample=2)
-        assert tag(method="nearest") == tag(method="nearest", supersample=1)
-        batch = {"width": 64, "height": 48, "views": [{"camera": {"eye": [3, 0.2, 1], "target": [0, 0, 1]}, **what}
-                                                      for what in ({}, picture, plain)]}
-        bodies = [body for _, _, body in parts(d.post(batch, "/v1/datasets/wall/views"))]
-        assert bodies[0] == bodies[1] != bodies[2]
-    with Daemon(REAL, "--max-samples", str(64 * 48)) as d:  # one sample has room, 1.25 a side have not
-        assert tag() == tag(**plain) and d.view(**small, **picture).status == 400
 
 
 def test_bad_lists_are_refused_by_name():

@@ -92,7 +92,7 @@ def test_metrics_of_datasets_stages_and_tours():
             stages = [name for name in got if name.startswith("splatd_stage_seconds_total{")]
             assert len(stages) == 8 and not any(got[name] for name in stages), got
             path = {"keyframes": [{"camera": {"eye": [x, 0, 1], "target": [0, 0, 1], "fov": 60}} for x in (3, 4)]}
-            reply = d.post({"path": path, "frames": 3, "settings": {"width": 32, "height": 32, "method": "splat"}}, "/v1/datasets/a/tours")
+            reply = d.post({"path": path, "frames": 3, "settings": {"width": 32, "height": 32}}, "/v1/datasets/a/tours")
             assert reply.status == 202, reply.body
             eventually(lambda: metrics(d)['splatd_tours{state="done"}'] == 1)
             got = metrics(d)

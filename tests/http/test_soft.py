@@ -159,14 +159,14 @@ def test_it_counts_where_something_is_soft():
 def test_how_much_is_soft_is_said():
     with Daemon(REAL) as d:
         def drawn(**query):
-            reply = d.view(width=64, height=48, supersample=1, **query)
+            reply = d.view(width=64, height=48, **query)
             assert reply.status == 200, reply.body
             return reply.headers["Splatd-Soft-Drawn"]
         plane = "plane:0,0,1,0,0,1>0"
         assert int(drawn(soft=plane)) > 100 > 0 == int(drawn(soft="class:77")) == int(drawn(soft="plane:0,0,1e6,0,0,1>0"))
         assert int(drawn(soft=plane, layer="coverage")) == int(drawn(soft=plane)) == int(drawn(soft=plane, layer="depth", of="first"))
         assert drawn() is drawn(soft=plane, soft_opacity=0) is drawn(soft=plane, layer="depth") is None, "none could be"
-        assert d.view(width=64, height=48, supersample=1, soft=plane).headers["Splatd-Soft-Drawn"] == drawn(soft=plane)  # of the cache, too
+        assert d.view(width=64, height=48, soft=plane).headers["Splatd-Soft-Drawn"] == drawn(soft=plane)  # of the cache, too
 
 
 def test_numbers_are_as_they_were_asked_for():

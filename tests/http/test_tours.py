@@ -86,17 +86,6 @@ def test_a_frame_whose_faces_are_too_many_samples_fails_its_tour():
             assert state == "done" or "the limit is 300000" in json.dumps(tour), tour
 
 
-def test_frames_that_have_room_with_one_sample_alone():
-    """What is chosen of a picture is chosen of the path's cameras, and within the limits."""
-    def key(x, **camera):
-        return {"camera": {"eye": [x, 0, 1], "target": [0, 0, 1], **camera}}
-    with Folder() as tours, Daemon(FAKE, "--tours", tours, "--max-samples", str(64 * 48), "--tour-pixels", str(4 * 64 * 48)) as d:
-        for frames, settings, status in ((4, {}, 202), (5, {}, 400), (4, {"supersample": 1.25}, 400)):
-            reply = begin(d, {"path": {"keyframes": [key(3), key(4)]}, "frames": frames,
-                              "settings": {"width": 64, "height": 48, **settings}}, status)
-            assert status == 202 or "limit" in str(reply), reply
-
-
 def read_stream(d, uri, begun=None):
     """Reads a stream to its end; `begun` is set once its first byte is there."""
     connection = d.connect(120)

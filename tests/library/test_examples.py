@@ -52,7 +52,7 @@ def the_c_example(lib, dataset, folder):
 
 def the_python_example(lib, dataset, folder):
     """As it is, into a numpy array where there is numpy, and as if there were none."""
-    run(SPLATD, "render", dataset, "--size", SIZE, "--method", "splat", "--format", "raw", "-o", folder / "command.raw")
+    run(SPLATD, "render", dataset, "--size", SIZE, "--format", "raw", "-o", folder / "command.raw")
     raw = (folder / "command.raw").read_bytes()
     width, height = SIZE.split("x")
     wanted = f"P6\n{width} {height}\n255\n".encode() + bytes(raw[i] for i in range(len(raw)) if i % 4 != 3)

@@ -20,16 +20,6 @@ static json_t *describe_layers(void)
     return list;
 }
 
-/* How a picture is drawn of which nothing is said. */
-static json_t *describe_picture(const struct spl_dataset_info *info)
-{
-    struct spl_view view;
-    spl_view_init(&view);
-    spl_view_choose(&view, info);
-    return json_pack("{s:s, s:f}", "method", spl_method_name(spl_method_for(view.method, info)), "supersample",
-                     view.supersample);
-}
-
 /* Those that are drawn as they are called: without radii something else stands in for discs. */
 static json_t *describe_methods(const struct spl_dataset_info *info)
 {
@@ -223,7 +213,6 @@ json_t *spl_describe_dataset(const struct spl_catalog_entry *entry, bool full)
     set(json, "splat_radius", json_real(info->splat_radius));
     set(json, "layers", describe_layers());
     set(json, "methods", describe_methods(info));
-    set(json, "picture", describe_picture(info));
     set(json, "attributes", describe_attributes(info));
     set(json, "soft", describe_soft(info));
     set(json, "color", describe_color(entry->dataset));

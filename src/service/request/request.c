@@ -134,32 +134,6 @@ void spl_values_resolve_colors(const struct values *values, struct spl_view *vie
     }
 }
 
-void spl_view_request_unchoose(struct spl_view_request *request)
-{
-    struct spl_view usual;
-    spl_view_init(&usual);
-    request->view.method = usual.method;
-    request->view.supersample = usual.supersample;
-    request->chosen = false;
-}
-
-static bool is_within(const struct spl_view *view, const struct spl_camera_limits *limits)
-{
-    return (!limits->samples || spl_view_get_samples(view) <= limits->samples) &&
-           (!limits->bytes || spl_view_get_frame_bytes(view) <= limits->bytes);
-}
-
-/* Of a picture where nothing is said of method, samples and cost. */
-static void choose(const struct values *values, const struct spl_camera_defaults *defaults,
-                   const struct spl_camera_limits *limits, struct spl_view_request *out)
-{
-    if (out->planned || given(values, PARAM_method) || given(values, PARAM_supersample) || !defaults->dataset)
-        return;
-    out->chosen = spl_view_choose(&out->view, defaults->dataset);
-    if (out->chosen && !is_within(&out->view, limits))
-        spl_view_request_unchoose(out);
-}
-
 /* Samples and memory, not pixels alone, are what a view costs. */
 static int check_cost(const struct spl_view *view, const struct spl_camera_limits *limits, struct spl_error *err)
 {
@@ -267,7 +241,6 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
         return rc;
     spl_values_resolve_version(values, out);
     out->view.partial = get(values, PARAM_wait, 1) == 0;
-    choose(values, defaults, limits, out);
     rc = spl_view_check(&out->view, err);
     return rc ? rc : check_cost(&out->view, limits, err);
 }

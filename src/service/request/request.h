@@ -30,7 +30,6 @@ struct spl_view_request {
         struct spl_camera camera; /* that was asked for */
         uint32_t crs;             /* the answer's position, a number of EPSG's list; 0 = the world */
     } pick;
-    bool chosen;    /* nothing was said of method and samples, and spl_view_choose() has set them */
     bool named;     /* view was given: what that shows may change */
     bool versioned; /* v was given: only this version of the dataset will do */
     uint64_t version;
@@ -42,9 +41,6 @@ struct spl_view_request {
 int spl_view_request_from_query(const char *query, size_t length, const struct spl_camera_defaults *defaults,
                                 const struct spl_camera_limits *limits, struct spl_view_request *out,
                                 struct spl_error *err);
-
-/* Undoes what was chosen, for a picture that turns out to be none, or too large. */
-void spl_view_request_unchoose(struct spl_view_request *request);
 
 /* An empty body is the default view. */
 int spl_view_request_from_json(const char *body, size_t length, const struct spl_camera_defaults *defaults,

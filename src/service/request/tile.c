@@ -37,7 +37,5 @@ int spl_tile_request_from_query(const char *query, size_t length, const struct s
         set(&values, PARAM_transparent, &yes, 1);
     rc = spl_values_resolve(&values, defaults, limits, out, err);
     out->view.surrounded = true;
-    if (!rc && out->chosen) /* discs that do not blend differ more from tile to tile */
-        spl_view_request_unchoose(out);
     return rc;
 }

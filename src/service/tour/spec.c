@@ -187,18 +187,6 @@ int spl_tour_check_frame(const struct spl_view *view, const struct spl_camera_li
     return SPL_OK;
 }
 
-/* A path's lens may bend, and its images be larger: what was chosen of the settings alone is chosen no more. */
-static void choose_again(struct spl_view_request *settings, const struct spl_camera_path *path,
-                         const struct spl_tour_limits *limits, size_t frames)
-{
-    struct spl_view view = settings->view;
-    view.camera = path->cameras[0];
-    if (settings->chosen &&
-        (spl_camera_is_bent(&view.camera) || spl_tour_check_frame(&view, &limits->image, NULL) ||
-         frames > limits->pixels / spl_view_get_samples(&view)))
-        spl_view_request_unchoose(settings);
-}
-
 /* A path may bring its own size, so a frame is judged here as well. */
 static int check_limits(const struct spl_view *settings, const struct spl_camera_path *path,
                         const struct spl_tour_limits *limits, size_t frames, struct spl_error *err)
@@ -252,10 +240,8 @@ int spl_tour_spec_from_json(json_t *body, const struct spl_camera_defaults *defa
         (rc = read_path(body, defaults, limits, out, &path, err)) || (rc = read_motion(body, &motion, &path, err)) ||
         (rc = spl_camera_path_count(&path, isnan(frames) ? 0 : (size_t)frames, fps, seconds, limits->frames,
                                     &out->frames, &out->fps, err)) ||
-        (rc = check_fades(&path, &out->view.view, err)))
-        goto done;
-    choose_again(&out->view, &path, limits, out->frames);
-    if ((rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
+        (rc = check_fades(&path, &out->view.view, err)) ||
+        (rc = check_limits(&out->view.view, &path, limits, out->frames, err)))
         goto done;
     if (!(out->cameras = spl_alloc_raw(out->frames, sizeof *out->cameras, err)))
         rc = SPL_E_NOMEM;

@@ -1,4 +1,4 @@
-/* Which layers a dataset has; what is chosen of a picture; what is no method, and no name of one. */
+/* Which layers a dataset has; what is no method, and no name of one. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -61,30 +61,6 @@ static void test_a_camera_is_whole_with_a_lens_and_a_pose(void **state)
 }
 
 /* From other languages an enum is any number, and a name may be NULL. */
-/* Colours alone, of one pinhole or a plan, where discs have no textures and maps. */
-static void test_a_picture_is_chosen_for(void **state)
-{
-    (void)state;
-    struct spl_dataset_info info = {.has_surface = true};
-    struct spl_view view, usual;
-    spl_view_init(&usual);
-    spl_view_init(&view);
-    assert_true(spl_view_choose(&view, &info));
-    assert_true(view.method == SPL_METHOD_PICTURE && view.supersample == SPL_PICTURE_SUPERSAMPLE);
-    view = usual;
-    view.camera.projection = SPL_ORTHOGRAPHIC;
-    assert_true(spl_view_choose(&view, &info));
-    for (int kind = 0; kind < 6; kind++) {
-        struct spl_dataset_info other = {.has_surface = kind != 0, .atoms = kind == 1, .maps = kind == 2};
-        view = usual;
-        view.layers = kind == 3 ? 1u << SPL_LAYER_DEPTH : kind == 4 ? view.layers | 1u << SPL_LAYER_DEPTH : view.layers;
-        if (kind == 5)
-            assert_int_equal(spl_camera_set_around(&view.camera, SPL_EQUIRECTANGULAR, 240, 120, NULL), SPL_OK);
-        assert_false(spl_view_choose(&view, &other));
-        assert_true(view.method == usual.method && view.supersample == 1);
-    }
-}
-
 static void test_what_is_no_method_is_answered(void **state)
 {
     (void)state;
@@ -154,7 +130,6 @@ int main(void)
         cmocka_unit_test(test_normals_need_a_surface),
         cmocka_unit_test(test_ids_have_32_bits),
         cmocka_unit_test(test_what_a_dataset_lacks_does_not_count),
-        cmocka_unit_test(test_a_picture_is_chosen_for),
         cmocka_unit_test(test_what_is_no_method_is_answered),
         cmocka_unit_test(test_maps_are_on_unless_told),
         cmocka_unit_test(test_a_camera_is_whole_with_a_lens_and_a_pose),
