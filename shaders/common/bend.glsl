@@ -22,12 +22,12 @@ float unbent(float bent, uint code)
 }
 
 /* Beside a colour that no map is added to: how far off its disc's centre a sample lies, squared, in 6 bits, and in 2
- * how large its disc is on the image, the short way: 0 below SPL_SMOOTH_RADIUS samples, 1 to 3 from it, twice and four
- * times as much on. */
+ * how large its disc is on the image, the short way: 0 below SPL_SMOOTH_RADIUS samples, 1 from it and 2 from twice as
+ * much on. */
 uint disc_word(float radius)
 {
     float size = radius * (1.0 / SPL_SMOOTH_RADIUS);
-    return size < 1.0 ? 0u : size < 2.0 ? 1u << 30 : size < 4.0 ? 2u << 30 : 3u << 30;
+    return size < 1.0 ? 0u : size < 2.0 ? 1u << 30 : 2u << 30;
 }
 
 uint disc_size(uint word)

@@ -51,29 +51,25 @@ uint sample_at(ivec2 at, uint otherwise)
     return uint(at.x) < frame.width && uint(at.y) < frame.height ? sample_index(at) : otherwise;
 }
 
-/* The mean colour over the samples around `at` on its surface, 2 `reach` + 1 a side, `apart` apart. `reach` is a
- * constant where it is called: software drivers lose sums of lanes that leave a loop before others. */
-vec3 smooth_over(ivec2 at, uint own, int reach, int apart, bool weighted)
+/* The mean colour over the samples around `at` on its surface, `side` a side, `apart` apart. `side`, 3 or 5, is a
+ * constant where it is called: software drivers lose sums of lanes that leave a loop before others, and unroll it. */
+vec3 smooth_over(ivec2 at, uint own, int side, int apart, bool weighted)
 {
     float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
-    ivec2 to = ivec2(-reach);
     vec3 sum = vec3(0.0);
-    for (;;) {
+    for (int i = 0;;) {
+        ivec2 to = ivec2(i % side, i / side) - side / 2, away = abs(to);
         uint beside = sample_at(at + apart * to, own);
         float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
-        ivec2 away = abs(to);
         int steps = away.x + away.y;
         float near = steps == 0 ? 4.0 : steps == 1 ? 1.0 : 0.5, pyramid = float((3 - away.x) * (3 - away.y));
-        float weight = reach == 1 ? near : pyramid;
+        float weight = side == 3 ? near : pyramid;
         weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
         uint word = payload(beside);
         weight *= weighted ? 1.0 - disc_off(word) : 1.0;
         sum += weight * vec3(unpack_color(word));
         weights += weight;
-        to.x++;
-        bool wrap = to.x > reach;
-        to = ivec2(wrap ? -reach : to.x, to.y + int(wrap));
-        if (to.y > reach)
+        if (++i >= side * side)
             break;
     }
     return sum / weights;
@@ -81,14 +77,13 @@ vec3 smooth_over(ivec2 at, uint own, int reach, int apart, bool weighted)
 
 /* The colour around `at`, which holds something; if `weighted`, times what payloads say of how near to its disc's
  * centre each sample lies, as discs that blend weigh. Of small discs over 3 x 3 samples, 4 : 1 : 1/2. Of large ones
- * (common/bend.glsl) a pyramid of 5 x 5, as many samples apart as makes them reach a third to two thirds of a radius,
- * up to SPL_SMOOTH_REACH. */
+ * (common/bend.glsl) a pyramid of 5 x 5, for the largest every other sample: farther apart they would show as combs. */
 vec3 smooth_color(ivec2 at, uint own, bool weighted)
 {
     int size = weighted ? int(disc_size(payload(own))) : 0;
     if (size == 0)
-        return smooth_over(at, own, 1, 1, weighted);
-    return smooth_over(at, own, 2, 1 << (size - 1), weighted);
+        return smooth_over(at, own, 3, 1, weighted);
+    return smooth_over(at, own, 5, size, weighted);
 }
 
 #endif

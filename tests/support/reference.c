@@ -300,7 +300,7 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     struct fragment f = {.margin = margin_of(s, d->radius, d->p[2], slant),
                          .behind = s->sided && facing > 0 ? d->radius : 0};
     float radius = (float)s->camera.fx * fminf(fabsf(facing), 1) * d->radius / ray_scale(&s->camera, d->p[2]);
-    for (radius /= SPL_SMOOTH_RADIUS; radius >= 1 && f.size < 3; radius /= 2)
+    for (radius /= SPL_SMOOTH_RADIUS; radius >= 1 && f.size < 2; radius /= 2)
         f.size++;
     for (int y = first[1]; y <= last[1]; y++) {
         for (int x = first[0]; x <= last[0]; x++) {

@@ -53,12 +53,12 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     return found;
 }
 
-/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2, or 5 x 5 that lie
- * apart where its disc is large, a pyramid; with `weighted` times how near to its disc's centre each lies. */
+/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2, or 5 x 5, a
+ * pyramid, where its disc is large; with `weighted` times how near to its disc's centre each lies. */
 static float smooth_color(const struct scene *s, const struct sample *at, int c, bool weighted)
 {
     const int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
-    const int size = weighted ? (int)(at->payload >> 30) : 0, reach = size ? 2 : 1, apart = size ? 1 << (size - 1) : 1;
+    const int size = weighted ? (int)(at->payload >> 30) : 0, reach = size ? 2 : 1, apart = size ? size : 1;
     double sum = 0, weights = 0;
     for (int j = -reach; j <= reach; j++)
         for (int i = -reach; i <= reach; i++) {
