@@ -275,7 +275,8 @@ def profiled():
                                           stdout=subprocess.PIPE).stdout)["views"]
         truth = exact(CACHE / "planner-sample", views)
         subprocess.run([SPLATD, "bench", dataset, "--views", truth.parent / "views.json", "--reference", truth, "-o",
-                        CACHE / "planner-bench", "--lod", "0.5,1,2,4", "--supersample", "0.25,0.5,1", "--repeats", "3"],
+                        CACHE / "planner-bench", "--lod", "0.5,1,2,4", "--supersample", "0.25,0.5,1", "--repeats", "3",
+                        "--restart"],  # the dataset was packed anew
                        check=True, stdout=subprocess.DEVNULL)
     return str(dataset), json.loads(profile.read_text())
 
