@@ -67,7 +67,7 @@
 #define SPL_SMOOTH_SHARE 0.01f
 /* Discs of this radius on, samples, are smoothed as those that are large. */
 #define SPL_SMOOTH_RADIUS 4.0f
-#define SPL_SMOOTH_REACH 4 /* samples, of the largest */
+#define SPL_SMOOTH_REACH 3 /* samples, of the largest */
 
 /* Along parallel rays nothing says how depths of one surface differ but the samples: by as much as for a lens of this
  * focal length, pixels, whose samples are as large there. */

@@ -51,39 +51,29 @@ uint sample_at(ivec2 at, uint otherwise)
     return uint(at.x) < frame.width && uint(at.y) < frame.height ? sample_index(at) : otherwise;
 }
 
-/* The mean colour over the samples around `at` on its surface, `side` a side, `apart` apart. `side`, 3 or 5, is a
- * constant where it is called: software drivers lose sums of lanes that leave a loop before others, and unroll it. */
-vec3 smooth_over(ivec2 at, uint own, int side, int apart, bool weighted)
+/* The colour around `at`, which holds something: the mean over 3 x 3 samples on its surface, with `weighted` times what
+ * payloads say of how near to its disc's centre each lies, as discs that blend weigh. Of small discs they weigh
+ * 4 : 1 : 1/2, of large ones (common/bend.glsl) 4 : 2 : 1, and lie two or three samples apart. One loop of constant
+ * length for all: software drivers unroll it, and where lanes leave one before others they lose their sums. */
+vec3 smooth_color(ivec2 at, uint own, bool weighted)
 {
     float first = uintBitsToFloat(depth_word(own)), weights = 0.0;
+    int size = weighted ? int(disc_size(payload(own))) : 0, apart = size + 1;
+    float beside = size == 0 ? 1.0 : 2.0;
     vec3 sum = vec3(0.0);
     for (int i = 0;;) {
-        ivec2 to = ivec2(i % side, i / side) - side / 2, away = abs(to);
-        uint beside = sample_at(at + apart * to, own);
-        float z = uintBitsToFloat(depth_word(beside)); /* SPL_NOTHING is no number: compares as false */
-        int steps = away.x + away.y;
-        float near = steps == 0 ? 4.0 : steps == 1 ? 1.0 : 0.5, pyramid = float((3 - away.x) * (3 - away.y));
-        float weight = side == 3 ? near : pyramid;
+        uint found = sample_at(at + apart * ivec2(i % 3 - 1, i / 3 - 1), own);
+        float z = uintBitsToFloat(depth_word(found)); /* SPL_NOTHING is no number: compares as false */
+        float weight = i == 4 ? 4.0 : i % 2 == 1 ? beside : 0.5 * beside;
         weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
-        uint word = payload(beside);
+        uint word = payload(found);
         weight *= weighted ? 1.0 - disc_off(word) : 1.0;
         sum += weight * vec3(unpack_color(word));
         weights += weight;
-        if (++i >= side * side)
+        if (++i >= 9)
             break;
     }
     return sum / weights;
-}
-
-/* The colour around `at`, which holds something; if `weighted`, times what payloads say of how near to its disc's
- * centre each sample lies, as discs that blend weigh. Of small discs over 3 x 3 samples, 4 : 1 : 1/2. Of large ones
- * (common/bend.glsl) a pyramid of 5 x 5, for the largest every other sample: farther apart they would show as combs. */
-vec3 smooth_color(ivec2 at, uint own, bool weighted)
-{
-    int size = weighted ? int(disc_size(payload(own))) : 0;
-    if (size == 0)
-        return smooth_over(at, own, 3, 1, weighted);
-    return smooth_over(at, own, 5, size, weighted);
 }
 
 #endif

@@ -53,19 +53,19 @@ static const struct sample *standing_for(const struct scene *s, int64_t x, int64
     return found;
 }
 
-/* Of method nearest: channel `c` of the mean over the samples around on its surface, 4 : 1 : 1/2, or 5 x 5, a
- * pyramid, where its disc is large; with `weighted` times how near to its disc's centre each lies. */
+/* Of method nearest: channel `c` of the mean over 3 x 3 samples on its surface, 4 : 1 : 1/2, or 4 : 2 : 1 and two or
+ * three apart where its disc is large; with `weighted` times how near to its disc's centre each lies. */
 static float smooth_color(const struct scene *s, const struct sample *at, int c, bool weighted)
 {
     const int64_t index = at - s->samples, width = s->camera.width, x = index % width, y = index / width;
-    const int size = weighted ? (int)(at->payload >> 30) : 0, reach = size ? 2 : 1, apart = size ? size : 1;
+    const int size = weighted ? (int)(at->payload >> 30) : 0;
     double sum = 0, weights = 0;
-    for (int j = -reach; j <= reach; j++)
-        for (int i = -reach; i <= reach; i++) {
-            const int64_t bx = x + i * apart, by = y + j * apart;
+    for (int j = -1; j <= 1; j++)
+        for (int i = -1; i <= 1; i++) {
+            const int64_t bx = x + i * (size + 1), by = y + j * (size + 1);
             bool inside = bx >= 0 && bx < width && by >= 0 && by < s->camera.height;
             const struct sample *beside = inside ? s->samples + by * width + bx : at;
-            double weight = size ? (3 - abs(i)) * (3 - abs(j)) : i && j ? 0.5 : i || j ? 1 : 4;
+            double weight = i && j ? (size ? 1 : 0.5) : i || j ? (size ? 2 : 1) : 4;
             if (!(fabsf(beside->first - at->first) <= depth_slack(s, at->first, SPL_SMOOTH_SHARE)))
                 continue;
             weight *= weighted ? 1 - (beside->payload >> 24 & 63) / 63.0 : 1;
