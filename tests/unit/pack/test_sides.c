@@ -184,17 +184,17 @@ static void test_strong_votes_outdo_up(void **state)
 static void test_a_ceiling_hears_all_its_walls(void **state)
 {
     (void)state;
-    enum { floor, ceiling, walls, pieces = walls + 4 };
+    enum { ground, ceiling, walls, pieces = walls + 4 };
     struct spl_component room[pieces] = {{.outward = 10001, .level = 10001}, {.outward = 10000, .level = 10000}};
     struct spl_orient_edge edges[8];
     for (uint32_t w = 0; w < 4; w++) {
-        edges[w] = (struct spl_orient_edge){floor, walls + w, (200 - (int64_t)w) * (1 << 20)};
+        edges[w] = (struct spl_orient_edge){ground, walls + w, (200 - (int64_t)w) * (1 << 20)};
         edges[4 + w] = (struct spl_orient_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
     }
     assert_int_equal(spl_orient_components(room, pieces, edges, 8, NULL, NULL), 0);
-    assert_int_not_equal(room[ceiling].flip, room[floor].flip);
+    assert_int_not_equal(room[ceiling].flip, room[ground].flip);
     for (int w = walls; w < pieces; w++)
-        assert_int_equal(room[w].flip, room[floor].flip);
+        assert_int_equal(room[w].flip, room[ground].flip);
 }
 
 int main(void)
