@@ -88,14 +88,14 @@ uint standing_for(ivec2 at)
     precise float sum = 0.0;
     float covered = 0.0, closest = 3.4e38;
     for (int i = 0;;) {
-        uint bits = depth_word(sample_beside(at, i));
+        uint bits = depth_word(sample_beside(at, i, 1));
         sum += bits != SPL_NOTHING ? uintBitsToFloat(bits) : 0.0;
         covered += bits != SPL_NOTHING ? 1.0 : 0.0;
         if (++i >= 9)
             break;
     }
     for (int i = 0; covered >= 7.0;) {
-        uint beside = sample_beside(at, i), bits = depth_word(beside);
+        uint beside = sample_beside(at, i, 1), bits = depth_word(beside);
         precise float off = abs(covered * uintBitsToFloat(bits) - sum);
         bool closer = bits != SPL_NOTHING && off < closest;
         found = closer ? beside : found;

@@ -38,17 +38,11 @@ uvec3 unpack_color(uint word)
     return (uvec3(word) >> uvec3(0u, 8u, 16u)) & 255u;
 }
 
-/* The i-th of the 3 x 3 samples around `at`; outside of the tile `at` itself. */
-uint sample_beside(ivec2 at, int i)
+/* The i-th of 3 x 3 samples around `at` that lie `apart` from each other; outside of the tile `at` itself. */
+uint sample_beside(ivec2 at, int i, int apart)
 {
-    ivec2 beside = at + ivec2(i % 3 - 1, i / 3 - 1);
+    ivec2 beside = at + apart * ivec2(i % 3 - 1, i / 3 - 1);
     return sample_index(uint(beside.x) < frame.width && uint(beside.y) < frame.height ? beside : at);
-}
-
-/* The sample at `at`; outside of the tile `otherwise`. */
-uint sample_at(ivec2 at, uint otherwise)
-{
-    return uint(at.x) < frame.width && uint(at.y) < frame.height ? sample_index(at) : otherwise;
 }
 
 /* The colour around `at`, which holds something: the mean over 3 x 3 samples on its surface, with `weighted` times what
@@ -62,7 +56,7 @@ vec3 smooth_color(ivec2 at, uint own, bool weighted)
     float beside = size == 0 ? 1.0 : 2.0;
     vec3 sum = vec3(0.0);
     for (int i = 0;;) {
-        uint found = sample_at(at + apart * ivec2(i % 3 - 1, i / 3 - 1), own);
+        uint found = sample_beside(at, i, apart);
         float z = uintBitsToFloat(depth_word(found)); /* SPL_NOTHING is no number: compares as false */
         float weight = i == 4 ? 4.0 : i % 2 == 1 ? beside : 0.5 * beside;
         weight = abs(z - first) <= depth_slack(first, SPL_SMOOTH_SHARE) ? weight : 0.0;
