@@ -2,8 +2,11 @@
  * chunks.
  *
  * Inside a chunk the splitting goes on down to single splats, and the two halves of each split are interleaved: so the
- * first 2^k splats of a chunk are one of each of its 2^k parts, and any prefix is as even as the splits are. */
+ * first 2^k splats of a chunk are one of each of its 2^k parts, and any prefix is as even as the splits are. What order
+ * is left to choose, within the runs that are drawn as a whole or nearly so, is that of sizes. */
 #include "pack/chunks.h"
+
+#include <string.h>
 
 #include "shared.h"
 
@@ -147,4 +150,34 @@ void spl_chunks_cut(struct spl_cut *items, size_t count)
     }
     if (count)
         order_chunk(items, count);
+}
+
+/* How many of a run are smaller than each, the first of equals before the others: its place among them. Radii above 0
+ * are in the order of their bits. */
+static void rank(const uint32_t *bits, uint32_t *place)
+{
+    for (uint32_t i = 0; i < SPL_RUN_SPLATS; i++)
+        place[i] = 0;
+    for (uint32_t j = 0; j < SPL_RUN_SPLATS; j++)
+        for (uint32_t i = 0; i < SPL_RUN_SPLATS; i++)
+            place[i] += (bits[j] < bits[i]) | ((bits[j] == bits[i]) & (j < i));
+}
+
+void spl_chunk_match_lanes(struct spl_cut *items, const float *radius, size_t count)
+{
+    for (size_t first = 0; first < count; first += SPL_RUN_SPLATS) {
+        size_t used = count - first < SPL_RUN_SPLATS ? count - first : SPL_RUN_SPLATS;
+        uint32_t bits[SPL_RUN_SPLATS], place[SPL_RUN_SPLATS];
+        struct spl_cut run[SPL_RUN_SPLATS];
+        memset(bits, 0xff, sizeof bits); /* what is not there comes last */
+        memcpy(bits, radius + first, used * sizeof *bits);
+        rank(bits, place);
+        /* the smallest go before the largest, behind those between */
+        uint32_t groups = (uint32_t)(used + SPL_LANES - 1) / SPL_LANES, between = groups > 2 ? (groups - 2) * SPL_LANES : 0;
+        for (size_t i = 0; i < used; i++) {
+            uint32_t to = place[i];
+            run[to < SPL_LANES ? to + between : to < SPL_LANES + between ? to - SPL_LANES : to] = items[first + i];
+        }
+        memcpy(items + first, run, used * sizeof *run);
+    }
 }

@@ -224,6 +224,15 @@ static size_t chunks_of(uint32_t count)
     return (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
 }
 
+static void match_lanes(struct spl_node_encoder *w, const struct spl_tree_node *node, struct spl_cut *items, uint32_t count)
+{
+    float radius[SPL_CHUNK_SPLATS];
+    for (uint32_t i = 0; i < count; i++)
+        radius[i] = spl_tree_node_has_points(node) ? w->points->radius[node->begin + items[i].index]
+                                                   : node->splats[items[i].index].radius;
+    spl_chunk_match_lanes(items, radius, count);
+}
+
 /* Adds items [begin, end) to the node's chunks. */
 static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node *node, uint32_t begin, uint32_t end,
                          struct spl_node *header, struct spl_encoded_node *out)
@@ -233,6 +242,7 @@ static void encode_discs(struct spl_node_encoder *w, const struct spl_tree_node 
         struct spl_splat splats[SPL_CHUNK_SPLATS];
         double position[SPL_CHUNK_SPLATS][3];
         const uint32_t used = end - first < SPL_CHUNK_SPLATS ? end - first : SPL_CHUNK_SPLATS, c = out->chunk_count++;
+        match_lanes(w, node, w->items + first, used);
         for (uint32_t i = 0; i < used; i++) {
             uint32_t at = w->items[first + i].index;
             if (spl_tree_node_has_points(node))

@@ -111,6 +111,85 @@ static void test_prefixes_are_even(void **state)
     free(items);
 }
 
+static double radius_of(uint32_t index)
+{
+    return 0.01 * (1 + index * 2654435761u % 1000 / 250.0); /* no order of places, fivefold */
+}
+
+/* What lanes wait for: the largest of the SPL_LANES discs that are drawn together. */
+static double waits(const struct spl_cut *items, size_t count)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i += SPL_LANES) {
+        double most = 0;
+        for (size_t lane = i; lane < i + SPL_LANES && lane < count; lane++)
+            most = fmax(most, radius_of(items[lane].index) * radius_of(items[lane].index));
+        sum += SPL_LANES * most;
+    }
+    return sum;
+}
+
+static double mean_radius(const struct spl_cut *items, size_t count)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += radius_of(items[i].index);
+    return sum / (double)count;
+}
+
+/* Lanes draw discs of about one size; each run keeps its splats, and what is drawn of it is of middle size. Whatever a
+ * chunk's count: also where the last run, or the last group of lanes, is not full. */
+static void test_lanes_draw_discs_of_one_size(void **state)
+{
+    (void)state;
+    for (size_t count = 1; count <= SPL_CHUNK_SPLATS; count++) {
+        struct spl_cut *items = cut_of(SHAPE_PLANE, count), before[SPL_CHUNK_SPLATS];
+        float radius[SPL_CHUNK_SPLATS];
+        spl_chunks_cut(items, count);
+        memcpy(before, items, count * sizeof *items);
+        for (size_t i = 0; i < count; i++)
+            radius[i] = (float)radius_of(items[i].index);
+        spl_chunk_match_lanes(items, radius, count);
+        for (size_t first = 0; first < count; first += SPL_RUN_SPLATS) {
+            size_t used = count - first < SPL_RUN_SPLATS ? count - first : SPL_RUN_SPLATS;
+            uint64_t was = 0, is = 0;
+            for (size_t i = first; i < first + used; i++) {
+                was += (uint64_t)1 << before[i].index % 61;
+                is += (uint64_t)1 << items[i].index % 61;
+            }
+            assert_true(was == is);
+            if (used < SPL_RUN_SPLATS)
+                continue;
+            double mean = mean_radius(items + first, used);
+            assert_true(waits(items + first, used) < 0.8 * waits(before + first, used));
+            for (size_t part = SPL_LANES; part < used; part += SPL_LANES)
+                assert_true(fabs(mean_radius(items + first, part) / mean - 1) < 0.35);
+        }
+        free(items);
+    }
+}
+
+/* Discs of one size stay as they were, but for whole groups: equal input, equal bytes. */
+static void test_equal_sizes_keep_their_order(void **state)
+{
+    (void)state;
+    struct spl_cut *items = cut_of(SHAPE_PLANE, SPL_CHUNK_SPLATS), before[SPL_CHUNK_SPLATS];
+    float radius[SPL_CHUNK_SPLATS];
+    spl_chunks_cut(items, SPL_CHUNK_SPLATS);
+    memcpy(before, items, sizeof before);
+    for (size_t i = 0; i < SPL_CHUNK_SPLATS; i++)
+        radius[i] = 0.02f;
+    spl_chunk_match_lanes(items, radius, SPL_CHUNK_SPLATS);
+    for (size_t group = 0; group < SPL_CHUNK_SPLATS; group += SPL_LANES) {
+        size_t of_run = group % SPL_RUN_SPLATS, run = group - of_run;
+        size_t from = of_run + SPL_LANES == SPL_RUN_SPLATS       ? of_run
+                      : of_run + 2 * SPL_LANES == SPL_RUN_SPLATS ? 0
+                                                                 : of_run + SPL_LANES;
+        assert_memory_equal(items + group, before + run + from, SPL_LANES * sizeof *items);
+    }
+    free(items);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -118,6 +197,8 @@ int main(void)
         cmocka_unit_test(test_equal_values),
         cmocka_unit_test(test_chunks_are_compact),
         cmocka_unit_test(test_prefixes_are_even),
+        cmocka_unit_test(test_lanes_draw_discs_of_one_size),
+        cmocka_unit_test(test_equal_sizes_keep_their_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
