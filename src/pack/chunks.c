@@ -173,7 +173,8 @@ void spl_chunk_match_lanes(struct spl_cut *items, const float *radius, size_t co
         memcpy(bits, radius + first, used * sizeof *bits);
         rank(bits, place);
         /* the smallest go before the largest, behind those between */
-        uint32_t groups = (uint32_t)(used + SPL_LANES - 1) / SPL_LANES, between = groups > 2 ? (groups - 2) * SPL_LANES : 0;
+        uint32_t groups = (uint32_t)(used + SPL_LANES - 1) / SPL_LANES;
+        uint32_t between = groups > 2 ? (groups - 2) * SPL_LANES : 0;
         for (size_t i = 0; i < used; i++) {
             uint32_t to = place[i];
             run[to < SPL_LANES ? to + between : to < SPL_LANES + between ? to - SPL_LANES : to] = items[first + i];

@@ -224,7 +224,8 @@ static size_t chunks_of(uint32_t count)
     return (count + SPL_CHUNK_SPLATS - 1) / SPL_CHUNK_SPLATS;
 }
 
-static void match_lanes(struct spl_node_encoder *w, const struct spl_tree_node *node, struct spl_cut *items, uint32_t count)
+static void match_lanes(struct spl_node_encoder *w, const struct spl_tree_node *node, struct spl_cut *items,
+                        uint32_t count)
 {
     float radius[SPL_CHUNK_SPLATS];
     for (uint32_t i = 0; i < count; i++)
