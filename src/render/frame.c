@@ -31,7 +31,7 @@ static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
     if (spl_dataset_is_without(job->resident->dataset, part))
         return SPL_SELECT_NO;
     if (job->counts && slot < spl_slot_of_tables(job->resident->dataset, 0))
-        return SPL_SELECT_YES;
+        return !job->had || job->had[slot] ? SPL_SELECT_YES : SPL_SELECT_NO;
     bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
