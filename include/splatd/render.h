@@ -74,7 +74,8 @@ SPL_API int spl_view_check_layers(const struct spl_view *view, const struct spl_
                                   struct spl_error *err);
 
 struct spl_frame_stats {
-    uint64_t splats_drawn, chunks_drawn, nodes_drawn; /* of all tiles together; splats alone, without primitives */
+    uint64_t splats_drawn, chunks_drawn, nodes_drawn; /* of all tiles together; splats alone, without primitives. Of a
+                                   tile that several devices drew: by one, of all pages that any of its pieces had */
     uint64_t pages_loaded;      /* that the frame has waited for */
     uint32_t tiles;
     bool complete;              /* every chosen page was drawn; else coarser nodes stood in, as the memory limit or

@@ -66,9 +66,12 @@ static int make_room(struct spl_residency *residency, bool evict_held, uint64_t 
     }
     if (bytes > limit - used + gives_way && bytes <= limit - used + gives_way + held)
         return SPL_SLOT_CROWDED;
-    if (bytes > limit - used + gives_way)
+    if (bytes > limit - used + gives_way) {
+        const uint64_t lacking = bytes - (limit - used + gives_way);
+        residency->lacking = residency->lacking && residency->lacking < lacking ? residency->lacking : lacking;
         return spl_fail(err, SPL_E_LIMIT, "%" PRIu64 " bytes have no room: of the memory limit, %" PRIu64 ", %" PRIu64
                         " are taken by what does not give way", bytes, limit, used - gives_way);
+    }
     while (bytes > limit - spl_gpu_get_memory(residency->gpu)) {
         bool gone = evict_one(residency, evict_held);
         spl_assert(gone);

@@ -31,7 +31,7 @@ static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
     if (spl_dataset_is_without(job->resident->dataset, part))
         return SPL_SELECT_NO;
     if (job->counts && slot < spl_slot_of_tables(job->resident->dataset, 0))
-        return SPL_SELECT_YES;
+        return !job->had || job->had[slot] ? SPL_SELECT_YES : SPL_SELECT_NO;
     bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
@@ -118,15 +118,35 @@ struct spl_select_params spl_frame_selection(struct spl_frame_job *job, const st
     };
 }
 
+/* Gives back what others needed where the walk has left out what then has room, so that what is left out follows from
+ * the view alone: it is to be made anew. Soft views keep what the stage had of the one before: it is an eighth of all
+ * memory, and pages in its place would have to be read and driven out with each. */
+static bool give_back(struct spl_frame_job *job, const struct spl_draw_list *list)
+{
+    struct spl_renderer *r = job->renderer;
+    const struct spl_scratch_needs needs = {
+        .soft = job->marks.count && job->view->soft.opacity > 0,
+        .shades = spl_shade_get_kinds(job->view, spl_dataset_get_info(job->resident->dataset)),
+        .list = list,
+    };
+    const uint64_t lacking = r->residency.lacking;
+    return lacking && spl_scratch_give_back(&r->scratch, &r->residency, &needs, lacking);
+}
+
 int spl_frame_find_spacing(struct spl_frame_job *job, const struct spl_camera *camera, double *spacing,
                            struct spl_error *err)
 {
     struct spl_select_params params = spl_frame_selection(job, camera);
     struct spl_error why = {0}; // a page that cannot be loaded looks like a limit to the selection
     uint64_t clock = spl_now_ns();
-    bool complete = true;
-    spl_residency_begin_walk(&job->renderer->residency, &job->hold);
-    int rc = spl_select_spacing(&params, spacing, &complete, &why), waits = end_walk(job, err);
+    bool complete;
+    int rc, waits;
+    do {
+        complete = true;
+        spl_residency_begin_walk(&job->renderer->residency, &job->hold);
+        rc = spl_select_spacing(&params, spacing, &complete, &why);
+        waits = end_walk(job, err);
+    } while (!rc && !waits && give_back(job, NULL));
     job->frame->stats.select_ms += spl_since_ms(&clock);
     if (waits)
         return waits;
@@ -270,6 +290,28 @@ int spl_frame_know_tile(struct spl_frame_job *job, struct spl_tile *tile, struct
     return rc;
 }
 
+/* Selects; anew where others had memory that this tile lacks. */
+static int select_with_room(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
+{
+    struct spl_error why = {0};
+    int rc = select_tile(job, tile, &why);
+    if ((!rc || rc == SPL_E_LIMIT) && give_back(job, &job->renderer->list)) {
+        why = (struct spl_error){0};
+        rc = select_tile(job, tile, &why);
+    }
+    return rc < 0 ? spl_fail_field(err, rc, why.field, "%s", why.message) : rc;
+}
+
+/* All that the tile takes beside pages. */
+static int take_room(struct spl_renderer *r, const struct spl_frame_job *job, const struct spl_tile *tile,
+                     struct spl_error *err)
+{
+    const uint64_t shaded = spl_tile_get_shades(tile) ? tile->samples : 0;
+    int rc = spl_soft_prepare(r, &tile->camera, job->view, err);
+    rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, err);
+    return rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, err);
+}
+
 /* Selects and uploads. Pages are taken while selecting; where they leave the draw list no room, it takes that of some,
  * and the tile is selected anew from those that then fit. */
 static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err)
@@ -278,24 +320,20 @@ static int list_tile(struct spl_frame_job *job, struct spl_tile *tile, struct sp
     struct spl_frame_stats *stats = &job->frame->stats;
     for (int attempt = 0;; attempt++) {
         uint64_t clock = spl_now_ns();
-        int rc = select_tile(job, tile, err);
+        int rc = attempt ? select_tile(job, tile, err) : select_with_room(job, tile, err);
         stats->select_ms += spl_since_ms(&clock);
         if (rc)
             return rc;
         if (is_too_much(job, tile))
             return SPL_FRAME_TOO_MUCH;
         struct spl_error why = {0};
-        rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
-        rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
-        const uint64_t shaded = spl_tile_get_shades(tile) ? tile->samples : 0;
-        rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
+        rc = take_room(r, job, tile, &why);
         bool again = !attempt && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM);
         if (again) {
             why = (struct spl_error){0};
+            spl_scratch_give_back(&r->scratch, &r->residency, &(struct spl_scratch_needs){.list = &r->list}, 0);
             spl_residency_begin_walk(&r->residency, &job->hold); // what this frame asked for may go, too
-            rc = spl_soft_prepare(r, &tile->camera, job->view, &why);
-            rc = rc ? rc : spl_scratch_upload(&r->scratch, &r->residency, &r->list, &why);
-            rc = rc ? rc : spl_scratch_make_shades(&r->scratch, &r->residency, shaded, &why);
+            rc = take_room(r, job, tile, &why);
         }
         stats->upload_ms += spl_since_ms(&clock);
         if (rc || !again)

@@ -24,7 +24,8 @@ struct spl_frame_job {
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
     struct spl_frame_whole whole;  /* of a tile that is cut */
-    bool counts;                   /* nothing is drawn of what is walked: pages count as if they were there */
+    bool counts;                   /* nothing is drawn of what is walked: pages count as if they were there, */
+    const bool *had;               // these alone, by slot; may be NULL: all
     struct spl_soft_pause pause;   /* what of the piece is walked */
     double advance; /* of spl_camera_advance(): what depths of the view are more by than those that are drawn */
 };
@@ -50,9 +51,9 @@ int spl_frame_make_images(struct spl_frame *frame, const struct spl_view *view, 
 enum { SPL_FRAME_TOO_MUCH = SPL_SLOT_PENDING + 1, SPL_FRAME_PAUSED };
 int spl_frame_render_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_error *err);
 
-/* Finds what is to be known of `tile` for its pieces, as it is with all its pages: job->whole; no page is asked for,
- * but tables are. *drawn: what it draws. SPL_SLOT_PENDING where it has these to wait for; SPL_E_LIMIT as of rendering.
- */
+/* Finds what is to be known of `tile` for its pieces, as it is with all its pages, or those of job->had: job->whole; no
+ * page is asked for, but tables are. *drawn: what it draws. SPL_SLOT_PENDING where it has these to wait for;
+ * SPL_E_LIMIT as of rendering. */
 int spl_frame_know_tile(struct spl_frame_job *job, struct spl_tile *tile, struct spl_frame_stats *drawn,
                         struct spl_error *err);
 

@@ -12,6 +12,7 @@ struct spl_kernel_made {
     struct spl_kernel_key key;
     struct spl_gpu_kernel *kernel;
     uint64_t used; /* turn in which it was got last */
+    bool again;    /* in another than it was made in */
 };
 
 static bool is_same(const struct spl_kernel_key *a, const struct spl_kernel_key *b)
@@ -30,22 +31,39 @@ static int make(struct spl_gpu *gpu, const struct spl_kernel_key *key, struct sp
     return spl_gpu_kernel_create(gpu, name, key->constants, SPL_KERNEL_CONSTANTS, out, err);
 }
 
-static void drop_oldest(struct spl_kernels *kernels, struct spl_gpu *gpu)
+/* Of more than half that were used again, that was longest ago: it is as new ones are. */
+static void let_age(struct spl_kernels *kernels)
 {
-    size_t oldest = 0;
-    for (size_t i = 1; i < kernels->count; i++)
-        oldest = kernels->made[i].used < kernels->made[oldest].used ? i : oldest;
-    spl_gpu_kernel_destroy(gpu, kernels->made[oldest].kernel);
-    kernels->made[oldest] = kernels->made[--kernels->count];
+    size_t again = 0;
+    struct spl_kernel_made *oldest = NULL;
+    for (struct spl_kernel_made *made = kernels->made; made < kernels->made + kernels->count; made++) {
+        again += made->again;
+        if (made->again && (!oldest || made->used < oldest->used))
+            oldest = made;
+    }
+    if (2 * again > kernels->count)
+        oldest->again = false;
+}
+
+/* Any of those that were not used again. Of those that come round in turns, the one that was used longest ago would
+ * always be the next that is wanted. */
+static void drop_one(struct spl_kernels *kernels, struct spl_gpu *gpu)
+{
+    let_age(kernels);
+    kernels->random = kernels->random * 1664525u + 1013904223u; // Numerical Recipes; its high bits are the random ones
+    size_t gone = (kernels->random >> 8) % kernels->count;
+    while (kernels->made[gone].again)
+        gone = (gone + 1) % kernels->count;
+    spl_gpu_kernel_destroy(gpu, kernels->made[gone].kernel);
+    kernels->made[gone] = kernels->made[--kernels->count];
 }
 
 void spl_kernels_begin(struct spl_kernels *kernels, struct spl_gpu *gpu, bool parallel)
 {
     kernels->parallel = parallel;
     kernels->turn++;
-    if (kernels->count > SPL_KERNELS_MOST + kernels->more)
-        while (kernels->count > SPL_KERNELS_KEPT + kernels->more)
-            drop_oldest(kernels, gpu);
+    while (kernels->count > SPL_KERNELS_MOST + kernels->more)
+        drop_one(kernels, gpu);
 }
 
 int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const struct spl_kernel_key *wanted,
@@ -56,6 +74,7 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
     for (size_t i = 0; i < kernels->count; i++) {
         if (is_same(&kernels->made[i].key, key)) {
             *out = kernels->made[i].kernel;
+            kernels->made[i].again |= kernels->made[i].used != kernels->turn;
             kernels->made[i].used = kernels->turn;
             return SPL_OK;
         }
@@ -64,7 +83,7 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
         return SPL_E_NOMEM;
     int rc = make(gpu, key, out, err);
     if (!rc)
-        kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out, kernels->turn};
+        kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out, kernels->turn, false};
     return rc;
 }
 

@@ -118,6 +118,11 @@ static int preload(struct spl_renderer *renderer, const struct spl_dataset *data
         if (!first && (spl_dataset_is_remote(dataset) || !spl_residency_has_room(residency, resident, next)))
             break; // the rest comes as views need it
         rc = spl_residency_ask(residency, resident, next, false, &why);
+        const struct spl_scratch_needs none = {.list = &(struct spl_draw_list){0}};
+        if (first && rc == SPL_E_LIMIT && spl_scratch_give_back(&renderer->scratch, residency, &none, 0)) {
+            why = (struct spl_error){0};
+            rc = spl_residency_ask(residency, resident, next, false, &why);
+        }
         if (!first && (rc == SPL_E_LIMIT || rc == SPL_E_NOMEM || rc == SPL_SLOT_CROWDED))
             break;
         if (rc < 0)

@@ -15,9 +15,11 @@
 #include "render/select.h"
 #include "render/soft/order.h"
 
-/* Fixed, pre-sized device memory of one tile. */
+/* Device memory of one tile: pre-sized, but for what is said to grow or to be made on demand, which
+ * spl_scratch_give_back() gives back. */
 struct spl_scratch {
     uint64_t samples;              /* capacity */
+    uint64_t first_chunks;         /* the same of chunks, before they grow */
     uint64_t taken_bytes;          /* by all buffers below */
     struct spl_gpu_buffer *depth;  /* 4 bytes a sample; 8 with 64 bit atomics (where the nearest wins) */
     struct spl_gpu_buffer *large;  /* 16 bytes a sample; see enum spl_area */
@@ -112,6 +114,16 @@ int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *reside
 /* Makes room for the factors of a shaded tile of so many samples; 0 needs none. Errors as of upload. */
 int spl_scratch_make_shades(struct spl_scratch *scratch, struct spl_residency *residency, uint64_t samples,
                             struct spl_error *err);
+
+/* What of its memory on demand is needed just now. */
+struct spl_scratch_needs {
+    bool soft, shades;
+    const struct spl_draw_list *list; // may be NULL: whatever buffers have room for
+};
+/* Between a tile's walk and its upload, or between tiles: gives back what is not needed where that is `least` bytes,
+ * and buffers of a list that is four times as long, so that views in turns do not grow them each time. Says whether. */
+bool spl_scratch_give_back(struct spl_scratch *scratch, struct spl_residency *residency,
+                           const struct spl_scratch_needs *needs, uint64_t least);
 
 /* Begins an area and returns its memory, for who clears it. What holds between dispatches is ended by who began it. */
 bool spl_tile_may_begin(const struct spl_tile *tile, enum spl_area area); /* is its block free? */
@@ -225,6 +237,7 @@ static inline uint32_t spl_tile_get_paint(const struct spl_tile *tile, uint32_t 
  * shading looks away. light() records what of it comes from normals, which it draws for it, before the group of colours
  * (`first` as of a method's record()); deepen() what comes from depths, behind it. */
 uint32_t spl_tile_get_shades(const struct spl_tile *tile);
+uint32_t spl_shade_get_kinds(const struct spl_view *view, const struct spl_dataset_info *info); /* the same of a view */
 uint32_t spl_shade_get_reach(const struct spl_view *view, const struct spl_dataset_info *info);
 int spl_tile_light(struct spl_tile *tile, bool *first, struct spl_error *err);
 int spl_tile_deepen(struct spl_tile *tile, struct spl_error *err);

@@ -108,6 +108,7 @@ void spl_residency_begin_walk(struct spl_residency *residency, struct spl_hold *
     residency->frame++;
     residency->asker = asker;
     residency->asked_count = 0;
+    residency->lacking = 0;
     residency->pending = residency->crowded = residency->stalled = residency->later = false;
     bool any = spl_io_count_hanging(residency->io);
     for (size_t i = 0; i < residency->dataset_count; i++)

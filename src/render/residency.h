@@ -99,6 +99,7 @@ struct spl_residency {
     bool pending, crowded;   /* some of them are on their way; have no room before another frame lets go */
     bool stalled;            /* crowded, since their disk hangs */
     bool later;              /* some that it does without are on their way, or will have room */
+    uint64_t lacking;        /* the least that one of those without room lacked, bytes; 0 = all had room */
 };
 
 /* `wake` as spl_io_create(). */

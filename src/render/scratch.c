@@ -1,5 +1,6 @@
-/* Device memory of the renderer: taken once, sized by the largest tile; only the draw list's buffers may grow. What may
- * share a block, and for how long each holds it, stands in one table. */
+/* Device memory of the renderer: taken once, sized by the largest tile. The draw list's buffers grow with it, and what
+ * few views draw takes its own when first drawn; both are given back when another view lacks room. What may share a
+ * block, and for how long each holds it, stands in one table. */
 #include "render/renderer.h"
 
 #include <inttypes.h>
@@ -94,12 +95,12 @@ int spl_scratch_init(struct spl_scratch *scratch, struct spl_gpu *gpu, uint64_t 
         samples = limits->binding_bytes / 16;
     if (samples > (uint64_t)limits->workgroups * SPL_WORKGROUP) /* the resolve pass is one dispatch */
         samples = (uint64_t)limits->workgroups * SPL_WORKGROUP;
-    *scratch = (struct spl_scratch){.samples = samples};
     uint64_t chunks = options->first_page_chunks + options->first_page_chunks / 4; // near ones, in several windows
     if (chunks < chunks_at_start)
         chunks = chunks_at_start;
     if (chunks > limits->binding_bytes / sizeof(struct spl_draw_chunk))
         chunks = limits->binding_bytes / sizeof(struct spl_draw_chunk);
+    *scratch = (struct spl_scratch){.samples = samples, .first_chunks = chunks};
     bool software = spl_gpu_get_device(gpu)->software;
     const struct {
         struct spl_gpu_buffer **buffer;
@@ -153,7 +154,7 @@ void spl_scratch_finish(struct spl_scratch *scratch, struct spl_gpu *gpu)
     *scratch = (struct spl_scratch){0};
 }
 
-/* What the buffers may still take. They never shrink, so they leave every dataset the room of its first page. */
+/* What the buffers may still take. They do not give way to pages, so they leave every dataset the room of its first. */
 static uint64_t room(const struct spl_scratch *scratch, const struct spl_residency *residency)
 {
     uint64_t limit = spl_gpu_get_limits(residency->gpu)->memory_bytes;
@@ -198,33 +199,95 @@ static int make_room(struct spl_scratch *scratch, struct spl_residency *residenc
 int spl_scratch_make_shades(struct spl_scratch *scratch, struct spl_residency *residency, uint64_t samples,
                             struct spl_error *err)
 {
-    return make_room(scratch, residency, &scratch->shades, SPL_GPU_DEVICE, samples * sizeof(uint32_t), err);
+    const uint64_t bytes = samples * sizeof(uint32_t);
+    return bytes ? make_room(scratch, residency, &scratch->shades, SPL_GPU_DEVICE, bytes, err) : SPL_OK;
 }
 
-static int upload(struct spl_scratch *scratch, struct spl_residency *residency, struct spl_gpu_buffer **buffer,
-                  const void *from, uint64_t bytes, struct spl_error *err)
+/* A buffer of the draw list. */
+struct list_part {
+    struct spl_gpu_buffer **buffer;
+    enum spl_gpu_buffer_kind kind;
+    const void *from;
+    uint64_t bytes, first; /* of the list; at the start */
+};
+enum { LIST_PARTS = 5 };
+
+static void find_parts(struct spl_scratch *scratch, const struct spl_draw_list *list, struct list_part out[LIST_PARTS])
 {
-    int rc = make_room(scratch, residency, buffer, SPL_GPU_UPLOAD, bytes, err);
-    if (!rc && bytes)
-        memcpy(spl_gpu_buffer_map(*buffer), from, bytes);
-    return rc;
+    const uint64_t chunks = scratch->first_chunks, word = sizeof(uint32_t);
+    const struct list_part parts[LIST_PARTS] = {
+        {&scratch->marks, SPL_GPU_DEVICE, NULL, list->mark_words * word, marks_at_start},
+        {&scratch->chunks, SPL_GPU_UPLOAD, list->chunks, list->chunk_count * sizeof *list->chunks,
+         chunks * sizeof *list->chunks},
+        {&scratch->bounds, SPL_GPU_UPLOAD, list->bounds, list->chunk_count * sizeof *list->bounds,
+         chunks * sizeof *list->bounds},
+        {&scratch->entries, SPL_GPU_UPLOAD, list->entries, list->entry_count * word,
+         chunks * chunk_entries_at_start * word},
+        {&scratch->tests, SPL_GPU_UPLOAD, list->tests, list->test_count * word, tests_at_start},
+    };
+    memcpy(out, parts, sizeof parts);
 }
 
 int spl_scratch_upload(struct spl_scratch *scratch, struct spl_residency *residency, const struct spl_draw_list *list,
                        struct spl_error *err)
 {
-    const struct {
-        struct spl_gpu_buffer **buffer;
-        const void *from;
-        uint64_t bytes;
-    } all[] = {
-        {&scratch->chunks, list->chunks, list->chunk_count * sizeof *list->chunks},
-        {&scratch->bounds, list->bounds, list->chunk_count * sizeof *list->bounds},
-        {&scratch->entries, list->entries, list->entry_count * sizeof *list->entries},
-        {&scratch->tests, list->tests, list->test_count * sizeof *list->tests},
-    };
-    int rc = make_room(scratch, residency, &scratch->marks, SPL_GPU_DEVICE, list->mark_words * sizeof(uint32_t), err);
-    for (size_t i = 0; i < sizeof all / sizeof *all && !rc; i++)
-        rc = upload(scratch, residency, all[i].buffer, all[i].from, all[i].bytes, err);
+    struct list_part parts[LIST_PARTS];
+    find_parts(scratch, list, parts);
+    int rc = SPL_OK;
+    for (size_t i = 0; i < LIST_PARTS && !rc; i++) {
+        const struct list_part *part = &parts[i];
+        const uint64_t bytes = *part->buffer || part->bytes > part->first ? part->bytes : part->first;
+        rc = make_room(scratch, residency, part->buffer, part->kind, bytes, err);
+        if (!rc && part->kind == SPL_GPU_UPLOAD && part->bytes)
+            memcpy(spl_gpu_buffer_map(*part->buffer), part->from, part->bytes);
+    }
     return rc;
+}
+
+static void drop(struct spl_scratch *scratch, struct spl_gpu *gpu, struct spl_gpu_buffer **buffer)
+{
+    scratch->taken_bytes -= *buffer ? taken(spl_gpu_buffer_get_bytes(*buffer)) : 0;
+    spl_gpu_buffer_destroy(gpu, *buffer);
+    *buffer = NULL;
+}
+
+/* What a part is to be cut to, as it would have grown; 0: it is no larger than twice that, as lists of one view are. */
+static uint64_t cut_to(const struct list_part *part)
+{
+    uint64_t grown = part->first;
+    while (grown < part->bytes)
+        grown *= 2;
+    return *part->buffer && spl_gpu_buffer_get_bytes(*part->buffer) > 2 * grown ? grown : 0;
+}
+
+bool spl_scratch_give_back(struct spl_scratch *scratch, struct spl_residency *residency,
+                           const struct spl_scratch_needs *needs, uint64_t least)
+{
+    struct spl_gpu *gpu = residency->gpu;
+    struct list_part parts[LIST_PARTS];
+    size_t count = 0;
+    uint64_t spare = needs->soft ? 0 : scratch->soft_bytes;
+    spare += needs->shades || !scratch->shades ? 0 : taken(spl_gpu_buffer_get_bytes(scratch->shades));
+    if (needs->list)
+        find_parts(scratch, needs->list, parts);
+    for (size_t i = 0; i < LIST_PARTS && needs->list; i++)
+        if (cut_to(&parts[i])) {
+            spare += taken(spl_gpu_buffer_get_bytes(*parts[i].buffer)) - taken(cut_to(&parts[i]));
+            parts[count++] = parts[i];
+        }
+    if (!spare || spare < least)
+        return false;
+    if (!needs->soft) {
+        spl_soft_memory_finish(&scratch->soft, gpu);
+        scratch->taken_bytes -= scratch->soft_bytes;
+        scratch->soft_bytes = 0;
+    }
+    if (!needs->shades)
+        drop(scratch, gpu, &scratch->shades);
+    for (size_t i = 0; i < count; i++) {
+        const uint64_t left = cut_to(&parts[i]);
+        drop(scratch, gpu, parts[i].buffer);
+        make_room(scratch, residency, parts[i].buffer, parts[i].kind, left, NULL);
+    } /* where that fails, spl_scratch_upload() tries again */
+    return true;
 }

@@ -19,6 +19,12 @@ struct stretch {
     size_t first, end;
 };
 
+struct told {
+    struct spl_frame_whole whole;
+    struct spl_frame_stats drawn; /* by all its pieces */
+    bool *had;                    // by slot: what any piece was drawn of; may be NULL
+};
+
 struct spl_spread {
     pthread_mutex_t mutex;
     unsigned renderers;
@@ -31,7 +37,8 @@ struct spl_spread {
     size_t left;                      /* pieces that are not drawn */
     struct stretch stretches[SPL_SPREAD_MAX];
     size_t held[SPL_SPREAD_MAX], back[SPL_SPREAD_MAX], back_count;
-    struct spl_frame_whole *wholes; /* of each tile */
+    struct told *told;                /* of each tile */
+    size_t tiles;
     uint64_t pixels_left;
     double total_ms[SPL_SPREAD_MAX];
 };
@@ -64,7 +71,9 @@ void spl_spread_destroy(struct spl_spread *spread)
         return;
     spl_frame_finish(&spread->frame);
     pthread_mutex_destroy(&spread->mutex);
-    free(spread->wholes);
+    for (size_t i = 0; i < spread->tiles; i++)
+        free(spread->told[i].had);
+    free(spread->told);
     free(spread);
 }
 
@@ -93,7 +102,7 @@ static void find(const struct spl_spread *spread, size_t number, struct spl_spre
                              .y = index / spread->columns * spread->tile_height};
     tile.width = rest(camera->width, tile.x, spread->tile_width);
     tile.height = rest(camera->height, tile.y, spread->tile_height);
-    *out = (struct spl_spread_piece){.tile = tile, .index = index, .whole = spread->wholes[index]};
+    *out = (struct spl_spread_piece){.tile = tile, .index = index, .whole = spread->told[index].whole};
     out->piece = (struct spl_piece){.x = tile.x + x,
                                     .y = tile.y + y,
                                     .width = rest(tile.width, x, spread->width),
@@ -140,8 +149,9 @@ static int lay_out(struct spl_spread *spread, const struct spl_tiling *tiling, s
         spl_assert(tiling->width == spread->tile_width && tiling->height == spread->tile_height);
         return SPL_OK;
     }
-    if (!(spread->wholes = spl_alloc(tiles, sizeof *spread->wholes, err)))
+    if (!(spread->told = spl_alloc(tiles, sizeof *spread->told, err)))
         return SPL_E_NOMEM;
+    spread->tiles = tiles;
     spread->tile_width = tiling->width;
     spread->tile_height = tiling->height;
     spread->columns = columns;
@@ -211,10 +221,46 @@ void spl_spread_tell(struct spl_spread *spread, uint32_t index, const struct spl
                      const struct spl_frame_stats *drawn)
 {
     pthread_mutex_lock(&spread->mutex);
-    if (!spread->wholes[index].pixels) {
-        spread->wholes[index] = *whole;
-        add(&spread->frame.stats, drawn);
+    if (!spread->told[index].whole.pixels) {
+        spread->told[index].whole = *whole;
+        spread->told[index].drawn = *drawn;
     }
+    pthread_mutex_unlock(&spread->mutex);
+}
+
+int spl_spread_note_had(struct spl_spread *spread, uint32_t index, const struct spl_resident_dataset *resident,
+                        uint64_t walk, struct spl_error *err)
+{
+    pthread_mutex_lock(&spread->mutex);
+    struct told *told = &spread->told[index];
+    if (!told->had)
+        told->had = spl_alloc(resident->slot_count, sizeof *told->had, err);
+    for (uint32_t slot = 0; slot < resident->slot_count && told->had; slot++)
+        told->had[slot] |= resident->pages[slot].last_frame == walk && resident->pages[slot].filled;
+    pthread_mutex_unlock(&spread->mutex);
+    return told->had ? SPL_OK : SPL_E_NOMEM;
+}
+
+bool spl_spread_find_short(struct spl_spread *spread, uint32_t *index, struct spl_piece *tile, const bool **had)
+{
+    pthread_mutex_lock(&spread->mutex);
+    bool found = false;
+    for (; !spread->left && !spread->frame.stats.complete && *index < spread->tiles; ++*index) {
+        struct spl_spread_piece first;
+        find(spread, *index * spread->across * spread->down, &first);
+        *tile = first.tile;
+        *had = spread->told[*index].had;
+        if ((found = *had && spread->told[*index].whole.pixels))
+            break;
+    }
+    pthread_mutex_unlock(&spread->mutex);
+    return found;
+}
+
+void spl_spread_tell_anew(struct spl_spread *spread, uint32_t index, const struct spl_frame_stats *drawn)
+{
+    pthread_mutex_lock(&spread->mutex);
+    spread->told[index].drawn = *drawn;
     pthread_mutex_unlock(&spread->mutex);
 }
 
@@ -262,6 +308,9 @@ void spl_spread_hand_out(struct spl_spread *spread, struct spl_frame *frame)
     for (unsigned i = 0; i < spread->renderers; i++)
         if (spread->frame.stats.total_ms < spread->total_ms[i])
             spread->frame.stats.total_ms = spread->total_ms[i];
+    for (size_t i = 0; i < spread->tiles; i++)
+        if (spread->told[i].whole.pixels)
+            add(&spread->frame.stats, &spread->told[i].drawn);
     *frame = spread->frame;
     spread->frame = (struct spl_frame){0};
     pthread_mutex_unlock(&spread->mutex);

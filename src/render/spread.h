@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "render/pieces.h"
+#include "render/residency.h"
 #include "render/tiling.h"
 
 enum { SPL_SPREAD_MAX = 16 }; /* renderers */
@@ -57,6 +58,14 @@ int spl_spread_take(struct spl_spread *spread, unsigned number, const struct spl
 /* What is known of a tile from now on; who says it first counts what it draws. */
 void spl_spread_tell(struct spl_spread *spread, uint32_t index, const struct spl_frame_whole *whole,
                      const struct spl_frame_stats *drawn);
+
+/* A piece of the tile was drawn, of what `walk` asked for and had. SPL_E_NOMEM. */
+int spl_spread_note_had(struct spl_spread *spread, uint32_t index, const struct spl_resident_dataset *resident,
+                        uint64_t walk, struct spl_error *err);
+/* Once all is drawn, of an incomplete frame: the next tile from *index on that was told, and by slot what any piece of
+ * it had. What it was told to draw is of all its pages: who asks is to tell anew. False: there is none. */
+bool spl_spread_find_short(struct spl_spread *spread, uint32_t *index, struct spl_piece *tile, const bool **had);
+void spl_spread_tell_anew(struct spl_spread *spread, uint32_t index, const struct spl_frame_stats *drawn);
 
 /* The piece that it has is drawn; moves what was counted into the frame's, all but total_ms. True: it was the last. */
 bool spl_spread_done(struct spl_spread *spread, unsigned number, struct spl_frame_stats *counted);

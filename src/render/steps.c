@@ -243,6 +243,13 @@ static int draw_piece(struct spl_frame_steps *steps, struct spl_error *err)
     }
 }
 
+/* Is what it has of the spread a part of its tile? */
+static bool is_cut(const struct spl_frame_steps *steps)
+{
+    const struct spl_spread_piece *taken = &steps->taken;
+    return taken->piece.width != taken->tile.width || taken->piece.height != taken->tile.height;
+}
+
 /* The next of the spread, if there is one; its tile becomes known where it is cut. */
 static int take_piece(struct spl_frame_steps *steps, struct spl_error *err)
 {
@@ -256,14 +263,30 @@ static int take_piece(struct spl_frame_steps *steps, struct spl_error *err)
         steps->slow = false;
         spl_pieces_begin(&steps->pieces, &steps->taken.piece);
     }
-    const struct spl_spread_piece *taken = &steps->taken;
-    if (job->whole.pixels || (taken->piece.width == taken->tile.width && taken->piece.height == taken->tile.height))
+    if (job->whole.pixels || !is_cut(steps))
         return SPL_OK;
     struct spl_tile tile = place(steps, &steps->taken.tile);
     int rc = spl_frame_know_tile(job, &tile, &drawn, err);
     if (!rc)
         spl_spread_tell(steps->spread, steps->taken.index, &job->whole, &drawn);
     return rc;
+}
+
+/* All of the frame is drawn, and not of all pages: what is told of tiles is to be what one would draw of those that
+ * there were. Where tables have gone meanwhile, it stays as it is. */
+static void count_anew(struct spl_frame_steps *steps)
+{
+    struct spl_frame_job *job = &steps->job;
+    struct spl_piece piece;
+    for (uint32_t index = 0; spl_spread_find_short(steps->spread, &index, &piece, &job->had); index++) {
+        struct spl_tile tile = place(steps, &piece);
+        struct spl_frame_stats drawn = {.complete = true};
+        job->whole = (struct spl_frame_whole){0};
+        if (spl_frame_know_tile(job, &tile, &drawn, NULL) == SPL_OK)
+            spl_spread_tell_anew(steps->spread, index, &drawn);
+        spl_hold_release(&job->hold);
+    }
+    job->had = NULL;
 }
 
 /* Draws a piece of what the spread has left, or of the one that it is at. */
@@ -277,9 +300,13 @@ static int make_piece(struct spl_frame_steps *steps, struct spl_error *err)
     steps->borrowed = steps->wanted.layers;
     if (rc || (rc = draw_piece(steps, err)))
         return steps->paused ? SPL_OK : rc;
+    const struct spl_frame_job *job = &steps->job;
+    if (is_cut(steps) && (rc = spl_spread_note_had(steps->spread, steps->taken.index, job->resident,
+                                                   job->renderer->residency.frame, err)))
+        return rc;
     spl_pieces_remove(&steps->pieces);
-    if (!steps->pieces.count)
-        steps->drew_last = spl_spread_done(steps->spread, steps->number, &steps->frame.stats);
+    if (!steps->pieces.count && (steps->drew_last = spl_spread_done(steps->spread, steps->number, &steps->frame.stats)))
+        count_anew(steps);
     if (steps->drew_last && is_resampled(steps)) { // by these alone
         spl_spread_hand_out_images(steps->spread, steps->frame.images);
         steps->borrowed = 0;

@@ -7,17 +7,19 @@
 #include "render/method.h"
 #include "render/renderer.h"
 
+uint32_t spl_shade_get_kinds(const struct spl_view *view, const struct spl_dataset_info *info)
+{
+    return view->layers >> SPL_LAYER_COLOR & 1 ? spl_shade_for(&view->shade, &view->color, info) : 0;
+}
+
 uint32_t spl_tile_get_shades(const struct spl_tile *tile)
 {
-    if (!(tile->view->layers >> SPL_LAYER_COLOR & 1))
-        return 0;
-    return spl_shade_for(&tile->view->shade, &tile->view->color, spl_dataset_get_info(tile->resident->dataset));
+    return spl_shade_get_kinds(tile->view, spl_dataset_get_info(tile->resident->dataset));
 }
 
 uint32_t spl_shade_get_reach(const struct spl_view *view, const struct spl_dataset_info *info)
 {
-    const bool looks =
-        view->layers >> SPL_LAYER_COLOR & 1 && spl_shade_for(&view->shade, &view->color, info) & SPL_SHADE_EDL;
+    const bool looks = spl_shade_get_kinds(view, info) & SPL_SHADE_EDL;
     return looks ? view->shade.radius * (uint32_t)view->supersample : 0;
 }
 

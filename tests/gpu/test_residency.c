@@ -1,4 +1,5 @@
 /* Datasets larger than the device memory limit: coarser nodes stand in, pages come and go, and what fits is exact. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,6 +12,7 @@
 #include <splatd/render.h>
 
 #include "dataset/dataset.h"
+#include "render/renderer.h"
 #include "support/make_dataset.h"
 
 enum { splats = 4000000, splats_beside = 400000, width = 96, height = 64 };
@@ -240,6 +242,109 @@ static void who_was_drawn_longest_ago_gives_way(void **state)
     }
 }
 
+static struct spl_frame draw(struct spl_renderer *renderer, const struct spl_dataset *of, const struct spl_view *view)
+{
+    struct spl_error err = {0};
+    struct spl_frame frame;
+    if (spl_renderer_render(renderer, of, view, &frame, &err))
+        fail_msg("%s", err.message);
+    return frame;
+}
+
+static void soften(struct spl_view *view)
+{
+    view->soft.what.count = 1;
+    view->soft.what.terms[0] = (struct spl_term){
+        .measure = SPL_TERM_PLANE, .least = -100, .most = INFINITY, .shape = {0, 0, 0, 0, 0, 1}};
+    view->soft.opacity = 0.3;
+}
+
+static void take_list(struct spl_renderer *renderer, size_t chunks)
+{
+    struct spl_draw_list list = {.chunks = calloc(chunks, sizeof *list.chunks),
+                                 .bounds = calloc(chunks, sizeof *list.bounds),
+                                 .chunk_count = chunks};
+    struct spl_error err = {0};
+    spl_residency_begin_walk(&renderer->residency, NULL);
+    if (spl_scratch_upload(&renderer->scratch, &renderer->residency, &list, &err))
+        fail_msg("%s", err.message);
+    free(list.chunks);
+    free(list.bounds);
+}
+
+/* Where the limit has room for a view and nothing else, each of the others takes memory that pages of it had. */
+static void what_other_views_needed_is_given_back(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_view all = looking(0, 0), soft = looking(1, 4), shaded = looking(2, 4), both = soft;
+    const double eye[3] = {-5, -6, 4}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    assert_int_equal(spl_camera_look_at(&all.camera, eye, middle, up, NULL), SPL_OK);
+    struct spl_view filled = all;
+    filled.method = SPL_METHOD_FILL;
+    soften(&soft);
+    shaded.shade.kinds = SPL_SHADE_EDL;
+    soften(&both);
+    both.shade.kinds = SPL_SHADE_EDL;
+    const struct {
+        const char *other_is;
+        const struct spl_view *view, *other; // NULL: none is, but its draw list is there
+    } rows[] = {{"soft", &all, &soft}, {"shaded", &all, &shaded}, {"soft and shaded", &all, &both},
+                {"soft", &filled, &soft}, {"of a long list", &all, NULL}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_frame frames[3];
+        struct spl_renderer *renderer = open_renderer(1ull << 30, &err);
+        assert_int_equal(spl_renderer_add(renderer, dataset, &err), SPL_OK);
+        frames[0] = draw(renderer, dataset, rows[i].view);
+        const uint64_t limit = spl_renderer_get_memory(renderer);
+        spl_renderer_destroy(renderer);
+        renderer = open_renderer(limit, &err);
+        assert_int_equal(spl_renderer_add(renderer, dataset, &err), SPL_OK);
+        for (int k = 1; k < 3; k++) {
+            struct spl_frame other;
+            frames[k] = draw(renderer, dataset, rows[i].view);
+            if (!frames[k].stats.complete)
+                fail_msg("%zu: a view %s leaves too little room", i, rows[i].other_is);
+            assert_memory_equal(frames[k].images[SPL_LAYER_COLOR].pixels, frames[0].images[SPL_LAYER_COLOR].pixels,
+                                (size_t)width * height * 4);
+            if (rows[i].other) {
+                other = draw(renderer, dataset, rows[i].other);
+                spl_frame_finish(&other);
+            } else {
+                take_list(renderer, 70000);
+            }
+            assert_true(spl_renderer_get_memory(renderer) <= limit);
+        }
+        for (int k = 0; k < 3; k++)
+            spl_frame_finish(&frames[k]);
+        spl_renderer_destroy(renderer);
+    }
+}
+
+/* What a soft view took is no reason to refuse a dataset that comes later. */
+static void a_dataset_that_comes_has_its_room(void **state)
+{
+    (void)state;
+    struct spl_error err = {0};
+    struct spl_view view = looking(0, 4);
+    struct spl_residency_info info;
+    size_t first_page;
+    soften(&view);
+    spl_dataset_get_page(dataset, 0, &first_page);
+    struct spl_renderer *renderer = open_renderer(1ull << 30, &err);
+    const uint64_t limit = spl_renderer_get_memory(renderer) + first_page + staging_of(renderer, first_page) + 64;
+    spl_renderer_destroy(renderer);
+    renderer = open_renderer(limit, &err);
+    assert_int_equal(spl_renderer_add(renderer, beside, &err), SPL_OK);
+    struct spl_frame frame = draw(renderer, beside, &view);
+    spl_frame_finish(&frame);
+    if (spl_renderer_add(renderer, dataset, &err) || spl_renderer_preload(renderer, dataset, &err))
+        fail_msg("%s", err.message);
+    spl_renderer_get_residency(renderer, dataset, &info);
+    assert_true(info.bytes >= first_page);
+    spl_renderer_destroy(renderer);
+}
+
 static void a_limit_below_the_scratch_is_refused_with_numbers(void **state)
 {
     (void)state;
@@ -279,6 +384,8 @@ int main(void)
         cmocka_unit_test(pages_of_the_same_view_make_room_for_its_draw_list),
         cmocka_unit_test(preloading_leaves_others_where_they_are),
         cmocka_unit_test(who_was_drawn_longest_ago_gives_way),
+        cmocka_unit_test(what_other_views_needed_is_given_back),
+        cmocka_unit_test(a_dataset_that_comes_has_its_room),
         cmocka_unit_test(a_limit_below_the_scratch_is_refused_with_numbers),
     };
     int failed = cmocka_run_group_tests(tests, NULL, NULL);

@@ -369,6 +369,7 @@ static void pages_of_its_pieces_are_enough(void **state)
     struct spl_frame spread = draw_by_turns(both, dataset, &view, (const int[]){1, 1});
     assert_true(spread.stats.complete);
     assert_same(&whole, &spread, "within a limit");
+    assert_same_counts(&whole.stats, &spread.stats);
     for (int i = 0; i < 2; i++) {
         assert_true(spl_renderer_get_memory(both[i]) <= limit);
         spl_renderer_destroy(both[i]);
@@ -376,6 +377,52 @@ static void pages_of_its_pieces_are_enough(void **state)
     spl_frame_finish(&whole);
     spl_frame_finish(&alone);
     spl_frame_finish(&spread);
+    done(dataset);
+}
+
+/* Where pieces have no room for their pages either: what is said to be drawn is, as of one that has as many. */
+static void what_is_left_out_is_not_counted(void **state)
+{
+    (void)state;
+    char path[256];
+    struct spl_dataset *dataset;
+    struct spl_view view = view_from_above(50, 90);
+    make_folder(path);
+    strcat(path, "/tree.spld");
+    make_tree_file(path, 60000, 1 << 14);
+    assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
+    remove_file(path);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_frame whole = render_with(renderer, dataset, &view);
+    struct spl_renderer *both[2] = {open_renderer(0, 0), NULL};
+    assert_int_equal(spl_renderer_add(both[0], dataset, NULL), SPL_OK);
+    const uint64_t bare = spl_renderer_get_memory(both[0]);
+    struct spl_frame alone = render_with(both[0], dataset, &view), spread;
+    const uint64_t full = spl_renderer_get_memory(both[0]);
+    spl_renderer_destroy(both[0]);
+    bool left_out = false, equal = false;
+    for (int part = 3; part < 16; part++) {
+        spl_frame_finish(&alone);
+        for (int i = 0; i < 2; i++) {
+            both[i] = open_renderer(bare + (full - bare) / 16 * (uint64_t)part, 0);
+            assert_int_equal(spl_renderer_add(both[i], dataset, NULL), SPL_OK);
+        }
+        alone = render_with(both[1], dataset, &view);
+        spread = draw_by_turns(both, dataset, &view, (const int[]){1, 1});
+        assert_in_range(spread.stats.splats_drawn, alone.stats.splats_drawn, whole.stats.splats_drawn);
+        left_out |= spread.stats.splats_drawn < whole.stats.splats_drawn;
+        const struct spl_image *a = &alone.images[SPL_LAYER_COLOR], *b = &spread.images[SPL_LAYER_COLOR];
+        if (!spread.stats.complete && !memcmp(a->pixels, b->pixels, (size_t)a->width * a->height * 4)) {
+            assert_same_counts(&alone.stats, &spread.stats);
+            equal = true;
+        }
+        spl_frame_finish(&spread);
+        for (int i = 0; i < 2; i++)
+            spl_renderer_destroy(both[i]);
+    }
+    assert_true(left_out && equal);
+    spl_frame_finish(&whole);
+    spl_frame_finish(&alone);
     done(dataset);
 }
 
@@ -438,6 +485,7 @@ int main(int argc, char **argv)
         frames_test(a_lost_one_leaves_its_piece_to_others),
         frames_test(steps_may_end_before_the_frame),
         frames_test(pages_of_its_pieces_are_enough),
+        frames_test(what_is_left_out_is_not_counted),
         frames_test(threads_draw_side_by_side),
     };
     return frames_run(argc, argv, "spread", tests, sizeof tests / sizeof *tests);

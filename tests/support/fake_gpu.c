@@ -40,6 +40,7 @@ static int fake_kernel_create(struct spl_gpu *gpu, const struct spl_gpu_code *co
     (void)gpu, (void)code, (void)constants, (void)count, (void)err;
     *out = calloc(1, sizeof **out);
     fake.kernels++;
+    fake.kernels_made++;
     return 0;
 }
 

@@ -9,7 +9,7 @@
 #include "gpu/backend.h"
 
 extern struct fake_gpu {
-    int buffers, kernels, dispatches, fills, waits, closes;
+    int buffers, kernels, kernels_made, dispatches, fills, waits, closes;
     bool refuse_buffers, refuse_submit;
     uint64_t upload_bytes_max; /* larger buffers to be mapped are refused; 0 = none are */
     uint64_t ended; /* tickets up to this one have ended */

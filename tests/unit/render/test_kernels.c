@@ -1,4 +1,5 @@
-/* A renderer keeps as many kernels as a bound says: those that were used last, and never fewer than a tile has got. */
+/* A renderer keeps as many kernels as a bound says: those in use, most of what comes round, and never fewer than a tile
+ * has got. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -50,7 +51,7 @@ static void test_a_bound(void **state)
         get(tile);
         assert_true(fake.kernels == (int)kernels.count && fake.kernels <= SPL_KERNELS_MOST + 2);
     }
-    assert_true(fake.kernels >= SPL_KERNELS_KEPT);
+    assert_true(fake.kernels >= SPL_KERNELS_MOST);
 }
 
 /* A tile that needs more than the bound keeps all that it has got to its end. */
@@ -64,24 +65,52 @@ static void test_a_tile_of_many(void **state)
     for (uint32_t i = 0; i < 2 * SPL_KERNELS_MOST; i++)
         assert_ptr_equal(get(i), got[i]);
     spl_kernels_begin(&kernels, &gpu, false);
-    assert_int_equal(fake.kernels, SPL_KERNELS_KEPT);
+    assert_int_equal(fake.kernels, SPL_KERNELS_MOST);
 }
 
-/* What was used longest ago goes. */
-static void test_the_oldest_go(void **state)
+/* What some tiles use now and then is made once, whatever others come and go between. */
+static void test_those_in_use_stay(void **state)
 {
     (void)state;
-    for (uint32_t i = 0; i <= SPL_KERNELS_MOST; i++) {
+    enum { in_use = 16, tiles = 20 * SPL_KERNELS_MOST };
+    const int before = fake.kernels_made;
+    for (uint32_t tile = 0; tile < tiles; tile++) {
         spl_kernels_begin(&kernels, &gpu, false);
-        get(i);
+        get(tile % in_use);
+        get(in_use + tile);
     }
-    spl_kernels_begin(&kernels, &gpu, false);
-    get(1); // was among the oldest, and is used again
-    const int before = fake.kernels;
-    assert_int_equal(before, SPL_KERNELS_KEPT + 1);
-    for (uint32_t i = SPL_KERNELS_MOST; i > SPL_KERNELS_MOST + 1 - SPL_KERNELS_KEPT; i--)
-        get(i);
-    assert_int_equal(fake.kernels, before); // all of them were still there
+    assert_int_equal(fake.kernels_made - before, in_use + tiles);
+}
+
+/* Who goes round in a quarter more than are kept has most of them made once, not each anew in every round. */
+static void test_rounds_of_more_than_are_kept(void **state)
+{
+    (void)state;
+    enum { many = SPL_KERNELS_MOST * 5 / 4, rounds = 10 };
+    int before = 0;
+    for (uint32_t i = 0; i < rounds * many; i++) {
+        spl_kernels_begin(&kernels, &gpu, false);
+        get(i % many);
+        before = i == 2 * many ? fake.kernels_made : before;
+    }
+    assert_in_range(fake.kernels_made - before, 1, (rounds - 2) * many / 2);
+}
+
+/* What nobody wants any more, however often it was used, gives its room to what comes round now. */
+static void test_others_take_their_place(void **state)
+{
+    (void)state;
+    enum { many = SPL_KERNELS_MOST / 2, rounds = 10 };
+    for (uint32_t i = 0; i < rounds * SPL_KERNELS_MOST; i++) {
+        spl_kernels_begin(&kernels, &gpu, false);
+        get(i % SPL_KERNELS_MOST);
+    }
+    const int before = fake.kernels_made;
+    for (uint32_t i = 0; i < rounds * many; i++) {
+        spl_kernels_begin(&kernels, &gpu, false);
+        get(SPL_KERNELS_MOST + i % many);
+    }
+    assert_in_range(fake.kernels_made - before, many, rounds * many / 3);
 }
 
 /* Who asks for more goes round in as many without making one twice. */
@@ -121,7 +150,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_a_bound, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_a_tile_of_many, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(test_the_oldest_go, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_those_in_use_stay, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_rounds_of_more_than_are_kept, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_others_take_their_place, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_more_are_kept, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_parallel_ones_are_others, set_up, tear_down),
     };
