@@ -95,7 +95,9 @@ struct spl_cloud_info {
     /* Text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "". Begins with '-' where the
      * first numbers or names the points. */
     char guessed[192];
-    char unused[200]; /* headings of a text whose columns fill nothing, as "Code, Dist"; "" = none */
+    /* Headings of a text whose columns fill nothing, as "Code, Dist"; of other files what is called as a colour, and
+     * gives none, "rgb (a list)"; "" = none */
+    char unused[200];
     /* Of a text whose columns nothing names, or the letters X and Y: what is odd about them where x may be the north,
      * "x has seven digits and y six"; static, NULL = nothing */
     const char *north_first; // may be NULL

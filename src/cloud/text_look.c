@@ -123,7 +123,8 @@ bool spl_text_written_add(struct spl_text_written *written, const struct spl_lay
     for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {
         struct spl_fields plain = fields;
         double v;
-        if (!spl_layout_next(layout, &fields, &field) || (named && (i >= layout->fields || layout->column[i] < 0)))
+        if (!spl_layout_next(layout, &fields, &field) || (named && (i >= layout->fields || layout->column[i] < 0)) ||
+            layout->packed == i + 1)
             continue;
         written->found |= field.number && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
         written->bad |= !field.number && (named ? !spl_text_is_missing(field.text, field.length)
