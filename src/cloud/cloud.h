@@ -50,6 +50,7 @@ struct spl_cloud_coordinates {
     double step[3];       /* that they are multiples of; 0 = not said */
     double first[3];      /* from where on these are counted */
     bool floats;          /* of 32 bits, so that their steps grow with their size */
+    char lost[200];       /* what it says of its system and is not kept, as a sentence; "" = nothing */
 };
 
 struct spl_cloud_options {
