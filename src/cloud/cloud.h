@@ -103,6 +103,7 @@ struct spl_cloud_info {
      * "x has seven digits and y six"; static, NULL = nothing */
     const char *north_first; // may be NULL
     char footer[192]; /* of a text that ends in words: which lines are left out; "" = none */
+    char units[96];   /* a text's headings, where they name units that do not fit each other: "x in m, y in ft"; "" */
     bool surveyors;   /* a text's headings Y and X were taken for east and north, x and y here */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */

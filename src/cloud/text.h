@@ -94,6 +94,14 @@ bool spl_text_packed_judge(const struct spl_text_packed *packed, struct spl_layo
 /* The colour of that column's next field: as spl_layout_number(). */
 enum spl_field spl_layout_packed(const struct spl_layout *layout, struct spl_fields *fields, uint32_t *rgb);
 
+/* The units of x, y and z that headings name, "X [m]", "z (US ft)", "easting_ft", in metres; SPL_TEXT_DEGREES of
+ * degrees, 0 of none. */
+#define SPL_TEXT_DEGREES (-1.0)
+void spl_layout_find_units(const struct spl_layout *layout, const char *line, size_t length, double units[3]);
+
+/* The same of one unit, "m", "US ft". */
+double spl_text_unit(const char *text, size_t length);
+
 /* Does a header line name longitudes or latitudes? */
 bool spl_text_names_degrees(const char *line, size_t length);
 

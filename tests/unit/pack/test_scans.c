@@ -217,6 +217,12 @@ static void test_guesses_are_noted(void **state)
         {"", "12000%02d.25 26000%02d.5 3\n",
          "a.txt: x is about 1.2 million and y 2.6 million (Swiss LV95), as where the north comes before the east: then "
          "y and x change places in --columns\n"},
+        {"x[m] y[m] z[m]\n", "%d.5 %d 3\n", ""},
+        {"x y z[m]\n", "%d.5 %d 3\n",
+         "a.txt: its headings name z in m, which is no unit of all three and not used: --unit says which one it is\n"},
+        {"x[m] y[ft] z[m]\n", "%d.5 %d 3\n",
+         "a.txt: its headings name x in m, y in ft, z in m, which is no unit of all three and not used: --unit says "
+         "which one it is\n"},
         {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
         {"Nr Y X H\n", "P%d %d 4 3\n",
          "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
