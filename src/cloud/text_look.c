@@ -92,7 +92,9 @@ static bool looks_like_number(const char *text, size_t length)
             return false;
         digit |= text[i] >= '0' && text[i] <= '9';
     }
-    return digit && strchr("0123456789+-.", *text);
+    static const char minus[] = "\xe2\x88\x92"; /* a typographer's */
+    return digit &&
+           (strchr("0123456789+-.", *text) || (length > sizeof minus - 1 && !memcmp(text, minus, sizeof minus - 1)));
 }
 
 unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields)
