@@ -21,6 +21,7 @@ struct spl_layout {
     uint64_t texts; /* 1 << field of those that hold text, which are skipped */
     uint8_t packed; /* 1 + the field whose number is red, green and blue; 0: there is none. Its column is RED */
     bool vague;     /* names: it is called colour, which may be anything */
+    bool argb;      /* names: likewise "argb" */
     bool hex;       /* it is written "ff8000" */
 };
 

@@ -144,6 +144,18 @@ static int find_row_names(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+/* One heading, "rgb" or "rgba", over three or four columns. */
+static void part_packed(struct spl_layout *layout, unsigned more)
+{
+    const unsigned at = layout->packed - 1u, first = at + (more == 3 && layout->argb);
+    memmove(layout->column + at + 1 + more, layout->column + at + 1, layout->fields - at - 1);
+    memset(layout->column + at, SPL_COLUMN_SKIP, 1 + more);
+    for (unsigned k = 0; k < 3; k++)
+        layout->column[first + k] = (int8_t)(SPL_COLUMN_RED + (int)k);
+    layout->fields += more;
+    layout->packed = 0;
+}
+
 static void add_unused(struct spl_cloud *cloud, const char *name, const char *what)
 {
     char *unused = cloud->info.unused;
@@ -191,6 +203,10 @@ static int check_names(struct spl_cloud *cloud, struct spl_error *err)
         return refuse_doubled(cloud, 0, err);
     if (code == SPL_OK && !kinds.ragged && kinds.fields == layout->fields + 1 && layout->fields < SPL_TEXT_FIELDS)
         code = find_row_names(cloud, err);
+    const unsigned more = kinds.fields > layout->fields ? kinds.fields - layout->fields : 0;
+    if (layout->packed && !layout->vague && !kinds.ragged && (more == 2 || more == 3) &&
+        kinds.fields <= SPL_TEXT_FIELDS)
+        part_packed(layout, more);
     unsigned last = layout->fields - 1; /* words, with separators between them */
     if (layout->column[last] < 0 && kinds.texts[last] > kinds.numbers[last])
         layout->exact = false;

@@ -310,6 +310,7 @@ static void find_packed(struct spl_layout *layout, struct spl_fields fields)
                 layout->column[k] = SPL_COLUMN_SKIP; /* of three that are not all there */
         layout->column[i] = SPL_COLUMN_RED;
         layout->packed = (uint8_t)(i + 1);
+        layout->argb = !strncasecmp(name, "argb", length < 4 ? length : 4);
     }
 }
 

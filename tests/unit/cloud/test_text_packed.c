@@ -22,6 +22,10 @@ static const struct {
     {"\"x\" \"y\" \"z\" \"rgb\"\n\"a\" 1 2 3 660512\n\"b\" 4 5 6 16744449\n", NULL, NULL}, /* R's names of rows */
     {"1 2 3 660512\n4 5 6 16744449\n", "x,y,z,rgb", NULL},
     {"1 2 3 0a1420\n4 5 6 ff8001\n", "x,y,z,rgb", NULL},
+    {"x y z rgb\n1 2 3 10 20 32\n4 5 6 255 128 1\n", NULL, NULL}, /* one heading for all three */
+    {"x y z rgb i\n1 2 3 10 20 32 5\n4 5 6 255 128 1 6\n", NULL, NULL},
+    {"rgba,x,y,z\n10,20,32,255,1,2,3\n255,128,1,255,4,5,6\n", NULL, NULL},
+    {"x,y,z,argb\n1,2,3,255,10,20,32\n4,5,6,255,255,128,1\n", NULL, NULL},
     {"x y z rgb r g b\n1 2 3 7 10 20 32\n4 5 6 7 255 128 1\n", NULL, "rgb"}, /* three columns are surer */
     /* what is no such colour */
     {"x,y,z,color\n1,2,3,7\n4,5,6,8\n", NULL, "color"},
@@ -42,6 +46,7 @@ static void colours_in_one_column(void **state)
         if (strcmp(l.unused, unused) != 0)
             fail_msg("%zu: \"%s\" is not used", i, l.unused);
         assert_int_equal(l.points, 2);
+        assert_true(l.first.position[1][2] == 6);
         assert_int_equal(l.attributes, colors ? SPL_CLOUD_COLOR : 0);
         if (colors) {
             assert_true(l.colors.white == 255);
