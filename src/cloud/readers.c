@@ -36,7 +36,7 @@ bool spl_cloud_is_drawing(const char *path)
 
 static bool is_ply(const uint8_t *bytes, size_t available)
 {
-    return begins_with(bytes, available, "ply") && (available == 3 || bytes[3] <= ' ');
+    return available >= 3 && !strncasecmp((const char *)bytes, "ply", 3) && (available == 3 || bytes[3] <= ' ');
 }
 
 static bool is_las(const uint8_t *bytes, size_t available)

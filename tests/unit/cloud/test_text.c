@@ -466,6 +466,9 @@ static void a_mark_before_it_changes_no_format(void **state)
         {"ply\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
          "property float x\nproperty float y\nproperty float z\nend_header\n9 8 7 1 2 3\n6 5 4 4 5 6\n",
          "PLY", SPL_CLOUD_COLOR},
+        {"PLY\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty float x\nproperty float y\n"
+         "property float z\nend_header\n9 1 2 3\n6 4 5 6\n",
+         "PLY", 0},
         {"# .PCD v.7\nFIELDS rgb x y z\nWIDTH 2\nDATA ascii\n4.2108e+06 1 2 3\n4.2108e+06 4 5 6\n", "PCD",
          SPL_CLOUD_COLOR},
         {"VERSION .7\nFIELDS x y z\nWIDTH 2\nDATA ascii\n1 2 3\n4 5 6\n", "PCD", 0},
