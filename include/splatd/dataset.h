@@ -119,6 +119,7 @@ struct spl_dataset_info {
     bool stations_of_maps;        /* no scan says where it was taken from: they are the places of panoramas */
     uint64_t tile_bytes; /* of a collection: of its tiles' files; of one that does not say so, what their nodes, chunks
                             and pages take of these */
+    const char *crs;     // may be NULL; its coordinate system, as "EPSG:25832" or WKT; borrowed until close
 };
 
 /* How the values of stream `stream` (of info.streams) are distributed; NULL where the file does not say. */

@@ -74,6 +74,7 @@ struct spl_encode_options {
     char unit[32];        /* of distances, for what 16 bit PNG and GeoTIFF say: "m", "ft"; "" = "unit" */
     struct spl_ground ground; /* of GeoTIFF, which is refused without */
     bool list;            /* NPY of an image of one column, of rays: (n), not (n,1); (n,4), not (n,1,4) */
+    const char *crs;      // may be NULL; of GeoTIFF where ground.epsg is 0: WKT of its coordinate system; borrowed
 };
 
 static inline void spl_encode_options_init(struct spl_encode_options *options)

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/memory.h"
 #include "cloud/fields.h"
@@ -22,8 +23,15 @@ static void settle(struct spl_cloud_coordinates *crs)
     else if (crs->unit_m == 0 && !crs->angles) {
         crs->unit_m = unit;
         crs->angles = angles;
-    } else if (angles != crs->angles || (!angles && !spl_unit_is_same(unit, crs->unit_m)))
+    } else if (angles != crs->angles || (!angles && !spl_unit_is_same(unit, crs->unit_m))) {
+        char own[SPL_UNIT_TEXT_MAX], beside[SPL_UNIT_TEXT_MAX];
+        if (!crs->wkt)
+            snprintf(crs->lost, sizeof crs->lost,
+                     "its coordinate system EPSG:%u is in %s, but the unit beside that is %s: the number is left out",
+                     crs->epsg, angles ? "degrees" : spl_unit_print(unit, own),
+                     crs->angles ? "degrees" : spl_unit_print(crs->unit_m, beside));
         crs->epsg = 0;
+    }
     unit = spl_crs_get_unit(crs->height_epsg, &angles);
     if (crs->height_unit_m == 0)
         crs->height_unit_m = unit;
@@ -41,6 +49,40 @@ void spl_crs_replace(struct spl_cloud_coordinates *crs, const struct spl_cloud_c
     crs->floats = old.floats;
     settle(crs);
     free(old.wkt);
+}
+
+/* GDAL, too, makes such a system of a citation that is all there is. GeoTIFF keys may say how it is projected; but
+ * files are about half and half in whether false eastings are in the unit or in metres, and nothing tells which: wrong
+ * by 900 km of a state plane. */
+void spl_crs_keep_name(struct spl_cloud_coordinates *crs)
+{
+    static const struct {
+        double metres;
+        const char *name;
+    } units[] = {{1, "metre"}, {0.3048, "foot"}, {1200.0 / 3937, "US survey foot"}};
+    const char *unit = "unit";
+    char doubled[2 * sizeof crs->name], *out = doubled;
+    if (crs->epsg || crs->wkt || crs->angles || !crs->name[0] || !strcasecmp(crs->name, "unnamed") ||
+        !strcasecmp(crs->name, "unknown"))
+        return;
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++)
+        unit = spl_unit_is_same(crs->unit_m, units[i].metres) ? units[i].name : unit;
+    for (const char *c = crs->name; *c; c++) {
+        if (*c == '"')
+            *out++ = '"';
+        *out++ = *c;
+    }
+    *out = 0;
+    int length = crs->unit_m > 0
+                     ? asprintf(&crs->wkt, "LOCAL_CS[\"%s\",UNIT[\"%s\",%.17g]]", doubled, unit, crs->unit_m)
+                     : asprintf(&crs->wkt, "LOCAL_CS[\"%s\"]", doubled);
+    if (length < 0)
+        crs->wkt = NULL; /* as if it had none */
+    if (!crs->lost[0])
+        snprintf(
+            crs->lost, sizeof crs->lost,
+            "of its coordinate system the name is kept (%s), but not how it is projected: it has no number of EPSG",
+            crs->name);
 }
 
 char *spl_crs_print(const struct spl_cloud_coordinates *crs)

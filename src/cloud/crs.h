@@ -39,6 +39,9 @@ double spl_crs_get_length(uint32_t unit);
  * units are there which only the numbers say, and no number beside which another unit stands. */
 void spl_crs_replace(struct spl_cloud_coordinates *crs, const struct spl_cloud_coordinates *said);
 
+/* Of a system that has a name and neither number nor text: a text of its name and unit, and what is lost of it. */
+void spl_crs_keep_name(struct spl_cloud_coordinates *crs);
+
 /* As META has it: "EPSG:N", "EPSG:N+EPSG:M", WKT. The caller frees it. NULL: nothing is said, or there is no memory. */
 char *spl_crs_print(const struct spl_cloud_coordinates *crs);
 

@@ -106,5 +106,10 @@ void spl_crs_read_keys(const struct spl_crs_keys *keys, struct spl_cloud_coordin
     if (said.height_epsg >= old_heights_first && said.height_epsg <= old_heights_last)
         said.height_epsg = 0;
     said.height_unit_m = spl_crs_get_length(get_number(keys, key_height_unit));
+    if (get_number(keys, key_projected) == user_defined && !said.name[0])
+        snprintf(
+            said.lost, sizeof said.lost,
+            "its GeoTIFF keys define a coordinate system without a number of EPSG and without a name, which is left "
+            "out");
     spl_crs_replace(crs, &said);
 }

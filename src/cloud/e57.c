@@ -129,11 +129,22 @@ static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
     const char *text = e57->document.coordinates;
     struct spl_error why = {0};
     if (text && !spl_fields_blank(text, strlen(text))) {
-        int code = spl_crs_read_wkt(text, strlen(text), crs, &why);
+        const char *first = text + strspn(text, " \t\r\n");
+        static const char urn[] = "urn:ogc:def:crs:EPSG:";
+        char number[32] = ""; /* instead of a text */
+        if (!strncasecmp(first, urn, sizeof urn - 1))
+            snprintf(number, sizeof number, "EPSG:%.20s", strrchr(first, ':') + 1);
+        else if (!strncasecmp(first, "EPSG:", 5))
+            snprintf(number, sizeof number, "%.30s", first);
+        number[strcspn(number, " \t\r\n")] = 0;
+        int code = number[0] ? spl_crs_read_option(number, crs, &why) : spl_crs_read_wkt(text, strlen(text), crs, &why);
         if (code == SPL_E_NOMEM)
             return spl_fail(err, code, "%s", why.message);
         if (code < 0)
-            spl_text_show(text + strspn(text, " \t\r\n"), crs->name, sizeof crs->name);
+            spl_text_show(first, crs->name, sizeof crs->name);
+        if (code < 0 && !number[0])
+            snprintf(crs->lost, sizeof crs->lost, "the WKT of its coordinate system cannot be read (%.90s)",
+                     why.message);
         if (crs->angles || (crs->unit_m > 0 && crs->unit_m != 1)) {
             spl_log_warn(
                 "%s: its coordinateMetadata names a system that is not in metres (%.63s), as E57 always is; it "
@@ -143,6 +154,7 @@ static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
         }
     }
     crs->unit_m = crs->height_unit_m = 1;
+    spl_crs_keep_name(crs);
     for (size_t i = 0; i < e57->document.scan_count; i++)
         for (int k = 0; k < 3 && e57->document.scans[i].points && !e57->scans[i].posed; k++) {
             const struct spl_e57_field *field = spl_e57_field(&e57->document, &e57->document.scans[i], SPL_E57_X + k);

@@ -2,6 +2,7 @@
  * coordinates is no reason to refuse points: it counts as not said. Owned by the cloud's thread. */
 #include "cloud/las_records.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
@@ -71,6 +72,9 @@ static int read_wkt(struct spl_cloud *cloud, const struct spl_las_record records
     if (!code && text) {
         struct spl_error why = {0};
         code = spl_crs_read_wkt((const char *)text, bytes, crs, &why);
+        if (code)
+            snprintf(crs->lost, sizeof crs->lost, "the WKT of its coordinate system cannot be read (%.90s)",
+                     why.message);
         code = code == SPL_E_NOMEM ? spl_fail(err, code, "%s", why.message) : SPL_OK;
     }
     free(text);
@@ -132,7 +136,15 @@ int spl_las_read_coordinates(struct spl_cloud *cloud, const struct spl_las_recor
         spl_crs_finish(&keys);
         return code;
     }
+    struct spl_cloud_coordinates *crs = &cloud->info.coordinates;
+    char lost[sizeof crs->lost];
+    memcpy(lost, wkt.lost[0] ? wkt.lost : keys.lost, sizeof lost);
     complete(wkt_first ? &wkt : &keys, wkt_first ? &keys : &wkt);
-    cloud->info.coordinates = wkt_first ? wkt : keys;
+    *crs = wkt_first ? wkt : keys;
+    if (crs->epsg || crs->wkt)
+        crs->lost[0] = 0; /* one of the two says all */
+    else
+        memcpy(crs->lost, lost, sizeof lost);
+    spl_crs_keep_name(crs);
     return SPL_OK;
 }

@@ -14,11 +14,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/memory.h"
 #include "cloud/fields.h"
 #include "cloud/little.h"
+#include "cloud/packed.h"
 
 enum { sizes_bytes = 8 };
 enum { lzf_most = 88 }; /* bytes that a byte gives: the longest match is 264 from 3 */
@@ -38,15 +38,11 @@ static bool is_padding(const struct spl_pcd_field *field)
 
 static int take_column(struct spl_cloud *cloud, struct spl_pcd_field *field)
 {
-    const uint32_t rgb = 7u << SPL_COLUMN_RED;
     size_t length = strlen(field->name);
-    bool packed = !strcasecmp(field->name, "rgb") || !strcasecmp(field->name, "rgba");
-    if (!packed || field->bytes != 4 || cloud->columns & rgb)
-        return spl_cloud_take_column(cloud, field->name, length);
-    spl_cloud_name_field(cloud, field->name, length);
-    cloud->columns |= rgb;
-    field->packed = true;
-    return SPL_COLUMN_RED;
+    field->packed = spl_packed_take(cloud, field->name, length, field->bytes, field->count != 1);
+    if (field->packed)
+        return SPL_COLUMN_RED;
+    return field->count == 1 ? spl_cloud_take_column(cloud, field->name, length) : SPL_COLUMN_SKIP;
 }
 
 static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
@@ -55,7 +51,7 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
     cloud->integer_colors = true;
     for (unsigned i = 0; i < pcd->header.field_count; i++) {
         struct spl_pcd_field *field = &pcd->header.fields[i];
-        if (is_padding(field) || field->count != 1) /* a list is no number of the point */
+        if (is_padding(field)) /* neither is a list a number of the point */
             continue;
         field->column = (int8_t)take_column(cloud, field);
         if (field->column >= SPL_COLUMN_X && field->column <= SPL_COLUMN_Z)
@@ -69,6 +65,7 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
         if (!(cloud->columns >> k & 1))
             return spl_source_fail_line(&cloud->source, pcd->header.fields_line, spl_column_name(k), err,
                                         "FIELDS has no such name with a COUNT of 1");
+    spl_packed_tell_rest(cloud);
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)
@@ -198,29 +195,26 @@ static int pcd_open(struct spl_cloud *cloud, struct spl_error *err)
 
 /* ---- rows ---- */
 
-static void unpack(uint32_t rgb, struct spl_rows *rows, size_t row)
-{
-    for (unsigned k = 0; k < 3; k++)
-        rows->value[SPL_COLUMN_RED + k][row] = rgb >> (16 - 8 * k) & 0xff;
-}
-
 static void decode(const struct spl_pcd_field *field, const uint8_t *p, size_t stride, struct spl_rows *rows)
 {
-    if (!field->packed)
-        spl_numbers_decode(field->type, false, p, stride, rows->count, rows->value[field->column]);
+    double *value = rows->value[field->column];
+    bool bits = field->packed && field->bytes == 4; /* whatever their type */
+    if (!bits)
+        spl_numbers_decode(field->type, false, p, stride, rows->count, value);
     for (size_t r = 0; field->packed && r < rows->count; r++)
-        unpack(spl_le_get32(p + r * stride), rows, r);
+        spl_packed_put(rows, r, bits ? spl_le_get32(p + r * stride) : spl_packed_from_number(value[r]));
 }
 
-/* A colour as text is a number of its type: of a float, the bits are the colour. */
+/* A colour as text is a number of its type. Of a float the bits are the colour whatever it is: the library left some
+ * alpha in them, so that grey is 4.2108e+06. */
 static uint32_t pack(const struct spl_pcd_field *field, double value)
 {
     float single = (float)value;
     uint32_t bits = 0;
-    if (field->type == SPL_NUMBER_FLOAT32 && !isnan(value)) /* "nan": what it was is lost */
+    if (field->type != SPL_NUMBER_FLOAT32)
+        return spl_packed_from_number(value);
+    if (!isnan(value)) /* "nan": what it was is lost */
         memcpy(&bits, &single, sizeof bits);
-    else if (value >= INT32_MIN && value <= UINT32_MAX && field->type != SPL_NUMBER_FLOAT32)
-        bits = (uint32_t)(int64_t)value;
     return bits;
 }
 
@@ -244,7 +238,7 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
                 return spl_source_fail_line(source, source->line, field->name, err, "\"%s\" is not a number",
                                             spl_fields_show(&fields, text));
             if (field->packed)
-                unpack(pack(field, rows->value[field->column][row]), rows, row);
+                spl_packed_put(rows, row, pack(field, rows->value[field->column][row]));
         }
     }
     if (!spl_fields_blank(fields.p, (size_t)(fields.end - fields.p)))

@@ -11,6 +11,7 @@
 
 #include "base/memory.h"
 #include "cloud/fields.h"
+#include "cloud/packed.h"
 
 struct ply {
     struct spl_ply_header header;
@@ -29,6 +30,22 @@ static size_t block_rows(const struct spl_ply_element *element, uint64_t left)
     size_t fit = element->row_bytes ? SPL_SOURCE_WINDOW / element->row_bytes : SPL_ROWS;
     size_t most = fit < SPL_ROWS ? fit : SPL_ROWS;
     return left < most ? (size_t)left : most;
+}
+
+/* The type that a property's numbers are read as: a float that is a colour by its bits. */
+static enum spl_number read_as(const struct spl_ply_property *p)
+{
+    return p->packed && p->type == SPL_NUMBER_FLOAT32 ? SPL_NUMBER_UINT32 : p->type;
+}
+
+/* Colours of numbers that read_as() gave. */
+static void unpack(const struct spl_ply_property *p, struct spl_rows *rows, size_t first, size_t count)
+{
+    const double *value = rows->value[SPL_COLUMN_RED];
+    for (size_t r = first; r < first + count; r++)
+        spl_packed_put(rows, r,
+                       p->type == SPL_NUMBER_FLOAT32 ? spl_packed_from_bits((uint32_t)value[r])
+                                                     : spl_packed_from_number(value[r]));
 }
 
 /* One scalar at the cursor. */
@@ -58,7 +75,7 @@ static int take_row(struct spl_cloud *cloud, const struct spl_ply_element *eleme
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];
         uint64_t at = spl_source_tell(source);
         double value = 0;
-        int code = take_scalar(cloud, p->count_type ? p->count_type : p->type, &value, err);
+        int code = take_scalar(cloud, p->count_type ? p->count_type : read_as(p), &value, err);
         if (code < 0)
             return code;
         if (p->count_type) {
@@ -71,6 +88,8 @@ static int take_row(struct spl_cloud *cloud, const struct spl_ply_element *eleme
             spl_source_seek(source, at + spl_number_bytes(p->count_type) + (uint64_t)bytes);
         } else if (rows && p->column >= 0) {
             rows->value[p->column][row] = value;
+            if (p->packed)
+                unpack(p, rows, row, 1);
         }
     }
     return SPL_OK;
@@ -101,7 +120,9 @@ static int take_ascii_row(struct spl_cloud *cloud, const struct spl_ply_element 
         const struct spl_ply_property *p = property + i;
         double value = 0, item;
         enum spl_field got = spl_fields_number(&fields, &value);
-        if (got == SPL_FIELD_OK && p->column >= 0)
+        if (got == SPL_FIELD_OK && p->packed)
+            spl_packed_put(rows, row, spl_packed_from_number(value));
+        else if (got == SPL_FIELD_OK && p->column >= 0)
             rows->value[p->column][row] = value;
         if (got == SPL_FIELD_OK && p->count_type && !(value >= 0 && value == floor(value)))
             return spl_source_fail_line(source, source->line, p->name, err, "\"%s\" is no number of items",
@@ -232,14 +253,15 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
         if (p->column <= SPL_COLUMN_Z)
             cloud->info.coordinates.floats |= ply->header.format != SPL_PLY_ASCII && p->type == SPL_NUMBER_FLOAT32;
         if (p->column >= SPL_COLUMN_RED && p->column <= SPL_COLUMN_BLUE) {
-            cloud->scan_colors |= p->type != SPL_NUMBER_UINT8;
-            cloud->integer_colors &= p->type < SPL_NUMBER_FLOAT32;
+            cloud->scan_colors |= p->packed || p->type != SPL_NUMBER_UINT8; /* packed ones: all 0 are none */
+            cloud->integer_colors &= p->packed || p->type < SPL_NUMBER_FLOAT32;
         }
     }
     for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
         if (!(cloud->columns >> k & 1))
             return spl_source_fail_line(&cloud->source, ply->header.vertex_line, spl_column_name(k), err,
                                         "element vertex has no such property");
+    spl_packed_tell_rest(cloud);
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)
@@ -297,8 +319,10 @@ static int ply_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
         for (unsigned i = 0; code == SPL_OK && i < element->properties; i++) {
             const struct spl_ply_property *p = &ply->header.properties[element->first + i];
             if (p->column >= 0)
-                spl_numbers_decode(p->type, ply->header.format == SPL_PLY_BIG, bytes + p->offset, element->row_bytes,
+                spl_numbers_decode(read_as(p), ply->header.format == SPL_PLY_BIG, bytes + p->offset, element->row_bytes,
                                    count, rows->value[p->column]);
+            if (p->packed)
+                unpack(p, rows, 0, count);
         }
         if (code == SPL_OK)
             spl_source_take(&cloud->source, count * element->row_bytes);

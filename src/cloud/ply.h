@@ -12,6 +12,7 @@ struct spl_ply_property {
     uint8_t type;       /* enum spl_number; of the items when it is a list */
     uint8_t count_type; /* of a list's length, SPL_NUMBER_NONE when it is no list */
     int8_t column;      /* enum spl_column; SKIP for what is not kept */
+    bool packed;        /* red, green and blue in one number: 0x..RRGGBB */
     uint16_t offset;    /* in the row, where no list precedes it */
 };
 

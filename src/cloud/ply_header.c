@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "cloud/fields.h"
+#include "cloud/packed.h"
 
 static const struct {
     const char *name;
@@ -124,8 +125,13 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     struct spl_ply_element *element = &header->elements[header->element_count - 1];
     copy_name(p.name, sizeof p.name, words, name);
     p.offset = (uint16_t)element->row_bytes;
-    if (!list && header->vertex_line && element == &header->elements[header->vertex])
-        p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
+    if (header->vertex_line && element == &header->elements[header->vertex]) {
+        p.packed = spl_packed_take(cloud, p.name, strlen(p.name), spl_number_bytes(p.type), list);
+        if (p.packed)
+            p.column = SPL_COLUMN_RED;
+        else if (!list)
+            p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
+    }
     element->row_bytes += spl_number_bytes(list ? p.count_type : p.type);
     element->lists |= list;
     element->properties++;

@@ -12,6 +12,7 @@
 #include "cloud/reader.h"
 
 struct ptx {
+    uint64_t start;        /* of the first station: behind a byte order mark */
     uint64_t cells, taken; /* of the current station */
     unsigned fields;       /* values of a cell of this station, 0 before its first */
     unsigned first_fields; /* of the file's first station with cells */
@@ -241,7 +242,7 @@ static int ptx_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
     (void)part, (void)parts, (void)err; /* never sampled: intensities are 0 to 1 and colours 8 bits by definition */
     ptx->cells = ptx->taken = 0;
     cloud->info.station_count = 0;
-    spl_source_seek(&cloud->source, 0);
+    spl_source_seek(&cloud->source, ptx->start);
     cloud->source.line = 0;
     return SPL_OK;
 }
@@ -250,7 +251,11 @@ static int ptx_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, stru
 static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct ptx *ptx = cloud->state = spl_alloc(1, sizeof *ptx, err);
-    int code = ptx ? take_header(cloud, err) : SPL_E_NOMEM;
+    int code = SPL_E_NOMEM;
+    if (ptx) {
+        ptx->start = spl_source_tell(&cloud->source);
+        code = take_header(cloud, err);
+    }
     cloud->rows.count = 0;
     while (code > 0 && ptx->cells == 0)
         code = take_header(cloud, err);

@@ -36,7 +36,7 @@ bool spl_cloud_is_drawing(const char *path)
 
 static bool is_ply(const uint8_t *bytes, size_t available)
 {
-    return begins_with(bytes, available, "ply") && (available == 3 || bytes[3] <= ' ');
+    return available >= 3 && !strncasecmp((const char *)bytes, "ply", 3) && (available == 3 || bytes[3] <= ' ');
 }
 
 static bool is_las(const uint8_t *bytes, size_t available)
@@ -109,6 +109,7 @@ static const struct {
     {"<html", 5, "is a web page and no scan: what it was loaded from may have answered with an error"},
     {"<?xml", 5, "is XML and no scan"},
     {"{", 1, "is JSON and no scan"},
+    {"[{", 2, "is JSON and no scan"},
     {"%PDF", 4, "is a PDF and no scan"},
     {"\x89PNG", 4, "is a picture and no scan"},
     {"\xff\xd8\xff", 3, "is a picture and no scan"},
@@ -246,6 +247,12 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
     int code = spl_source_peek(source, first_bytes, &bytes, &available, err);
     if (code < 0)
         return code;
+    static const char mark[] = "\xef\xbb\xbf"; /* of UTF-8, which editors put before whatever they write */
+    if (begins_with(bytes, available, mark)) {
+        spl_source_take(source, sizeof mark - 1);
+        bytes += sizeof mark - 1;
+        available -= sizeof mark - 1;
+    }
     if (begins_with(bytes, available, "SPLD\r\n"))
         return spl_source_fail(
             source, SPL_E_INPUT, "", err,

@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "cloud/fields.h"
+#include "cloud/packed.h"
 
 static int text_open(struct spl_cloud *cloud, struct spl_error *err)
 {
@@ -33,9 +34,8 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
         code = spl_text_find_end(cloud, err);
     if (code < 0)
         return code;
-    for (unsigned i = 0; i < text->layout.fields; i++)
-        if (text->layout.column[i] >= 0)
-            cloud->columns |= 1u << text->layout.column[i];
+    cloud->columns |= spl_layout_taken(&text->layout);
+    cloud->integer_colors = text->layout.packed;
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)
@@ -47,6 +47,12 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
         cloud->info.points_expected = text->count;
     }
     return SPL_OK;
+}
+
+static const char *column_name(const struct spl_cloud *cloud, unsigned field)
+{
+    const struct spl_layout *layout = &((const struct spl_text *)cloud->state)->layout;
+    return layout->packed == field + 1 ? "rgb" : spl_cloud_column_name(cloud, layout->column[field]);
 }
 
 /* "1,5" between semicolons or blanks; "5 2" where blanks lie between and the commas were taken for separators. */
@@ -78,7 +84,7 @@ static int refuse_number(const struct spl_cloud *cloud, const struct spl_layout 
         hint = "; text cannot be kept, --keep takes columns of numbers";
     else if (layout->column[column] >= SPL_COLUMN_CLASS && word)
         hint = "; where the column holds text, '-' in its place of --columns skips it";
-    return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, layout->column[column]), err,
+    return spl_source_fail_line(source, source->line, column_name(cloud, column), err,
                                 "\"%s\" in column %u is not a number%s", text, column + 1, hint);
 }
 
@@ -100,6 +106,16 @@ static bool take_nothing(struct spl_fields *fields, bool is_last, const char *li
     return length > 0 && line[length - 1] == fields->separator;
 }
 
+/* As spl_layout_number(), of the column that is a colour. */
+static enum spl_field take_packed(const struct spl_layout *layout, struct spl_fields *fields, struct spl_rows *rows,
+                                  size_t row)
+{
+    uint32_t rgb;
+    enum spl_field got = spl_layout_packed(layout, fields, &rgb);
+    spl_packed_put(rows, row, got == SPL_FIELD_OK ? rgb : 0);
+    return got;
+}
+
 static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char *line, size_t length,
                      struct spl_error *err)
 {
@@ -111,15 +127,17 @@ static int take_line(struct spl_cloud *cloud, struct spl_rows *rows, const char 
 
     for (unsigned i = 0; i < layout->fields; i++) {
         int column = layout->column[i];
-        enum spl_field got = column >= 0 ? spl_layout_number(layout, &fields, &rows->value[column][row])
-                                         : spl_fields_text(&fields, &ignored);
+        bool packed = layout->packed == i + 1;
+        enum spl_field got = packed        ? take_packed(layout, &fields, rows, row)
+                             : column >= 0 ? spl_layout_number(layout, &fields, &rows->value[column][row])
+                                           : spl_fields_text(&fields, &ignored);
         if (got != SPL_FIELD_OK && take_nothing(&fields, i + 1 == layout->fields, line, length)) {
-            if (column >= 0)
+            if (column >= 0 && !packed)
                 rows->value[column][row] = (double)NAN;
             continue;
         }
         if (got == SPL_FIELD_END)
-            return spl_source_fail_line(source, source->line, spl_cloud_column_name(cloud, column), err,
+            return spl_source_fail_line(source, source->line, column_name(cloud, i), err,
                                         "column %u of %u is missing: correct the line, or delete it", i + 1,
                                         layout->fields);
         if (got == SPL_FIELD_BAD && column < 0)

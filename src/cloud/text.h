@@ -19,6 +19,10 @@ struct spl_layout {
     bool letters;   /* names: x and y are called so, and not east and north */
     char separator; /* ' ', ',', ';', '|' or '\t' */
     uint64_t texts; /* 1 << field of those that hold text, which are skipped */
+    uint8_t packed; /* 1 + the field whose number is red, green and blue; 0: there is none. Its column is RED */
+    bool vague;     /* names: it is called colour, which may be anything */
+    bool argb;      /* names: likewise "argb" */
+    bool hex;       /* it is written "ff8000" */
 };
 
 static inline struct spl_fields spl_layout_fields(const struct spl_layout *layout, const char *line, size_t length)
@@ -65,6 +69,39 @@ bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *kee
 
 /* The names of this line that fill nothing, "Code, Dist", into `text`, cut to `size`. */
 void spl_layout_list_unused(const struct spl_layout *layout, const char *line, size_t length, char *text, size_t size);
+
+/* Is a column called as a colour of one number? */
+bool spl_text_names_packed(const char *name, size_t length, bool *vague);
+
+/* What is written in that column: numbers, or 0xRRGGBB and #RRGGBB or six digits without a sign before them. Over lines
+ * of which some are added. Zero-initialised. */
+struct spl_text_packed {
+    unsigned values;  /* that there are */
+    unsigned numbers; /* of them */
+    unsigned whole;   /* of those */
+    unsigned large;   /* of those, beyond 16 bits */
+    unsigned signs;   /* with what says that they are hexadecimal */
+    unsigned digits;  /* six of them, of which some are letters or not */
+    bool letters;     /* some are */
+};
+
+/* False when enough lines were added. */
+bool spl_text_packed_add(struct spl_text_packed *packed, const struct spl_layout *layout, const char *line,
+                         size_t length);
+
+/* Are they colours? Then layout->hex is known, else layout->packed is 0 and the column skipped. */
+bool spl_text_packed_judge(const struct spl_text_packed *packed, struct spl_layout *layout);
+
+/* The colour of that column's next field: as spl_layout_number(). */
+enum spl_field spl_layout_packed(const struct spl_layout *layout, struct spl_fields *fields, uint32_t *rgb);
+
+/* The units of x, y and z that headings name, "X [m]", "z (US ft)", "easting_ft", in metres; SPL_TEXT_DEGREES of
+ * degrees, 0 of none. */
+#define SPL_TEXT_DEGREES (-1.0)
+void spl_layout_find_units(const struct spl_layout *layout, const char *line, size_t length, double units[3]);
+
+/* The same of one unit, "m", "US ft". */
+double spl_text_unit(const char *text, size_t length);
 
 /* Does a header line name longitudes or latitudes? */
 bool spl_text_names_degrees(const char *line, size_t length);

@@ -138,16 +138,54 @@ static int find_row_names(struct spl_cloud *cloud, struct spl_error *err)
     if (code < 0 || (look.unnamed && !spl_text_look_counts(&look)))
         return code;
     memmove(wider.column + 1, layout->column, layout->fields);
+    wider.packed += layout->packed > 0;
     wider.column[0] = SPL_COLUMN_SKIP;
     *layout = wider;
     return SPL_OK;
 }
 
-static void add_unused(struct spl_cloud *cloud, const char *name)
+/* One heading, "rgb" or "rgba", over three or four columns. */
+static void part_packed(struct spl_layout *layout, unsigned more)
+{
+    const unsigned at = layout->packed - 1u, first = at + (more == 3 && layout->argb);
+    memmove(layout->column + at + 1 + more, layout->column + at + 1, layout->fields - at - 1);
+    memset(layout->column + at, SPL_COLUMN_SKIP, 1 + more);
+    for (unsigned k = 0; k < 3; k++)
+        layout->column[first + k] = (int8_t)(SPL_COLUMN_RED + (int)k);
+    layout->fields += more;
+    layout->packed = 0;
+}
+
+static void add_unused(struct spl_cloud *cloud, const char *name, const char *what)
 {
     char *unused = cloud->info.unused;
     size_t used = strlen(unused);
-    snprintf(unused + used, sizeof cloud->info.unused - used, "%s%s (text)", used ? ", " : "", name);
+    snprintf(unused + used, sizeof cloud->info.unused - used, "%s%s%s", used ? ", " : "", name, what);
+}
+
+/* Is the column that is called as a colour one? A user who says so is believed. */
+static int check_packed(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct spl_text *text = cloud->state;
+    struct spl_text_packed packed = {0};
+    const char *line, *name = text->layout.vague ? "color" : "rgb";
+    size_t length;
+    int code;
+    if (!text->layout.packed)
+        return SPL_OK;
+    begin_again(cloud);
+    do {
+        code = next_sample(cloud, &line, &length, err);
+    } while (code > 0 && spl_text_packed_add(&packed, &text->layout, line, length));
+    if (code < 0)
+        return code;
+    struct spl_layout judged = text->layout;
+    bool is = spl_text_packed_judge(&packed, &judged);
+    if (is || !cloud->options->columns)
+        text->layout = judged;
+    if (!is && !cloud->options->columns)
+        add_unused(cloud, name, packed.numbers == packed.values ? "" : " (text)");
+    return SPL_OK;
 }
 
 /* Columns by their headings against what stands in them. One that holds nothing but text is none of numbers, unless a
@@ -165,6 +203,10 @@ static int check_names(struct spl_cloud *cloud, struct spl_error *err)
         return refuse_doubled(cloud, 0, err);
     if (code == SPL_OK && !kinds.ragged && kinds.fields == layout->fields + 1 && layout->fields < SPL_TEXT_FIELDS)
         code = find_row_names(cloud, err);
+    const unsigned more = kinds.fields > layout->fields ? kinds.fields - layout->fields : 0;
+    if (layout->packed && !layout->vague && !kinds.ragged && (more == 2 || more == 3) &&
+        kinds.fields <= SPL_TEXT_FIELDS)
+        part_packed(layout, more);
     unsigned last = layout->fields - 1; /* words, with separators between them */
     if (layout->column[last] < 0 && kinds.texts[last] > kinds.numbers[last])
         layout->exact = false;
@@ -174,7 +216,7 @@ static int check_names(struct spl_cloud *cloud, struct spl_error *err)
         if (!may || kinds.numbers[i] || !kinds.texts[i])
             continue;
         layout->column[i] = SPL_COLUMN_SKIP;
-        add_unused(cloud, spl_column_name(column));
+        add_unused(cloud, spl_column_name(column), " (text)");
     }
     return code;
 }
@@ -259,5 +301,7 @@ int spl_text_find_columns(struct spl_cloud *cloud, bool named, const char *line,
     if (code < 0)
         return code;
     code = named ? check_names(cloud, err) : recognise(cloud, err);
+    if (code == SPL_OK)
+        code = check_packed(cloud, err);
     return code == SPL_OK && !cloud->options->columns ? look_for_north(cloud, named, err) : code;
 }

@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "cloud/fields.h"
+#include "cloud/packed.h"
 #include "cloud/text.h"
 
 bool spl_text_is_tabbed(const char *line, size_t length)
@@ -37,15 +38,12 @@ char spl_text_separator(const char *line, size_t length)
 
 bool spl_layout_has(const struct spl_layout *layout, int column)
 {
-    for (unsigned i = 0; i < layout->fields; i++)
-        if (layout->column[i] == column)
-            return true;
-    return false;
+    return column >= 0 && spl_layout_taken(layout) >> column & 1;
 }
 
 uint32_t spl_layout_taken(const struct spl_layout *layout)
 {
-    uint32_t columns = 0;
+    uint32_t columns = layout->packed ? 7u << SPL_COLUMN_RED : 0;
     for (unsigned i = 0; i < layout->fields; i++)
         columns |= layout->column[i] >= 0 ? 1u << layout->column[i] : 0;
     return columns;
@@ -95,9 +93,17 @@ int spl_layout_from_option(struct spl_layout *layout, const struct spl_keep *kee
         int column = spl_keep_find_column(keep, spl_layout_taken(layout), fields.start, length);
         if (layout->fields == SPL_TEXT_FIELDS)
             return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: more than %d names", SPL_TEXT_FIELDS);
+        bool packed = column == SPL_COLUMN_SKIP && spl_packed_is_name(fields.start, length);
+        if (packed && spl_layout_taken(layout) >> SPL_COLUMN_RED & 7)
+            return spl_fail_field(err, SPL_E_USAGE, "columns", "columns: %.*s is named twice", (int)length,
+                                  fields.start);
+        if (packed) {
+            column = SPL_COLUMN_RED;
+            layout->packed = (uint8_t)(layout->fields + 1);
+        }
         if (known == SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP && !is_skipped(fields.start, length))
             return spl_fail_field(err, SPL_E_USAGE, "columns",
-                                  "columns: \"%.*s\" is not one of x y z red green blue nx ny nz intensity class "
+                                  "columns: \"%.*s\" is not one of x y z red green blue rgb nx ny nz intensity class "
                                   "return_number number_of_returns, nor named by --keep; - skips a column",
                                   length < 40 ? (int)length : 40, fields.start);
         if (known != SPL_COLUMN_SKIP && column == SPL_COLUMN_SKIP)

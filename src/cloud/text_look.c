@@ -92,7 +92,9 @@ static bool looks_like_number(const char *text, size_t length)
             return false;
         digit |= text[i] >= '0' && text[i] <= '9';
     }
-    return digit && strchr("0123456789+-.", *text);
+    static const char minus[] = "\xe2\x88\x92"; /* a typographer's */
+    return digit &&
+           (strchr("0123456789+-.", *text) || (length > sizeof minus - 1 && !memcmp(text, minus, sizeof minus - 1)));
 }
 
 unsigned spl_text_kinds_first(const struct spl_text_kinds *kinds, unsigned fields)
@@ -123,7 +125,8 @@ bool spl_text_written_add(struct spl_text_written *written, const struct spl_lay
     for (unsigned i = 0; i < count && i < SPL_TEXT_FIELDS && !written->bad; i++) {
         struct spl_fields plain = fields;
         double v;
-        if (!spl_layout_next(layout, &fields, &field) || (named && (i >= layout->fields || layout->column[i] < 0)))
+        if (!spl_layout_next(layout, &fields, &field) || (named && (i >= layout->fields || layout->column[i] < 0)) ||
+            layout->packed == i + 1)
             continue;
         written->found |= field.number && spl_fields_number(&plain, &v) != SPL_FIELD_OK;
         written->bad |= !field.number && (named ? !spl_text_is_missing(field.text, field.length)

@@ -296,6 +296,24 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
     }
 }
 
+/* A colour of one column, where no three are red, green and blue. */
+static void find_packed(struct spl_layout *layout, struct spl_fields fields)
+{
+    const char *name;
+    size_t length;
+    bool rgb = spl_columns_have3(spl_layout_taken(layout), SPL_COLUMN_RED);
+    for (unsigned i = 0; i < layout->fields && !rgb && !layout->packed && next_name(&fields, &name, &length); i++) {
+        if (layout->column[i] >= 0 || !spl_text_names_packed(name, without_unit(name, length), &layout->vague))
+            continue;
+        for (unsigned k = 0; k < layout->fields; k++)
+            if (layout->column[k] >= SPL_COLUMN_RED && layout->column[k] <= SPL_COLUMN_BLUE)
+                layout->column[k] = SPL_COLUMN_SKIP; /* of three that are not all there */
+        layout->column[i] = SPL_COLUMN_RED;
+        layout->packed = (uint8_t)(i + 1);
+        layout->argb = !strncasecmp(name, "argb", length < 4 ? length : 4);
+    }
+}
+
 bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *keep, const char *line, size_t length)
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length)), again = fields;
@@ -317,6 +335,7 @@ bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *kee
     }
     take_synonyms(layout, again);
     look_for_surveyors(layout, again);
+    find_packed(layout, again);
     return true;
 }
 

@@ -5,8 +5,11 @@
  * Invariant: the source's cursor is at the start of a line. Owned by the cloud's thread. */
 #include "cloud/text_reader.h"
 
+#include <stdio.h>
+
 #include "base/text.h"
 #include "cloud/fields.h"
+#include "geom/unit.h"
 
 enum { PROSE_LINES = 30 }; /* before the headings or numbers */
 
@@ -107,6 +110,31 @@ const char *spl_text_show_latin(const char *line, size_t *length, char out[SPL_T
     return latin ? out : line;
 }
 
+/* What headings, or a line below them, say of x, y and z. Units that do not fit each other are told and not taken; a
+ * height's own is a height's own. */
+static void take_units(struct spl_cloud *cloud, const double units[3])
+{
+    struct spl_cloud_coordinates *c = &cloud->info.coordinates;
+    char text[3][SPL_UNIT_TEXT_MAX], *told = cloud->info.units;
+    size_t used = 0, size = sizeof cloud->info.units;
+    bool degrees = units[0] < 0 && units[1] < 0, fits = units[0] == units[1] && (units[0] != 0 || units[2] == 0);
+    if (units[0] == 0 && units[1] == 0 && units[2] == 0)
+        return;
+    c->unit_m = c->height_unit_m = 0;
+    c->angles = fits && degrees;
+    told[0] = 0;
+    if (fits && units[2] >= 0) {
+        c->unit_m = degrees ? 0 : units[0];
+        c->height_unit_m = units[2];
+        return;
+    }
+    c->angles = false;
+    for (int k = 0; k < 3; k++)
+        if (units[k] != 0)
+            used += (size_t)snprintf(told + used, size - used, "%s%c in %s", used ? ", " : "", 'x' + k,
+                                     units[k] < 0 ? "degrees" : spl_unit_print(units[k], text[k]));
+}
+
 /* The names that columns are found by. */
 static void name_fields(struct spl_cloud *cloud, const struct spl_layout *layout, const char *line, size_t length)
 {
@@ -121,6 +149,11 @@ static void name_fields(struct spl_cloud *cloud, const struct spl_layout *layout
     if (!cloud->options->columns)
         spl_layout_list_unused(layout, line, length, cloud->info.unused, sizeof cloud->info.unused);
     cloud->info.surveyors = layout->surveyors;
+    if (!cloud->options->columns) {
+        double units[3];
+        spl_layout_find_units(layout, line, length, units);
+        take_units(cloud, units);
+    }
 }
 
 /* A comment before the first line may carry the names ("//X Y Z R G B"). */
@@ -168,7 +201,7 @@ static int refuse_names(const struct spl_cloud *cloud, const char *line, size_t 
 }
 
 /* A line of units below headings: "m;m;m;0-255", "[m] [m] [m]". */
-static bool is_units(const struct spl_layout *layout, const char *line, size_t length)
+static bool is_units(const struct spl_layout *layout, const char *line, size_t length, double units[3])
 {
     struct spl_fields fields = spl_fields_begin(line, length, spl_text_separator(line, length));
     unsigned found = 0;
@@ -181,12 +214,11 @@ static bool is_units(const struct spl_layout *layout, const char *line, size_t l
             unit++;
             size -= 2;
         }
-        static const char *const units[] = {"m",     "mm",    "cm",     "km",     "ft",  "us-ft",
-                                            "meter", "metre", "meters", "metres", "feet"};
-        for (size_t k = 0;
-             k < sizeof units / sizeof *units && layout->column[i] >= SPL_COLUMN_X && layout->column[i] <= SPL_COLUMN_Z;
-             k++)
-            found += strlen(units[k]) == size && !strncasecmp(units[k], unit, size);
+        int column = layout->column[i];
+        if (column < SPL_COLUMN_X || column > SPL_COLUMN_Z)
+            continue;
+        units[column - SPL_COLUMN_X] = spl_text_unit(unit, size);
+        found += units[column - SPL_COLUMN_X] > 0;
     }
     return found == 3;
 }
@@ -201,6 +233,7 @@ int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **li
     bool option = cloud->options->columns, header = false;
     unsigned prose = 0;
     size_t words = 0; /* of the last one */
+    double units[3] = {0};
     int code;
 
     *named = option;
@@ -236,8 +269,11 @@ int spl_text_take_preamble(struct spl_cloud *cloud, bool *named, const char **li
                 return code;
             continue;
         }
-        if (header && is_units(layout, *line, *length))
+        if (header && is_units(layout, *line, *length, units)) {
+            if (!option)
+                take_units(cloud, units);
             continue;
+        }
         if (header || is_data(*named ? layout : NULL, *line, *length)) { /* only one line has names */
             if (*named || !first.code)
                 return SPL_OK;

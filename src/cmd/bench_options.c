@@ -9,6 +9,7 @@
 #include "cmd/output.h"
 #include "cmd/table.h"
 #include "dataset/dataset.h"
+#include "dataset/remote_url.h"
 #include "geom/size.h"
 #include "render/view.h"
 #include "shared.h"
@@ -349,6 +350,20 @@ static int finish_soft(struct spl_cmd_bench_arguments *a, struct spl_error *err)
     return SPL_OK;
 }
 
+/* With all its tables; those of a collection's tiles are read when a view needs them. */
+static int open_dataset(const char *path, struct spl_dataset **dataset, struct spl_error *err)
+{
+    enum spl_file_kind kind = SPL_FILE_OTHER;
+    const struct spl_dataset_opening whole = {.tables_bytes = UINT64_MAX, .kind = &kind};
+    struct spl_error why = {0};
+    if (spl_remote_is_url(path))
+        return spl_dataset_open_whole(path, false, dataset, err); /* which says why not */
+    int rc = spl_dataset_open_as(path, &whole, dataset, &why);
+    if (rc && kind == SPL_FILE_COLLECTION)
+        return spl_dataset_open(path, false, dataset, err);
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
+
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv, struct spl_error *err)
 {
     a->devices[0] = "auto";
@@ -397,7 +412,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     a->bench.frames = a->bench.frames ? a->bench.frames : 20;
     for (int i = optind; !status && i < argc; i++) {
         struct spl_dataset **dataset = &a->datasets[a->bench.dataset_count];
-        status = spl_dataset_open_whole(argv[i], false, dataset, err);
+        status = open_dataset(argv[i], dataset, err);
         a->bench.dataset_count += !status;
         if (!status && a->sweep.maps_asked && !spl_dataset_get_info(*dataset)->maps)
             status = spl_fail(err, SPL_E_USAGE, "--maps is about stations' maps, and dataset '%s' has none",

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <jansson.h>
 
@@ -18,9 +19,11 @@
 #include "cmd/info_report.h"
 #include "cmd/info_scan.h"
 #include "cmd/output.h"
+#include "cmd/progress.h"
 #include "cmd/table.h"
 #include "dataset/classes.h"
 #include "dataset/dataset.h"
+#include "dataset/remote_url.h"
 #include "render/soft/suggest.h"
 
 static const char bar[] = "########################################";
@@ -44,7 +47,9 @@ static const struct spl_cmd_option options[] = {
     {"dictionary", "PNG", "where the picture goes; one dataset with textures", SPL_CMD_TEXT(struct arguments, picture)},
     {"columns", "LIST", "of text scans: x y z r g b intensity class nx ny nz -",
      SPL_CMD_TEXT(struct arguments, columns)},
-    {"verify", NULL, "check the pages' checksums too, read all points of scans (default)", .take = take_verify},
+    {"verify", NULL,
+     "check the pages' checksums too, also of a collection's tiles on disk; read all points of scans (default)",
+     .take = take_verify},
     {"no-verify", NULL, "trust the pages, and of scans the header; everything else is always checked",
      SPL_CMD_FLAG(struct arguments, no_verify)},
 };
@@ -238,7 +243,8 @@ static void print_lost(const struct spl_info_report *report)
 {
     char text[32];
     if (report->lost_count)
-        printf("  lost tiles    %s, of which nothing is counted in levels, lines, linear and clip lines:\n",
+        printf("  lost tiles    %s, of which nothing that cannot be read is counted in levels, lines, linear and clip "
+               "lines:\n",
                spl_cmd_group(report->lost_count, text));
     for (uint32_t i = 0; i < report->lost_count && i < SPL_INFO_LOST_MAX; i++)
         print_line("", report->lost[i].reason);
@@ -367,6 +373,15 @@ static int print_json(const struct spl_info_report *report, struct spl_error *er
     return SPL_OK;
 }
 
+/* A long way of large ones, so it is shown where somebody looks on. */
+static int check_tiles(struct spl_info_report *report, struct spl_error *err)
+{
+    struct spl_cmd_progress state = {0};
+    int rc = spl_info_check_tiles(report, isatty(STDERR_FILENO) ? spl_cmd_progress : NULL, &state, err);
+    spl_cmd_progress_finish(&state);
+    return rc;
+}
+
 int spl_cmd_info(int argc, char **argv)
 {
     struct arguments a = {0};
@@ -402,6 +417,8 @@ int spl_cmd_info(int argc, char **argv)
         int rc = spl_dataset_open_as(argv[i], &how, &dataset, &err);
         if (!rc)
             rc = spl_info_gather(&report, dataset, &err);
+        if (!rc && report.info->tiles && !a.no_verify && !spl_remote_is_url(argv[i]))
+            rc = check_tiles(&report, &err);
         if (!rc && a.json)
             rc = print_json(&report, &err);
         else if (!rc)

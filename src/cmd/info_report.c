@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
+#include "base/memory.h"
 #include "dataset/chunk_clip.h"
 #include "dataset/classes.h"
 #include "dataset/panels.h"
@@ -124,6 +126,45 @@ int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *da
     }
     report->lost_count = spl_dataset_list_faulty(dataset, report->lost, SPL_INFO_LOST_MAX);
     return spl_dataset_count_atoms(dataset, report->atoms, err);
+}
+
+int spl_info_check_tiles(struct spl_info_report *report, void (*progress)(void *context, const struct spl_progress *),
+                         void *context, struct spl_error *err)
+{
+    const struct spl_dataset *dataset = report->dataset;
+    const uint32_t pages = report->info->pages, own = spl_dataset_get_own_pages(dataset);
+    const uint64_t began_ns = spl_now_ns();
+    struct spl_progress said = {.stage = "checking tiles", .unit = "bytes"};
+    uint64_t said_ns = 0;
+    size_t room = 0;
+    uint32_t bad = 0; /* the tile that is not read on */
+    int rc = SPL_OK;
+    for (uint32_t page = own; page < pages; page++) {
+        const size_t bytes = spl_dataset_get_page_bytes(dataset, page);
+        said.total += bytes;
+        room = bytes > room ? bytes : room;
+    }
+    void *buffer = own < pages ? spl_alloc_raw(room, 1, err) : NULL;
+    if (own < pages && !buffer)
+        return SPL_E_NOMEM;
+    for (uint32_t page = own; page < pages && !rc; page++) {
+        const uint32_t part = spl_dataset_get_part(dataset, page);
+        const uint64_t now_ns = spl_now_ns();
+        struct spl_error why = {0};
+        if (progress && now_ns - said_ns > SPL_NS_PER_S / 10) {
+            said.rate = (double)said.done * SPL_NS_PER_S / (double)(now_ns - began_ns + 1);
+            progress(context, &said);
+            said_ns = now_ns;
+        }
+        said.done += spl_dataset_get_page_bytes(dataset, page);
+        if (part == bad || !(rc = spl_dataset_read_page(dataset, page, buffer, &why)))
+            continue;
+        bad = part;
+        rc = rc == SPL_E_CORRUPT ? SPL_OK : spl_fail(err, rc, "%s", why.message);
+    }
+    free(buffer);
+    report->lost_count = spl_dataset_list_faulty(dataset, report->lost, SPL_INFO_LOST_MAX);
+    return rc;
 }
 
 const char *spl_info_name(const struct spl_dataset_info *info, int attribute)

@@ -4,6 +4,8 @@
 
 #include <jansson.h>
 
+#include <splatd/pack.h>
+
 #include "base/error.h"
 #include "dataset/codec.h"
 #include "dataset/dataset.h"
@@ -36,12 +38,17 @@ struct spl_info_report {
     double error_squares[SPL_CHUNK_KINDS]; /* of panels and meshes: sum over their points of squared distances */
     double error_most[SPL_CHUNK_KINDS];
     struct spl_faulty_tile lost[SPL_INFO_LOST_MAX]; /* the first of a collection's tiles that cannot be read */
-    uint32_t lost_count;                            /* of whose pages nothing is counted */
+    uint32_t lost_count;                            /* of which nothing is counted that cannot be read */
     uint64_t clips;                                                          /* splats that end at a clip line */
 };
 
 /* Fills *report, which borrows the dataset. Blocks on disk. */
 int spl_info_gather(struct spl_info_report *report, const struct spl_dataset *dataset, struct spl_error *err);
+
+/* Of a collection, all pages of its tiles, each against its checksum where the dataset was opened with `verify`: what
+ * cannot be read is lost, as above. SPL_OK whatever tiles are like; `progress` may be NULL. Blocks on disk. */
+int spl_info_check_tiles(struct spl_info_report *report, void (*progress)(void *context, const struct spl_progress *),
+                         void *context, struct spl_error *err);
 
 /* What is counted, by name: the attributes that every dataset has, then its own. */
 int spl_info_count(const struct spl_dataset_info *info);

@@ -284,6 +284,8 @@ static void print_table(const json_t *json, const struct spl_scan *scan, const s
             info->north_first);
     if (info->surveyors)
         printf("  columns       Y is the east and X the north, as surveyors have it: x and y here\n");
+    if (info->units[0])
+        print_text("headings", info->units);
     if (info->footer[0])
         print_text("end", info->footer);
     if (info->unused[0])

@@ -57,6 +57,7 @@ static int find_ground(struct spl_cmd_render *a, const struct spl_dataset_info *
         return SPL_OK;
     int rc = spl_camera_get_ground(&a->drawing.view.camera, &a->drawing.encode.ground, err);
     a->drawing.encode.ground.epsg = info->epsg;
+    a->drawing.encode.crs = info->crs;
     return rc;
 }
 

@@ -30,6 +30,8 @@
 #include "service/place/places.h"
 #include "service/tour/fade.h"
 
+enum { parts_named = 12 };
+
 struct arguments {
     struct spl_cmd_drawing drawing; /* first */
     const char *dataset, *path;
@@ -42,6 +44,8 @@ struct arguments {
     size_t count;
     uint64_t saturated;      /* pixels beyond what a depth PNG can hold, of all frames */
     size_t saturated_frames; /* those that have some */
+    size_t parts;            /* frames that are not complete */
+    char first_parts[128];   /* the first numbers of them */
 };
 
 _Static_assert(offsetof(struct arguments, drawing) == 0, "its rows know it there");
@@ -185,6 +189,13 @@ static int write_image(struct arguments *a, size_t frame, const struct spl_image
     return rc;
 }
 
+static void note_part(struct arguments *a, size_t frame)
+{
+    size_t used = strlen(a->first_parts);
+    if (a->parts++ < parts_named)
+        snprintf(a->first_parts + used, sizeof a->first_parts - used, "%s%zu", used ? ", " : "", frame);
+}
+
 static int render_frames(struct arguments *a, const struct spl_dataset *dataset, struct spl_renderer *renderer,
                          struct spl_video *video, struct spl_error *err)
 {
@@ -201,12 +212,19 @@ static int render_frames(struct arguments *a, const struct spl_dataset *dataset,
         if (!rc)
             rc = video ? spl_video_add(video, &frame.images[a->drawing.layer], err)
                        : write_image(a, i, &frame.images[a->drawing.layer], err);
+        if (!rc && !frame.stats.complete)
+            note_part(a, i);
         spl_frame_finish(&frame);
         progress.done = i + 1;
         progress.rate = (double)progress.done * SPL_NS_PER_S / (double)(spl_now_ns() - began);
         spl_cmd_progress(&state, &progress);
     }
     spl_cmd_progress_finish(&state);
+    if (a->parts)
+        fprintf(stderr,
+                "splatd: %zu of %zu frames are not complete (%s%s): finer parts have no room on the device, or "
+                "their tile or server could not be read\n",
+                a->parts, a->count, a->first_parts, a->parts > parts_named ? ", …" : "");
     if (a->saturated)
         fprintf(stderr,
                 "splatd: %" PRIu64 " pixels in %zu of %zu frames lie beyond 65535 steps; a smaller --depth-scale "

@@ -237,7 +237,7 @@ void spl_dataset_strip(struct spl_dataset *dataset)
     json_decref(dataset->meta);
     dataset->stations = NULL;
     dataset->meta = NULL;
-    dataset->info.title = dataset->info.description = NULL; // were its texts
+    dataset->info.title = dataset->info.description = dataset->info.crs = NULL; // were its texts
 }
 
 void spl_dataset_let_go(const struct spl_dataset *dataset)

@@ -233,6 +233,7 @@ static int get_unit(struct spl_dataset *dataset, struct spl_error *err)
         return wrong(dataset, err, "crs", crs, "a text (WKT, or EPSG and a number) of at most 64 KiB, or null");
     spl_unit_print(metres, dataset->info.unit);
     dataset->info.epsg = spl_epsg_from_text(json_string_value(crs));
+    dataset->info.crs = json_string_value(crs);
     return SPL_OK;
 }
 

@@ -11,9 +11,9 @@ int spl_encode_jpeg(const struct spl_image *image, int quality, int chroma, stru
                     struct spl_error *err);
 int spl_encode_webp(const struct spl_image *image, int quality, struct spl_encoded *out, struct spl_error *err);
 extern const bool spl_webp_is_built;
-/* Of a map alone. `unit` as options have it. */
-int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, const char *unit,
-                    struct spl_encoded *out, struct spl_error *err);
+/* Of a map alone: ground, unit and crs of `options` count. */
+int spl_encode_tiff(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                    struct spl_error *err);
 extern const bool spl_tiff_is_built;
 /* depth_scale and unit of `options` count; the scale is above 0. */
 int spl_encode_png(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,

@@ -162,7 +162,7 @@ static int encode(const struct spl_image *image, const struct spl_encode_options
         rc = spl_encode_webp(image, options->quality ? options->quality : DEFAULT_QUALITY, out, err);
         break;
     case SPL_FORMAT_TIFF:
-        rc = spl_encode_tiff(image, &options->ground, options->unit, out, err);
+        rc = spl_encode_tiff(image, options, out, err);
         break;
     case SPL_FORMAT_NPY:
         rc = spl_encode_npy(image, options->list, out, err);

@@ -19,12 +19,12 @@
 
 const bool spl_tiff_is_built = true;
 
-enum { strip_bytes = 64 << 10, header_bytes_max = 1 << 20 };
+enum { strip_bytes = 64 << 10, header_bytes_max = 1 << 20, wkt_bytes_max = 2000 /* GDAL reads 2400 of a citation */ };
 enum { MODEL_PIXEL_SCALE = 33550, MODEL_TIEPOINT = 33922, MODEL_TRANSFORMATION = 34264 };
 enum { GEO_KEYS = 34735, GEO_DOUBLES, GEO_TEXT };
 enum { GDAL_METADATA = 42112, GDAL_NODATA };
 enum { MODEL_TYPE = 1024, RASTER_TYPE = 1025, CITATION = 1026, GEOGRAPHIC_TYPE = 2048, PROJECTED_TYPE = 3072 };
-enum { LINEAR_UNIT = 3076, LINEAR_UNIT_SIZE = 3077 };
+enum { PROJECTED_CITATION = 3073, LINEAR_UNIT = 3076, LINEAR_UNIT_SIZE = 3077 };
 enum { PROJECTED = 1, GEOGRAPHIC = 2, PIXEL_IS_AREA = 1, USER_DEFINED = 32767 };
 
 /* A file in memory. */
@@ -118,30 +118,74 @@ static TIFF *open_memory(struct memory *m)
     return tiff;
 }
 
-/* A system without a number: some plane, of which only the unit is known. Neither projected nor geographic, since
- * readers would take a datum for granted then. */
-static bool set_plane(TIFF *tiff, const char *unit)
+/* The name of a system: the first text of its WKT, into `name`, without what would end it in a tag. */
+static void find_name(const char *wkt, char name[96])
+{
+    const char *at = strchr(wkt, '"');
+    size_t n = 0;
+    for (at = at ? at + 1 : ""; *at && n < 95 && (*at != '"' || at[1] == '"'); at++) {
+        at += *at == '"';
+        name[n++] = (char)(*at == '|' ? ' ' : *at);
+    }
+    name[n] = 0;
+}
+
+/* Keys as they are written: the head, then number, place, count and value of each. */
+struct keys {
+    uint16_t all[4 + 4 * 8];
+    uint16_t count;
+};
+
+static void add_key(struct keys *keys, uint16_t number, uint16_t place, size_t count, size_t value)
+{
+    const uint16_t entry[4] = {number, place, (uint16_t)count, (uint16_t)value};
+    memcpy(keys->all + 4 + 4 * keys->count++, entry, sizeof entry);
+}
+
+/* A system without a number: some plane, of which the unit is known, and maybe a text. Neither projected nor
+ * geographic, since readers would take a datum for granted then. The text, where it is WKT of a sensible length, stands
+ * in a citation as Esri writes it: GDAL and what is built on it read the system from there, others its name. */
+static bool set_plane(TIFF *tiff, const char *unit, const char *wkt)
 {
     static const struct {
         const char *name;
         uint16_t epsg;
     } known[] = {{"m", 9001}, {"ft", 9002}, {"us-ft", 9003}};
+    static const char esri[] = "ESRI PE String = ";
+    struct keys keys = {.all = {1, 1, 1}};
     double metres = 0;
-    char citation[96];
+    char name[96] = "", text[96 + sizeof esri + wkt_bytes_max + 64];
     uint16_t code = USER_DEFINED;
-    if (!spl_unit_parse(unit, &metres) || !(metres > 0)) {
-        const uint16_t keys[] = {1, 1, 1, 1, RASTER_TYPE, 0, 1, PIXEL_IS_AREA};
-        return TIFFSetField(tiff, GEO_KEYS, 8, keys) == 1;
+    const bool has_unit = spl_unit_parse(unit, &metres) && metres > 0;
+    const bool whole = wkt && strlen(wkt) <= wkt_bytes_max;
+    if (wkt)
+        find_name(wkt, name);
+    if (!has_unit && !name[0]) {
+        add_key(&keys, RASTER_TYPE, 0, 1, PIXEL_IS_AREA);
+        keys.all[3] = keys.count;
+        return TIFFSetField(tiff, GEO_KEYS, 4 + 4 * keys.count, keys.all) == 1;
     }
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         code = strcmp(known[i].name, unit) ? code : known[i].epsg;
-    snprintf(citation, sizeof citation, "no EPSG number; units are %.31s|", unit); /* '|' ends a text */
-    const uint16_t keys[] = {1, 1, 1, 4 + (code == USER_DEFINED), MODEL_TYPE, 0, 1, USER_DEFINED,
-                             RASTER_TYPE, 0, 1, PIXEL_IS_AREA, CITATION, GEO_TEXT, (uint16_t)strlen(citation), 0,
-                             LINEAR_UNIT, 0, 1, code, LINEAR_UNIT_SIZE, GEO_DOUBLES, 1, 0};
-    return TIFFSetField(tiff, GEO_KEYS, code == USER_DEFINED ? 24 : 20, keys) == 1 &&
-           TIFFSetField(tiff, GEO_TEXT, citation) == 1 &&
-           (code != USER_DEFINED || TIFFSetField(tiff, GEO_DOUBLES, 1, &metres) == 1);
+    snprintf(text, sizeof text, name[0] ? "%s|" : "no EPSG number; units are %.31s|", name[0] ? name : unit);
+    size_t citation = strlen(text); /* '|' ends a text */
+    add_key(&keys, MODEL_TYPE, 0, 1, USER_DEFINED);
+    add_key(&keys, RASTER_TYPE, 0, 1, PIXEL_IS_AREA);
+    add_key(&keys, CITATION, GEO_TEXT, citation, 0);
+    if (name[0] && whole) {
+        snprintf(text + citation, sizeof text - citation, "%s%s|", esri, wkt);
+        for (char *c = text + citation; c[1]; c++)
+            *c = *c == '|' ? ' ' : *c;
+        add_key(&keys, PROJECTED_TYPE, 0, 1, USER_DEFINED);
+        add_key(&keys, PROJECTED_CITATION, GEO_TEXT, strlen(text + citation), citation);
+    }
+    if (has_unit)
+        add_key(&keys, LINEAR_UNIT, 0, 1, code);
+    if (has_unit && code == USER_DEFINED)
+        add_key(&keys, LINEAR_UNIT_SIZE, GEO_DOUBLES, 1, 0);
+    keys.all[3] = keys.count;
+    return TIFFSetField(tiff, GEO_KEYS, 4 + 4 * keys.count, keys.all) == 1 && TIFFSetField(tiff, GEO_TEXT, text) == 1 &&
+           (!has_unit || code != USER_DEFINED || TIFFSetField(tiff, GEO_DOUBLES, 1, &metres) == 1);
 }
 
 /* Heights: where there is nothing, and their unit, as GDAL says both. */
@@ -158,7 +202,7 @@ static bool set_heights(TIFF *tiff, const char *unit)
     return TIFFSetField(tiff, GDAL_METADATA, text) == 1;
 }
 
-static bool set_ground(TIFF *tiff, const struct spl_ground *ground, const char *unit, bool heights)
+static bool set_ground(TIFF *tiff, const struct spl_encode_options *options, bool heights)
 {
     static const TIFFFieldInfo fields[] = {
         {MODEL_PIXEL_SCALE, -1, -1, TIFF_DOUBLE, FIELD_CUSTOM, 1, 1, (char *)"ModelPixelScale"},
@@ -170,6 +214,7 @@ static bool set_ground(TIFF *tiff, const struct spl_ground *ground, const char *
         {GDAL_METADATA, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, (char *)"GDAL_METADATA"},
         {GDAL_NODATA, -1, -1, TIFF_ASCII, FIELD_CUSTOM, 1, 0, (char *)"GDAL_NODATA"},
     };
+    const struct spl_ground *ground = &options->ground;
     const double *o = ground->origin, *a = ground->across, *d = ground->down;
     if (TIFFMergeFieldInfo(tiff, fields, sizeof fields / sizeof *fields))
         return false;
@@ -181,7 +226,7 @@ static bool set_ground(TIFF *tiff, const struct spl_ground *ground, const char *
                                 geographic ? GEOGRAPHIC_TYPE : PROJECTED_TYPE, 0, 1, (uint16_t)ground->epsg};
         good = TIFFSetField(tiff, GEO_KEYS, 16, keys) == 1;
     } else {
-        good = set_plane(tiff, unit);
+        good = set_plane(tiff, options->unit, options->crs);
     }
     if (spl_ground_is_north_up(ground)) {
         good = good && TIFFSetField(tiff, MODEL_PIXEL_SCALE, 3, (double[]){a[0], -d[1], 0}) == 1 &&
@@ -190,10 +235,10 @@ static bool set_ground(TIFF *tiff, const struct spl_ground *ground, const char *
         const double m[16] = {a[0], d[0], 0, o[0], a[1], d[1], 0, o[1], 0, 0, 0, 0, 0, 0, 0, 1};
         good = good && TIFFSetField(tiff, MODEL_TRANSFORMATION, 16, m) == 1;
     }
-    return good && (!heights || set_heights(tiff, unit));
+    return good && (!heights || set_heights(tiff, options->unit));
 }
 
-static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct spl_ground *ground, const char *unit,
+static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct spl_encode_options *options,
                        uint32_t rows)
 {
     const bool color = image->type == SPL_PIXEL_RGBA8, vector = image->type == SPL_PIXEL_F32X3;
@@ -214,7 +259,7 @@ static bool set_fields(TIFF *tiff, const struct spl_image *image, const struct s
     if (good && samples > 1)
         good = TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, samples == 4 ? 1 : 2, samples == 4 ? &alpha : plain) == 1;
     bool heights = image->layer == SPL_LAYER_DEPTH || image->layer == SPL_LAYER_RANGE;
-    return good && set_ground(tiff, ground, unit, heights);
+    return good && set_ground(tiff, options, heights);
 }
 
 /* Rows [first, first + count) as they are written. */
@@ -249,9 +294,10 @@ static int write_strips(TIFF *tiff, const struct spl_image *image, const struct 
     return good ? SPL_OK : SPL_E_NOMEM;
 }
 
-int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, const char *unit,
-                    struct spl_encoded *out, struct spl_error *err)
+int spl_encode_tiff(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                    struct spl_error *err)
 {
+    const struct spl_ground *ground = &options->ground;
     if (!ground->placed)
         return spl_fail_field(err, SPL_E_INPUT, "format", "a GeoTIFF is of a view that is a map");
     const uint64_t row = (uint64_t)image->width * spl_pixel_bytes(image->type), bytes = row * image->height;
@@ -261,7 +307,7 @@ int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *grou
     const uint32_t rows = row >= strip_bytes ? 1 : (uint32_t)(strip_bytes / row);
     struct memory m = {.most = bytes + bytes / 64 + header_bytes_max}; /* what deflate cannot press grows by less */
     TIFF *tiff = open_memory(&m);
-    int rc = tiff && set_fields(tiff, image, ground, unit, rows)
+    int rc = tiff && set_fields(tiff, image, options, rows)
                  ? write_strips(tiff, image, ground, rows, &m, err)
                  : spl_fail(err, SPL_E_INTERNAL, "a TIFF could not be begun: %s", m.message);
     if (!rc && !TIFFFlush(tiff))

@@ -3,8 +3,8 @@
 
 const bool spl_tiff_is_built = false;
 
-int spl_encode_tiff(const struct spl_image *image, const struct spl_ground *ground, const char *unit,
-                    struct spl_encoded *out, struct spl_error *err)
+int spl_encode_tiff(const struct spl_image *image, const struct spl_encode_options *options, struct spl_encoded *out,
+                    struct spl_error *err)
 {
     (void)image;
     (void)ground;

@@ -36,6 +36,10 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
             info->north_first);
     if (info->surveyors)
         add(text, sizeof text, "%s", "Y is the east and X the north, as surveyors have it: x and y here");
+    if (info->units[0])
+        add(text, sizeof text,
+            "its headings name %s, which is no unit of all three and not used: --unit says which one it is",
+            info->units);
     if (info->footer[0])
         add(text, sizeof text, "%s", info->footer);
     if (info->unused[0])

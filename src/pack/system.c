@@ -182,6 +182,23 @@ static void mention_overruled(const struct finding *f, double unit_m)
     }
 }
 
+/* What is not kept of systems that no number says, of the first that has such a one. */
+static void mention_lost(const struct finding *f)
+{
+    const struct spl_scan *first = NULL;
+    size_t count = 0;
+    char more[48] = "";
+    for (size_t i = 0; i < f->scans->count; i++)
+        if (f->scans->list[i].coordinates.lost[0]) {
+            first = first ? first : &f->scans->list[i];
+            count++;
+        }
+    if (count > 1)
+        snprintf(more, sizeof more, " (and %zu more)", count - 1);
+    if (first)
+        say(f, "%.60s%s: %s; --crs says which one it is", first->name, more, first->coordinates.lost);
+}
+
 /* A dataset has one unit, which is also its system's: one in another unit is none of these coordinates, and would place
  * them elsewhere. The user's own is refused, that of the scans, whose unit the user knows better, left out (*crs
  * NULL). */
@@ -228,6 +245,8 @@ static int find(struct finding *f, struct spl_system *system, struct spl_error *
     if (rc)
         return rc;
     crs = of ? &of->coordinates : crs;
+    if (!f->has_crs && !f->has_none)
+        mention_lost(f);
     if (of && spl_crs_get_kind(crs->epsg) == SPL_CRS_GEOCENTRIC)
         say(f,
             "the coordinates of %.60s count from the middle of the earth (%s), and z is not up there: project the "

@@ -100,6 +100,18 @@ with tempfile.TemporaryDirectory() as folder:
     other = run(*[x if x != soft[1] else "box:-1,-1,0,2,2,3" for x in compared])
     assert other.returncode != 0 and "--restart" in other.stderr, other.stderr
 
+    must("pack", folder / "courtyard.ply", "--max-points", 3000, "-o", folder / "c.spld")
+    must("collect", folder / "a.spld", folder / "c.spld", "-o", folder / "yards.spld")  # tiles are read as views need them
+    rows = json.loads(must("bench", folder / "yards.spld", folder / "a.spld", *common, "--json"))["rows"]
+    assert [r["dataset"] for r in rows] == ["yards", "a"] and rows[0]["incomplete_frames"] == 0, rows
+    assert rows[0]["splats_drawn"] > rows[1]["splats_drawn"] > 0, rows
+    must("bench", folder / "yards.spld", *common, "--method", "splat", "--lod", "1,2", "--supersample", 1, "--repeats", 1, "-o", folder / "city")
+    points = json.loads((folder / "city/bench.json").read_text())["points"]
+    assert len(points) == 2 and all(p["psnr"] > 15 for p in points) and (folder / "yards.profile.json").exists(), points
+    for way in ("--textures", "--left-out"):  # these go through every splat
+        done = run("bench", way, folder / "yards.spld", "-o", folder / "none")
+        assert done.returncode != 0 and done.stderr and not (folder / "none").exists(), (way, done)
+
     for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out", "--photographs"],
                   ["--soft", "class:1", "--soft-model", "base,base"], ["--soft", "class:1", "--soft-opacity", 2],
                   ["--set", "yard"], ["--views", folder / "views.json", "--set", "hall"], ["--frames", 1],

@@ -168,6 +168,35 @@ def test_geotiffs_say_the_unit_of_a_plane():
                     assert {pixels[3], pixels[-1]} == {0} and 255 in pixels[3::4]
 
 
+def test_geotiffs_keep_a_system_without_a_number():
+    """Its name, and its text where GDAL reads one."""
+    if not TIFF:
+        return
+    utm = ('PROJCS["Site|grid ""A""",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
+           'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],%sUNIT["metre",1]]')
+    with tempfile.TemporaryDirectory() as top:
+        scan, made, out, prj = (os.path.join(top, name) for name in ("scan.xyz", "made.spld", "map.tif", "a.prj"))
+        with open(scan, "w") as file:
+            file.writelines(f"{x / 4} {y / 4} 2\n" for x in range(20) for y in range(20))
+        for wkt, kept in ((utm % "", True), (utm % 'PARAMETER["scale_factor",1],' * 1, True), (utm % ('PARAMETER["x",1],' * 130), False)):
+            with open(prj, "w") as file:
+                file.write(wkt)
+            subprocess.run([REAL, "pack", scan, "--crs", prj, "-o", made], check=True, capture_output=True)
+            subprocess.run([REAL, "render", made, "--projection", "orthographic", "--eye", "2,2,9", "--target", "2,2,0", "--units-per-pixel",
+                            "0.5", "--size", "16x16", "-o", out], check=True, capture_output=True)
+            with open(out, "rb") as file:
+                rendered = file.read()
+            with Daemon(REAL, datasets=[made]) as d:
+                served = d.ask("/v1/datasets/made/view?eye=2,2,9&target=2,2,0&units_per_pixel=0.5&width=16&height=16&projection=orthographic&format=tiff")
+            for body in (rendered, served.body):
+                tags = read_tiff(body)[0]
+                name, text = 'Site grid "A"|', f"ESRI PE String = {wkt}|".replace("Site|", "Site ")
+                full = (3072, 0, 1, 32767, 3073, 34737, len(text), len(name)) if kept else ()
+                said = (1024, 0, 1, 32767, 1025, 0, 1, 1, 1026, 34737, len(name), 0, *full, 3076, 0, 1, 9001)
+                assert tags[KEYS] == (1, 1, 1, len(said) // 4, *said), tags
+                assert tags[34737] == name + (text if kept else ""), tags
+
+
 def test_world_files_lie_beside_pictures():
     with Daemon(REAL, datasets=[TREE]) as d:
         zipped = zipfile.ZipFile(io.BytesIO(d.ask(f"{PLAN}&layers=color,depth&container=zip").body))

@@ -14,6 +14,7 @@ import time
 import zipfile
 
 import openapi
+import tiles
 from harness import FAKE, REAL, WALL, Daemon, eventually, run, together, Reply
 
 TOURS = "/v1/datasets/wall/tours"
@@ -524,6 +525,35 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert not (folder / ".fedcba9876543210").exists() and not (folder / "00000000000000aa").exists()
         with Daemon(FAKE, "--tours", str(folder)) as d:  # done is done
             assert d.ask(tour["uri"]).json() == tour and frames_of(d, tour)[:2] == wanted[:2]
+
+
+def test_frames_that_are_not_complete_are_named():
+    """A tile of a collection is gone: frames that show it are as it is from afar, and the tour says which, also after a restart."""
+    away, near = [[[x + 20, -15, 8], [x + 20, 30, 0]] for x in (-20, 60)]  # eye and target
+    path = {"frames": [{"camera": {"eye": eye, "target": target, "fov": 40}} for eye, target in (near, away, away, near, away)]}
+    with Folder() as folder, Folder() as tours:
+        tiles.make(folder, whole=False)
+        (folder / "city/tile-1.spld").unlink()
+        with Daemon(REAL, "--tours", tours, datasets=[folder / "city/city.spld"]) as d:
+            shown = [d.ask(f"/v1/datasets/city/view?eye={e[0]},{e[1]},{e[2]}&target={t[0]},{t[1]},{t[2]}&fov=40&width=64&height=48").headers
+                     for e, t in (near, away)]
+            assert [h["Splatd-Complete"] for h in shown] == ["false", "true"], shown
+            reply = d.post({"path": path, "settings": SMALL}, "/v1/datasets/city/tours")
+            tour = ended(d, reply.json()["uri"])
+            assert tour["frames_done"] == 5 and tour["incomplete_frames"] == {"count": 2, "first": [0, 3]}, tour
+            assert d.ask("/v1/tours").json()["tours"][0]["incomplete_frames"] == tour["incomplete_frames"]
+            eventually(lambda: json.loads((tours / tour["name"] / "tour.json").read_text())["incomplete"] == {"count": 2, "first": [0, 3]}, 10)
+        assert any("done after 5 of 5 frames, 2 of them not complete" in line for line in d.lines), d.lines
+        with Daemon(REAL, "--tours", tours, datasets=[folder / "city/city.spld"]) as d:
+            assert d.ask(tour["uri"]).json()["incomplete_frames"] == {"count": 2, "first": [0, 3]}
+        (tours / tour["name"] / "000003.jpeg").unlink()  # one that is not there is not known
+        with Daemon(REAL, "--tours", tours, datasets=[folder / "city/city.spld"]) as d:
+            assert d.ask(tour["uri"]).json()["incomplete_frames"] == {"count": 1, "first": [0]}
+        (folder / "path.json").write_text(json.dumps(path))
+        told = tiles.splatd("tour", folder / "city/city.spld", "--path", folder / "path.json", "--size", "64x48", "-o", folder / "out")
+        assert "2 of 5 frames are not complete (0, 3)" in told, told
+        told = tiles.splatd("tour", folder / "city/tile-0.spld", "--path", folder / "path.json", "--size", "64x48", "-o", folder / "out0")
+        assert "not complete" not in told, told
 
 
 def test_what_is_not_understood_counts_against_the_quota():

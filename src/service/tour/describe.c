@@ -58,6 +58,7 @@ json_t *spl_tour_describe(const struct spl_tour *tour)
     set(json, "error", tour->state == SPL_TOUR_FAILED ? json_string(tour->failure.message) : json_null());
     set(json, "frames", json_integer((json_int_t)spec->frames));
     set(json, "frames_done", json_integer((json_int_t)tour->frames_done));
+    set(json, "incomplete_frames", spl_tour_parts_to_json(tour));
     set(json, "progress", json_real(spec->frames ? (double)tour->frames_done / (double)spec->frames : 0));
     set(json, "remaining_s", remaining(tour));
     set(json, "fps", json_real(spec->fps));

@@ -54,8 +54,11 @@ static void end(struct spl_tour *tour, enum spl_tour_state state)
     free(tour->body); // may be large, and nothing is made of it any more
     tour->body = NULL;
     tour->body_length = 0;
-    spl_log_info("tour %s: %s after %zu of %zu frames%s%s", tour->name, spl_tour_state_names[state], tour->frames_done,
-                 tour->spec.frames, tour->failure.code ? ": " : "", tour->failure.message);
+    char parts[64] = "";
+    if (tour->parts)
+        snprintf(parts, sizeof parts, ", %zu of them not complete", tour->parts);
+    spl_log_info("tour %s: %s after %zu of %zu frames%s%s%s", tour->name, spl_tour_state_names[state],
+                 tour->frames_done, tour->spec.frames, parts, tour->failure.code ? ": " : "", tour->failure.message);
     spl_tour_work_state(tour);
     changed(tour);
 }
@@ -159,6 +162,8 @@ static void take_job(struct spl_job *job)
         tour->writing++;
         tours->writing_bytes += job->encoded.length;
         spl_count(tours->service->counters, tour_frames);
+        if (!job->stats.complete) /* pages had no room, or their tile or server could not be read */
+            tour->frames[job->frame_number] = SPL_FRAME_PART;
         spl_tour_work_frame(tour, job->frame_number, &job->encoded);
     }
     spl_job_destroy(job);
@@ -175,6 +180,10 @@ void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, c
         reopen(tour, frame, err);
     } else {
         tour->failures = 0;
+        if (tour->frames[frame] == SPL_FRAME_PART) {
+            spl_tour_note_part(tour, frame);
+            spl_tour_work_state(tour);
+        }
         tour->frames[frame] = SPL_FRAME_DONE;
         tour->frames_done++;
         account(tour, 0, bytes);

@@ -56,6 +56,29 @@ uint64_t spl_tour_state_bytes_max(size_t body_length)
     return state_bytes_own + 2 * (uint64_t)body_length;
 }
 
+void spl_tour_note_part(struct spl_tour *tour, size_t frame)
+{
+    size_t named = tour->parts < SPL_TOUR_PARTS ? tour->parts : SPL_TOUR_PARTS, at = named;
+    while (at > 0 && tour->first_parts[at - 1] >= frame)
+        at--;
+    if (at < named && tour->first_parts[at] == frame)
+        return;
+    tour->parts++;
+    if (at == SPL_TOUR_PARTS)
+        return;
+    size_t behind = named - at - (named == SPL_TOUR_PARTS);
+    memmove(&tour->first_parts[at + 1], &tour->first_parts[at], behind * sizeof tour->first_parts[0]);
+    tour->first_parts[at] = frame;
+}
+
+json_t *spl_tour_parts_to_json(const struct spl_tour *tour)
+{
+    json_t *first = json_array();
+    for (size_t i = 0; i < tour->parts && i < SPL_TOUR_PARTS; i++)
+        json_array_append_new(first, json_integer((json_int_t)tour->first_parts[i]));
+    return json_pack("{s:I, s:o}", "count", (json_int_t)tour->parts, "first", first);
+}
+
 json_t *spl_tour_to_json(const struct spl_tour *tour)
 {
     const struct spl_tour_spec *spec = &tour->spec;
@@ -65,12 +88,13 @@ json_t *spl_tour_to_json(const struct spl_tour *tour)
                           : json_null();
     json_t *body =
         tour->body ? json_stringn_nocheck(tour->body, tour->body_length) : json_null(); // it was parsed: UTF-8
-    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:o}", "format_version",
-                     format_version, "dataset", tour->dataset, "version", tour->version, "state",
+    return json_pack("{s:i, s:s, s:s, s:s, s:I, s:I, s:I, s:i, s:i, s:f, s:i, s:s, s:b, s:o, s:o, s:o}",
+                     "format_version", format_version, "dataset", tour->dataset, "version", tour->version, "state",
                      spl_tour_state_names[tour->state], "created", (json_int_t)tour->created_s, "ended",
                      (json_int_t)tour->ended_s, "frames", (json_int_t)spec->frames, "width", (int)camera->width,
                      "height", (int)camera->height, "fps", spec->fps, "layers", (int)spec->view.view.layers, "format",
-                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", body);
+                     spl_tour_format_name(tour), "video", spec->video, "failure", failure, "body", body, "incomplete",
+                     spl_tour_parts_to_json(tour));
 }
 
 static int read_state(const char *text)
@@ -147,6 +171,22 @@ static size_t frame_of(const struct spl_tour *tour, const char *file)
     return strcmp(name, file) ? SIZE_MAX : frame;
 }
 
+/* What tour.json says of frames that are not complete: of those that lie there. More are counted than named. */
+static void take_parts(struct spl_tour *tour, const json_t *parts)
+{
+    const json_t *first = json_object_get(parts, "first");
+    const json_int_t count = json_integer_value(json_object_get(parts, "count"));
+    const size_t named = json_array_size(first);
+    if (named > SPL_TOUR_PARTS || count < (json_int_t)named || count > (json_int_t)tour->spec.frames)
+        return;
+    for (size_t i = 0; i < named; i++) {
+        const json_int_t frame = json_integer_value(json_array_get(first, i));
+        if (frame >= 0 && frame < (json_int_t)tour->spec.frames && tour->frames[frame] == SPL_FRAME_DONE)
+            spl_tour_note_part(tour, (size_t)frame);
+    }
+    tour->parts += tour->parts == SPL_TOUR_PARTS ? (size_t)count - named : 0;
+}
+
 /* Which frames lie there, and how large everything is. What lies there is listed, not looked for: of a thousand tours
  * that failed early, ten million frames do not. */
 static int look_at_files(struct spl_tour *tour, struct spl_error *err)
@@ -191,7 +231,7 @@ static int stand_in(struct spl_tour *tour, const struct spl_error *why, struct s
     free(tour->frames);
     tour->body = NULL;
     tour->frames = NULL;
-    tour->body_length = tour->frames_done = 0;
+    tour->body_length = tour->frames_done = tour->parts = 0;
     tour->spec = (struct spl_tour_spec){.view.view.layers = 1};
     strcpy(tour->dataset, "");
     strcpy(tour->version, "0000000000000000");
@@ -223,8 +263,10 @@ static int read_tour(struct spl_tour *tour, struct spl_error *err)
         rc = SPL_E_NOMEM;
     tour->bytes = tour->state_bytes = rc ? 0 : length;
     free(bytes);
+    if (!rc && !(rc = look_at_files(tour, err)))
+        take_parts(tour, json_object_get(json, "incomplete"));
     json_decref(json);
-    return rc ? rc : look_at_files(tour, err);
+    return rc;
 }
 
 int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **out, struct spl_error *err)

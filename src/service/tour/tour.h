@@ -19,16 +19,18 @@ struct request;
 struct spl_call;
 
 enum {
-    SPL_TOUR_NAME = 16,        /* hex digits, random: a name cannot be guessed and is no path */
-    SPL_TOURS_MAX = 1000,      /* kept at a time */
-    SPL_TOURS_UNFINISHED = 32, /* of them; each holds its path in memory */
+    SPL_TOUR_NAME = 16,                          /* hex digits, random: a name cannot be guessed and is no path */
+    SPL_TOURS_MAX = 1000,                        /* kept at a time */
+    SPL_TOURS_UNFINISHED = 32,                   /* of them; each holds its path in memory */
+    SPL_TOUR_PARTS = 100,                        /* frames that are named as not complete */
     SPL_TOUR_IN_FLIGHT = 2 * SPL_DEVICES_MAX + 1 /* frames inside, at most: get_most_in_flight() */
 };
 
 enum spl_tour_state { SPL_TOUR_RENDERING, SPL_TOUR_VIDEO, SPL_TOUR_DONE, SPL_TOUR_FAILED };
 extern const char *const spl_tour_state_names[];
 
-enum spl_frame_state { SPL_FRAME_OPEN, SPL_FRAME_IN_FLIGHT, SPL_FRAME_DONE };
+/* PART: on its way to the disk, and without all of its pages. */
+enum spl_frame_state { SPL_FRAME_OPEN, SPL_FRAME_IN_FLIGHT, SPL_FRAME_PART, SPL_FRAME_DONE };
 
 struct spl_tour_stream;
 struct spl_tour_wish;
@@ -44,6 +46,7 @@ struct spl_tour {
     struct spl_error failure; /* set before it has ended where frames are still being written */
     unsigned char *frames;    /* enum spl_frame_state each */
     size_t frames_done, first_open, in_flight, writing, failures;
+    size_t parts, first_parts[SPL_TOUR_PARTS]; /* frames that are done and not complete; the least of them, rising */
     uint64_t bytes, state_bytes;     /* of its files, of tour.json */
     int64_t created_s, ended_s;      /* wall clock; ended 0 = not yet */
     uint64_t ended_ns, age_s;        /* monotonic time and age when it ended, or was taken up as ended */
@@ -112,6 +115,12 @@ void spl_tours_remove(struct spl_tour *tour);
 
 /* Frees a removed tour once nothing holds it; call after works, in_flight or readers went down. */
 void spl_tour_let_go(struct spl_tour *tour);
+
+/* Frame `frame`, which is done, is not complete; nothing where that is known. */
+void spl_tour_note_part(struct spl_tour *tour, size_t frame);
+
+/* {"count", "first"} of them. */
+json_t *spl_tour_parts_to_json(const struct spl_tour *tour);
 
 /* Ends it, once no frame of it is being written; its frames stay. */
 void spl_tour_fail(struct spl_tour *tour, const struct spl_error *why);

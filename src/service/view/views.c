@@ -102,6 +102,7 @@ void spl_view_set_unit(struct spl_view_request *view, const struct spl_dataset_i
 {
     snprintf(view->encode.unit, sizeof view->encode.unit, "%s", spl_unit_word(info));
     view->encode.ground.epsg = info->epsg;
+    view->encode.crs = info->crs;
 }
 
 /* What a dataset lacks of a view's terms, by the parameter that asked for it: classes are the clip's last terms. */

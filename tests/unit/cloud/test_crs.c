@@ -230,6 +230,42 @@ static void keys_are_read(void **state)
     assert_string_equal(show(&crs), "- | unknown | unknown");
 }
 
+/* Of a name that stands alone. */
+static void names_are_kept(void **state)
+{
+    (void)state;
+    static const struct {
+        struct spl_cloud_coordinates crs;
+        const char *wkt, *lost;
+    } rows[] = {
+        {{.name = "site", .unit_m = 1}, "LOCAL_CS[\"site\",UNIT[\"metre\",1]]", "the name is kept (site), but not how"},
+        {{.name = "say \"hi\"", .unit_m = 0.3048},
+         "LOCAL_CS[\"say \"\"hi\"\"\",UNIT[\"foot\",0.30480000000000002]]",
+         "the name is kept (say \"hi\")"},
+        {{.name = "links", .unit_m = 0.201168}, "LOCAL_CS[\"links\",UNIT[\"unit\",0.20116800000000001]]", "links"},
+        {{.name = "site"}, "LOCAL_CS[\"site\"]", "site"},
+        {{.name = "unnamed", .unit_m = 1}, NULL, ""},
+        {{.name = "WGS 84", .angles = true}, NULL, ""},
+        {{.name = "ETRS89 / UTM 32N", .epsg = 25832, .unit_m = 1}, NULL, ""},
+        {{.name = "", .unit_m = 1}, NULL, ""},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_cloud_coordinates crs = rows[i].crs, again = {0};
+        struct spl_error err = {0};
+        spl_crs_keep_name(&crs);
+        if (rows[i].wkt ? !crs.wkt || strcmp(crs.wkt, rows[i].wkt) != 0 : crs.wkt != NULL)
+            fail_msg("row %zu: %s", i, crs.wkt);
+        assert_true(rows[i].lost[0] ? strstr(crs.lost, rows[i].lost) != NULL : !crs.lost[0]);
+        if (crs.wkt) { /* it can be read */
+            assert_int_equal(spl_crs_read_wkt(crs.wkt, strlen(crs.wkt), &again, &err), 0);
+            assert_true(crs.unit_m == 0 || spl_unit_is_same(again.unit_m, crs.unit_m));
+            assert_int_equal(again.name[0], crs.name[0]);
+        }
+        spl_crs_finish(&again);
+        spl_crs_finish(&crs);
+    }
+}
+
 static void what_users_say(void **state)
 {
     (void)state;
@@ -336,10 +372,10 @@ static void files_say_it(void **state)
         {"copc/lone-star.copc.laz", "wkt | m | unknown"},
         {"trees/pine.las", "- | unknown | unknown"},
         {"formats/las/test_epsg_4326.las", "EPSG:4326 | angles | unknown"},
-        {"formats/las/mvk-thin.las", "- | us-ft | us-ft"},
+        {"formats/las/mvk-thin.las", "wkt | us-ft | us-ft"},
         {"formats/las/4_6_crop.las", "EPSG:2903 | us-ft | us-ft"},
         {"formats/las/lots_of_vlr.las", "- | us-ft | unknown"},
-        {"formats/las/interesting.las", "- | ft | unknown"},
+        {"formats/las/interesting.las", "wkt | ft | unknown"},
         {"formats/las/1.2-empty-geotiff-vlrs.las", "- | m | m"},
         {"formats/las/test1_4.las", "EPSG:2903 | us-ft | us-ft"},
         {"formats/laz/las_with_several_extra_byte_bloc.laz", "EPSG:2154 | m | unknown"},
@@ -373,10 +409,10 @@ static void files_say_it(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wkt_is_read),       cmocka_unit_test(odd_wkt_is_refused_where_it_is_odd),
-        cmocka_unit_test(keys_are_read),     cmocka_unit_test(what_users_say),
-        cmocka_unit_test(numbers_say_units), cmocka_unit_test(numbers_are_of_a_kind),
-        cmocka_unit_test(files_say_it),
+        cmocka_unit_test(wkt_is_read),           cmocka_unit_test(odd_wkt_is_refused_where_it_is_odd),
+        cmocka_unit_test(keys_are_read),         cmocka_unit_test(names_are_kept),
+        cmocka_unit_test(what_users_say),        cmocka_unit_test(numbers_say_units),
+        cmocka_unit_test(numbers_are_of_a_kind), cmocka_unit_test(files_say_it),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
 }

@@ -516,7 +516,11 @@ static void coordinates_are_in_metres(void **state)
                 {METADATA("GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],"
                           "PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433]]"),
                  "", 0},
-                {METADATA("\nurn:ogc:def:crs:EPSG::25832"), "urn:ogc:def:crs:EPSG::25832", 0}};
+                {METADATA("\nurn:ogc:def:crs:EPSG::25832 "), "", 25832},
+                {METADATA("EPSG:25833\n"), "", 25833},
+                {METADATA("EPSG:2994"), "", 0}, /* feet */
+                {METADATA("EPSG:foo"), "EPSG:foo", 0},
+                {METADATA("our own grid"), "our own grid", 0}};
     (void)state;
     prepare_doubles();
     const struct e57_field fields[] = {doubles("cartesianX", 0), doubles("cartesianY", 1), doubles("cartesianZ", 2)};
@@ -530,6 +534,8 @@ static void coordinates_are_in_metres(void **state)
         assert_string_equal(crs->name, rows[i].name);
         assert_int_equal(crs->epsg, rows[i].epsg);
         assert_true(crs->unit_m == 1 && !crs->angles);
+        assert_true((crs->wkt && !crs->epsg) == (rows[i].name[0] && !crs->epsg)); /* a name alone is kept */
+        assert_true(!crs->lost[0] == !(rows[i].name[0] && !crs->epsg));
         spl_cloud_destroy(cloud);
     }
 }

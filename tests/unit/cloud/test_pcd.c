@@ -181,6 +181,42 @@ static void packed_colors(void **state)
         }
 }
 
+/* A double holds the number or a float; what no colour is read from is told. */
+static void wide_colors_and_those_that_are_none(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < KINDS; kind++) {
+        const struct field place[] = {
+            {"x", 'F', 4, 1, {1, 2, 3}}, {"y", 'F', 4, 1, {1, 2, 3}}, {"z", 'F', 4, 1, {1, 2, 3}}};
+        const struct {
+            struct field field;
+            const char *unused; /* NULL: it is a colour */
+        } all[] = {
+            {{"rgb", 'F', 8, 1, {0x0a1420, 0xff8001, 0x8080e0}}, NULL},
+            {{"rgb", 'F', 8, 1, {as_float(0xff0a1420), as_float(0x00ff8001), as_float(0x008080e0)}}, NULL},
+            {{"rgba", 'U', 8, 1, {0xff0a1420, 0xffff8001, 0xff8080e0}}, NULL},
+            {{"rgb", 'U', 1, 1, {1, 2, 3}}, "rgb (of 1 byte)"},
+            {{"rgba", 'U', 2, 1, {1, 2, 3}}, "rgba (of 2 bytes)"},
+            {{"rgb", 'U', 1, 3, {1, 2, 3}}, "rgb (a list)"},
+            {{"red", 'U', 1, 1, {1, 2, 3}}, "red (without green)"},
+            {{"foo", 'U', 1, 3, {1, 2, 3}}, ""},
+        };
+        for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+            struct loaded l;
+            const struct field fields[] = {place[0], place[1], place[2], all[i].field};
+            load_fields(kind, fields, 4, &l);
+            assert_string_equal(l.unused, all[i].unused ? all[i].unused : "");
+            assert_int_equal(l.attributes, all[i].unused ? 0 : SPL_CLOUD_COLOR);
+            if (!all[i].unused) {
+                assert_color(&l, 0, 10, 20, 32);
+                assert_color(&l, 1, 255, 128, 1);
+                assert_color(&l, 2, 128, 128, 224);
+            }
+            loaded_finish(&l);
+        }
+    }
+}
+
 static void colors_as_text(void **state)
 {
     struct loaded l;
@@ -377,6 +413,7 @@ int main(void)
         cmocka_unit_test(doubles_are_exact),
         cmocka_unit_test(normals_intensity_and_label),
         cmocka_unit_test(packed_colors),
+        cmocka_unit_test(wide_colors_and_those_that_are_none),
         cmocka_unit_test(colors_as_text),
         cmocka_unit_test(headers_in_any_order),
         cmocka_unit_test(viewpoint_is_a_station),

@@ -381,9 +381,131 @@ static void gaussians_are_no_scan(void **state)
     loaded_finish(&l);
 }
 
+/* A property of `type` with these values beside x y z, and what is read of it. */
+static void load_packed(int order, const char *property, const double *values, struct loaded *l)
+{
+    static struct bytes b;
+    char type[16];
+    sscanf(property, "%15s", type);
+    b.length = 0;
+    put_text(&b,
+             "ply\nformat %s 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+             "property %s\nend_header\n",
+             orders[order], property);
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++)
+            put_scalar(&b, order, "float", i);
+        put_scalar(&b, order, type, values[i]);
+        end_row(&b, order);
+    }
+    load_bytes(&b, NULL, 2, l);
+    if (l->code < 0)
+        fail_msg("%s %s: %s", orders[order], property, l->err.message);
+}
+
+static double bits_as_float(uint32_t bits)
+{
+    float f;
+    memcpy(&f, &bits, 4);
+    return f;
+}
+
+/* 0xRRGGBB and 0xAARRGGBB as a number, as a negative one, as the bits of a float, and as a number in a float. */
+static void colours_in_one_number(void **state)
+{
+    const struct {
+        const char *property;
+        double values[3];
+    } all[] = {
+        {"uint rgba", {0xff0a1420, 0x00ff8001, 0xff8080e0}},
+        {"int32 RGB", {(int32_t)0xff0a1420, 0x00ff8001, (int32_t)0xff8080e0}},
+        {"float rgb", {bits_as_float(0xff0a1420), bits_as_float(0x00ff8001), bits_as_float(0x008080e0)}},
+        {"float rgb", {0x0a1420, 0xff8001, 0x8080e0}},
+        {"double rgb", {0x0a1420, 0xff8001, 0x8080e0}},
+    };
+    (void)state;
+    for (int order = 0; order < 3; order++)
+        for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+            struct loaded l;
+            load_packed(order, all[i].property, all[i].values, &l);
+            assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+            assert_color(&l, 0, 10, 20, 32);
+            assert_color(&l, 1, 255, 128, 1);
+            assert_color(&l, 2, 128, 128, 224);
+            assert_string_equal(l.unused, "");
+            loaded_finish(&l);
+        }
+}
+
+/* 0xff and red above 127 are no number as a float, but bits all the same. Dark ones are dark, and none at all none. */
+static void packed_colours_at_their_ends(void **state)
+{
+    static struct bytes b;
+    static const uint32_t packed[2] = {0xffff8001, 0xff800000};
+    struct loaded l;
+    (void)state;
+    b.length = 0;
+    put_text(&b,
+             "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+             "property float z\nproperty float rgb\nproperty uchar red\nproperty list uchar int more\nend_header\n");
+    for (int i = 0; i < 2; i++) {
+        const float place[3] = {(float)i, 0, 0};
+        put(&b, place, sizeof place);
+        put(&b, &packed[i], 4);
+        put(&b, "\x7f\0", 2);
+    }
+    load_bytes(&b, NULL, 2, &l);
+    assert_int_equal(l.code, 0);
+    assert_color(&l, 0, 255, 128, 1);
+    assert_color(&l, 1, 128, 0, 0);
+    loaded_finish(&l);
+    for (int order = 0; order < 3; order++) {
+        load_packed(order, "uint rgb", (const double[]){0, 1, 0x010001}, &l);
+        assert_color(&l, 1, 0, 0, 1);
+        assert_color(&l, 2, 1, 0, 1);
+        loaded_finish(&l);
+        load_packed(order, "uint rgb", (const double[]){0, 0, 0}, &l);
+        assert_int_equal(l.attributes, 0); /* fields that nobody filled are no colours */
+        assert_true(l.colors.blank);
+        loaded_finish(&l);
+    }
+}
+
+static void colours_that_are_not_read_are_told(void **state)
+{
+    static const struct {
+        const char *properties, *row, *unused;
+    } all[] = {
+        {"property list uchar uchar rgb", "3 10 20 30", "rgb (a list)"},
+        {"property uchar rgba", "7", "rgba (of 1 byte)"},
+        {"property uchar red\nproperty uchar blue", "7 8", "red, blue (without green)"},
+        {"property uchar green", "7", "green (without red)"},
+        {"property uchar foo", "7", ""},
+        {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uint rgba", "7 8 9 7", ""},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        static struct bytes b;
+        struct loaded l;
+        b.length = 0;
+        put_text(&b,
+                 "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                 "property float z\n%s\nend_header\n1 2 3 %s\n",
+                 all[i].properties, all[i].row);
+        load_bytes(&b, NULL, 2, &l);
+        if (l.code < 0)
+            fail_msg("%zu: %s", i, l.err.message);
+        assert_string_equal(l.unused, all[i].unused);
+        loaded_finish(&l);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(colours_in_one_number),
+        cmocka_unit_test(packed_colours_at_their_ends),
+        cmocka_unit_test(colours_that_are_not_read_are_told),
         cmocka_unit_test(gaussians_are_no_scan),
         cmocka_unit_test(every_type_and_byte_order),
         cmocka_unit_test(doubles_are_exact),

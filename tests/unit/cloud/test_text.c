@@ -404,6 +404,8 @@ static void what_is_no_scan_is_named(void **state)
         {BYTES("# timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "is a trajectory"},
         {BYTES("OFF\n3 0 0\n1 2 3\n"), "is a mesh (OFF)"},
         {BYTES("{\"type\":1}"), "is JSON"},
+        {BYTES("[{\"x\":1,\"y\":2,\"z\":3}]"), "is JSON"},
+        {BYTES("\xef\xbb\xbfv 0 0 0\nf 1 2 3\n"), "is a model of Wavefront's (OBJ)"},
         {BYTES("<!DOCTYPE HTML>404"), "is a web page"},
         {BYTES("II*\0abc"), "is a TIFF"},
         {BYTES("II*abc"), "no column has this name"},
@@ -454,9 +456,50 @@ static void lines_have_a_limit(void **state)
     loaded_finish(&l);
 }
 
+/* An editor has put UTF-8's mark before what it wrote. */
+static void a_mark_before_it_changes_no_format(void **state)
+{
+    static const struct {
+        const char *text, *format;
+        uint32_t attributes;
+    } files[] = {
+        {"ply\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+         "property float x\nproperty float y\nproperty float z\nend_header\n9 8 7 1 2 3\n6 5 4 4 5 6\n",
+         "PLY", SPL_CLOUD_COLOR},
+        {"PLY\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty float x\nproperty float y\n"
+         "property float z\nend_header\n9 1 2 3\n6 4 5 6\n",
+         "PLY", 0},
+        {"# .PCD v.7\nFIELDS rgb x y z\nWIDTH 2\nDATA ascii\n4.2108e+06 1 2 3\n4.2108e+06 4 5 6\n", "PCD",
+         SPL_CLOUD_COLOR},
+        {"VERSION .7\nFIELDS x y z\nWIDTH 2\nDATA ascii\n1 2 3\n4 5 6\n", "PCD", 0},
+        {"1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0.5\n4 5 6 0.25\n", "PTX",
+         SPL_CLOUD_COLOR | SPL_CLOUD_STATION},
+        {"2\n1 2 3 0 9 9 9\n4 5 6 0 9 9 8\n", "PTS", SPL_CLOUD_COLOR},
+        {"x y z\n1 2 3\n4 5 6\n", "text", 0},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
+        for (int mark = 0; mark < 2; mark++) {
+            static struct bytes b;
+            struct loaded l;
+            b.length = 0;
+            put_text(&b, "%s%s", mark ? "\xef\xbb\xbf" : "", files[i].text);
+            load_bytes(&b, NULL, 2, &l);
+            if (l.code < 0)
+                fail_msg("%zu: %s", i, l.err.message);
+            assert_string_equal(l.format, files[i].format);
+            assert_int_equal(l.attributes, files[i].attributes);
+            assert_int_equal(l.points, 2);
+            assert_point(&l, 0, 1, 2, 3);
+            assert_point(&l, 1, 4, 5, 6);
+            loaded_finish(&l);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_mark_before_it_changes_no_format),
         cmocka_unit_test(separators_headers_and_comments),
         cmocka_unit_test(named_columns),
         cmocka_unit_test(columns_are_recognised_by_their_values),

@@ -262,6 +262,12 @@ static void numbers_are_read_as_people_write_them(void **state)
         {"\"1,5\",\"2,25\",\"3\"\n1,2,3\n", "x,y,z", {1.5, 2.25, 3}, {1, 2, 3}},
         {"\"1,234.5\",\"2\",\"3\"\n1,2,3\n", "x,y,z", {1234.5, 2, 3}, {1, 2, 3}},
         {"\"1\" \"8.5\" \"1\" \"2\"\n2 7 1 2\n3 6 1 2\n", "-,x,y,z", {8.5, 1, 2}, {6, 1, 2}},
+        {"\xe2\x88\x92"
+         "1.5 2 3\n4 \xe2\x88\x92"
+         "5 6\n",
+         "x,y,z",
+         {-1.5, 2, 3},
+         {4, -5, 6}}, /* a comma is none of them */
         {"1,5;2;3;TREE\n4;5;6;EDGE\n", "x,y,z,text", {1.5, 2, 3}, {4, 5, 6}},
         {"\xe2\x88\x92"
          "1.5 2 3\n1 2 3\n",
@@ -651,6 +657,59 @@ static void a_north_before_the_east_is_told(void **state)
     loaded_finish(&l);
 }
 
+/* What headings say of x and y, and of z; in metres, -1 of degrees. */
+static void headings_name_units(void **state)
+{
+    static const double us_ft = 1200.0 / 3937;
+    const struct {
+        const char *text;
+        double unit, height;
+        const char *told; /* of what does not go together */
+    } rows[] = {
+        {"x[m] y[m] z[m]\n1 2 3\n", 1, 1, ""},
+        {"x [m] y [m] z [m] r g b\n1 2 3 4 5 6\n", 1, 1, ""},
+        {"//X(m),Y(m),Z(m)\n1,2,3\n", 1, 1, ""},
+        {"X (US ft),Y (US ft),Z (US ft)\n1,2,3\n", us_ft, us_ft, ""},
+        {"X [us-ft];Y [ftUS];Z [US survey foot]\n1;2;3\n", us_ft, us_ft, ""},
+        {"Easting (Feet),Northing (ft),Elevation (FT)\n1,2,3\n", 0.3048, 0.3048, ""},
+        {"easting_ft,northing_ft,height_ft\n1,2,3\n", 0.3048, 0.3048, ""},
+        {"x_m y_m z_m\n1 2 3\n", 1, 1, ""},
+        {"x[m] y[m] z[ft]\n1 2 3\n", 1, 0.3048, ""},
+        {"x[mm] y[mm] z\n1 2 3\n", 0.001, 0, ""},
+        {"x;y;z\nm;m;m\n1;2;3\n", 1, 1, ""},
+        {"x y z\n[mm] [mm] [mm]\n1 2 3\n", 0.001, 0.001, ""},
+        {"x;y;z;i\nft;ft;ft;0-255\n1;2;3;9\n", 0.3048, 0.3048, ""},
+        {"x[deg],y[deg],z[m]\n1,2,3\n", -1, 1, ""},
+        {"Ost;Nord;HOEHE UEBER NHN [m]\n1;2;3\n", 0, 0, "z in m"},
+        {"x[m] y[ft] z[m]\n1 2 3\n", 0, 0, "x in m, y in ft, z in m"},
+        {"x[m] y[deg] z\n1 2 3\n", 0, 0, "x in m, y in degrees"},
+        {"x y z\n1 2 3\n", 0, 0, ""},
+        {"x(0-255) y(0-255) z(0-255)\n1 2 3\n", 0, 0, ""},
+        {"x[UTM32] y[UTM32] z[NHN]\n1 2 3\n", 0, 0, ""},
+        {"x y z r(ft) foo_m\n1 2 3 4 5\n", 0, 0, ""},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_cloud *cloud;
+        struct spl_error err = {0};
+        write_scratch(rows[i].text, strlen(rows[i].text));
+        if (spl_cloud_open(scratch_path(), NULL, &cloud, &err))
+            fail_msg("%zu: %s", i, err.message);
+        const struct spl_cloud_info *info = spl_cloud_get_info(cloud);
+        const struct spl_cloud_coordinates *c = &info->coordinates;
+        double unit = c->angles ? -1 : c->unit_m;
+        if (unit != rows[i].unit || c->height_unit_m != rows[i].height || strcmp(info->units, rows[i].told) != 0)
+            fail_msg("%zu: %g, %g, \"%s\"", i, unit, c->height_unit_m, info->units);
+        spl_cloud_destroy(cloud);
+    }
+    struct spl_cloud *cloud;
+    const struct spl_cloud_options options = {.columns = "x,y,z"};
+    write_scratch("x[m],y[m],z[m]\n1,2,3\n", 21);
+    assert_int_equal(spl_cloud_open(scratch_path(), &options, &cloud, NULL), 0);
+    assert_true(spl_cloud_get_info(cloud)->coordinates.unit_m == 0); /* headings are not read then */
+    spl_cloud_destroy(cloud);
+}
+
 static void white_is_that_of_the_bits_in_use(void **state)
 {
     static const struct {
@@ -692,6 +751,7 @@ int main(void)
         cmocka_unit_test(many_headings_are_cut),
         cmocka_unit_test(surveyors_y_is_the_east),
         cmocka_unit_test(a_north_before_the_east_is_told),
+        cmocka_unit_test(headings_name_units),
         cmocka_unit_test(white_is_that_of_the_bits_in_use),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);

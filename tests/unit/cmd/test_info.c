@@ -224,6 +224,60 @@ static void test_lost_tiles(void **state)
     json_decref(json);
 }
 
+/* Flips a bit of the largest section of a file, which is a page. */
+static void spoil_page(const char *name)
+{
+    FILE *f = fopen(place(name), "r+b");
+    assert_non_null(f);
+    struct spl_dataset *dataset;
+    assert_int_equal(spl_dataset_open(place(name), true, &dataset, NULL), 0);
+    const uint64_t end = spl_dataset_get_info(dataset)->file_bytes;
+    spl_dataset_close(dataset);
+    for (uint64_t at = 0; at < end; at += 64) { /* where nothing but a page's checksum tells */
+        int byte;
+        assert_int_equal(fseek(f, (long)at, SEEK_SET), 0);
+        byte = fgetc(f);
+        assert_int_equal(fseek(f, (long)at, SEEK_SET), 0);
+        fputc(byte ^ 1, f);
+        assert_int_equal(fflush(f), 0);
+        if (!spl_dataset_open(place(name), false, &dataset, NULL)) {
+            spl_dataset_close(dataset);
+            if (spl_dataset_open(place(name), true, &dataset, NULL)) {
+                assert_int_equal(fclose(f), 0);
+                return;
+            }
+            spl_dataset_close(dataset);
+        }
+        assert_int_equal(fseek(f, (long)at, SEEK_SET), 0);
+        fputc(byte, f);
+    }
+    fail_msg("no page of %s", name);
+}
+
+/* A page whose checksum does not hold is found, and the tile named; the tables of all tiles are counted. */
+static void test_damaged_tiles(void **state)
+{
+    (void)state;
+    for (int t = 0; t < 3; t++)
+        make_tile(t);
+    splatd("collect tile-0.spld tile-1.spld tile-2.spld -o city.spld 2>&1", 0);
+    assert_non_null(strstr(splatd("info city.spld 2>pipe.txt", 0), "\n  tiles         3, "));
+    spoil_page("tile-2.spld");
+    const char *said = splatd("info city.spld 2>pipe.txt", 2);
+    assert_non_null(strstr(said, "\n  lost tiles    1, "));
+    assert_non_null(strstr(said, "tile-2.spld cannot be read: page 0 fails its checksum"));
+    assert_non_null(
+        strstr(splatd("info city.spld 2>&1 >table.txt", 2), "\nsplatd: city.spld: 1 of its 3 tiles cannot be used\n"));
+    assert_null(strstr(splatd("info --no-verify city.spld 2>pipe.txt", 0), "lost tiles"));
+    unlink(place("tile-0.spld"));
+    json_t *json = json_loads(splatd("info --json city.spld 2>pipe.txt", 2), 0, NULL);
+    const json_t *lost = json_object_get(json, "faulty_tiles"), *first = json_object_get(lost, "first");
+    assert_true(number(lost, "count") == 2 && json_array_size(first) == 2);
+    assert_string_equal(json_string_value(json_object_get(json_array_get(first, 0), "file")), "tile-0.spld");
+    assert_string_equal(json_string_value(json_object_get(json_array_get(first, 1), "file")), "tile-2.spld");
+    json_decref(json);
+}
+
 static int begin(void **state)
 {
     enum { side = 20 };
@@ -249,10 +303,8 @@ static int end(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_maps),
-        cmocka_unit_test(test_pruned),
-        cmocka_unit_test(test_primitives),
-        cmocka_unit_test(test_lost_tiles),
+        cmocka_unit_test(test_maps),       cmocka_unit_test(test_pruned),        cmocka_unit_test(test_primitives),
+        cmocka_unit_test(test_lost_tiles), cmocka_unit_test(test_damaged_tiles),
     };
     return cmocka_run_group_tests(tests, begin, end);
 }
