@@ -28,21 +28,8 @@
 #define SPL_INLINE static inline __attribute__((always_inline))
 
 static const float certain = 0.8f; /* agreement of an edge */
-#define ORIENT_VOTE (1 << 20)      /* of an edge whose normals agree */
 static const double level = 0.8;   /* how far a normal shows up or down; a roof's, too */
 enum { large = 1024 };             /* points of a level piece that counts */
-static const double border = 1; /* votes for "both up" of what is level and has a point; sqrt(n) times as many of n */
-
-/* Trees of points, or of pieces: all that know their signs relative to each other. */
-struct forest {
-    uint32_t *parent;
-    uint8_t *flip;     /* sign relative to the parent */
-    uint8_t *anchored; /* of roots: the tree is never turned */
-    int64_t *level;    /* of roots: points of large level pieces that show upwards, less those that show downwards */
-    uint32_t *best;    /* scratch: the edge of each root that has most votes */
-    uint32_t *place;   /* scratch: where the edges of each root lie, then whether it has joined another in this round */
-    uint32_t count;    /* of all of these */
-};
 
 int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, struct spl_error *err)
 {
@@ -102,165 +89,6 @@ float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j)
     }
     agree(points->normal[i], &b, &agreement);
     return agreement[0];
-}
-
-size_t spl_orient_add_edge(struct spl_orient_edge *edges, size_t count, uint32_t a, uint32_t b, float agreement)
-{
-    struct spl_orient_edge edge = {a < b ? a : b, a < b ? b : a, lrintf(agreement * ORIENT_VOTE)};
-    if (count > 0 && edges[count - 1].a == edge.a && edges[count - 1].b == edge.b)
-        edges[count - 1].votes += edge.votes;
-    else
-        edges[count++] = edge;
-    return count;
-}
-
-/* The root of `i`, with the sign of i relative to it; halves the path. */
-static uint32_t find_root(struct forest *f, uint32_t i, uint8_t *sign)
-{
-    uint8_t s = 0;
-    while (f->parent[i] != i) {
-        uint32_t up = f->parent[i];
-        if (f->parent[up] != up) {
-            f->flip[i] ^= f->flip[up];
-            f->parent[i] = f->parent[up];
-        }
-        s ^= f->flip[i];
-        i = f->parent[i];
-    }
-    *sign = s;
-    return i;
-}
-
-/* Joins the trees of a and b; the smaller root stays, so that roots precede their trees. Anchored trees keep their
- * sign, so two of them never join. */
-static void join(struct forest *f, uint32_t a, uint32_t b, bool opposed)
-{
-    uint8_t sa, sb;
-    uint32_t ra = find_root(f, a, &sa), rb = find_root(f, b, &sb);
-    if (ra == rb || (f->anchored[ra] && f->anchored[rb]))
-        return;
-    if (ra < rb ? f->anchored[rb] : !f->anchored[ra]) {
-        uint32_t r = ra;
-        ra = rb;
-        rb = r;
-    }
-    f->parent[rb] = ra;
-    f->flip[rb] = sa ^ sb ^ opposed;
-    if (!f->anchored[ra])
-        f->level[ra] += f->flip[rb] ? -f->level[rb] : f->level[rb];
-}
-
-static int compare_edges(const void *a, const void *b)
-{
-    const struct spl_orient_edge *x = a, *y = b;
-    return (x->b > y->b) - (x->b < y->b);
-}
-
-/* Makes one of all edges that have the same second end; those that are left are in its order. Returns how many. `at`
- * tells of each end where its edge may be. */
-static size_t unite_run(struct spl_orient_edge *edges, size_t count, uint32_t *at)
-{
-    enum { few = 32 };
-    size_t kept = 0;
-    for (size_t e = 0; e < count; e++) {
-        struct spl_orient_edge edge = edges[e];
-        uint32_t to = at[edge.b];
-        if (to < kept && edges[to].b == edge.b) {
-            edges[to].votes += edge.votes;
-        } else {
-            at[edge.b] = (uint32_t)kept;
-            edges[kept++] = edge;
-        }
-    }
-    if (kept > few)
-        qsort(edges, kept, sizeof *edges, compare_edges);
-    for (size_t e = 1; kept <= few && e < kept; e++) {
-        struct spl_orient_edge edge = edges[e];
-        size_t to = e;
-        for (; to > 0 && edges[to - 1].b > edge.b; to--)
-            edges[to] = edges[to - 1];
-        edges[to] = edge;
-    }
-    return kept;
-}
-
-/* Moves the edges to the roots of their ends, one for all of the same two, and leaves out those that can't join. Leaves
- * them by their ends. `spare` has room for as many. */
-static size_t unite(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
-{
-    uint32_t *place = f->place, sum = 0;
-    size_t moved = 0, kept = 0;
-    memset(place, 0, f->count * sizeof *place);
-    for (size_t i = 0; i < count; i++) {
-        uint8_t sa, sb;
-        uint32_t a = find_root(f, edges[i].a, &sa), b = find_root(f, edges[i].b, &sb);
-        if (a == b || (f->anchored[a] && f->anchored[b]))
-            continue;
-        edges[moved] =
-            (struct spl_orient_edge){a < b ? a : b, a < b ? b : a, sa == sb ? edges[i].votes : -edges[i].votes};
-        place[edges[moved++].a]++;
-    }
-    for (uint32_t i = 0; i < f->count; i++) {
-        uint32_t here = place[i];
-        place[i] = sum;
-        sum += here;
-    }
-    for (size_t e = 0; e < moved; e++)
-        spare[place[edges[e].a]++] = edges[e];
-    for (size_t begin = 0, end; begin < moved; begin = end) {
-        end = place[spare[begin].a];
-        size_t run = unite_run(spare + begin, end - begin, f->best);
-        memcpy(edges + kept, spare + begin, run * sizeof *edges);
-        kept += run;
-    }
-    return kept;
-}
-
-static void take_best(struct forest *f, const struct spl_orient_edge *edges, uint32_t root, size_t edge)
-{
-    if (f->best[root] == UINT32_MAX || llabs(edges[edge].votes) > llabs(edges[f->best[root]].votes))
-        f->best[root] = (uint32_t)edge;
-}
-
-/* Votes for two roots to show to the same side, by what is level in their trees. */
-static int64_t count_up(const struct forest *f, uint32_t a, uint32_t b)
-{
-    int64_t x = f->level[a], y = f->level[b], least = llabs(x) < llabs(y) ? llabs(x) : llabs(y);
-    int64_t votes = llrint(border * sqrt((double)least) * ORIENT_VOTE);
-    return (x < 0) == (y < 0) ? votes : -votes;
-}
-
-/* Joins the trees of an edge's ends. Where up says something else than the edge, and one of the two trees has joined
- * another in this round, there may be more edges between them: then it waits until these are counted together. */
-static void join_ends(struct forest *f, const struct spl_orient_edge *edge)
-{
-    uint8_t sa, sb;
-    uint32_t a = find_root(f, edge->a, &sa), b = find_root(f, edge->b, &sb);
-    int64_t up = sa == sb ? count_up(f, a, b) : -count_up(f, a, b);
-    bool opposed = edge->votes + up < 0;
-    if (opposed != (edge->votes < 0) && (f->place[a] || f->place[b]))
-        return;
-    join(f, edge->a, edge->b, opposed);
-    f->place[a] = f->place[b] = 1;
-}
-
-/* Joins all that touches, as the head of this file says. Each round joins at least the two whose edge is the first of
- * those with most votes, and mostly halves the number of trees. */
-static void vote(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
-{
-    while ((count = unite(f, edges, spare, count)) > 0) {
-        for (size_t e = 0; e < count; e++) {
-            f->best[edges[e].a] = f->best[edges[e].b] = UINT32_MAX;
-            f->place[edges[e].a] = f->place[edges[e].b] = 0;
-        }
-        for (size_t e = 0; e < count; e++) {
-            take_best(f, edges, edges[e].a, e);
-            take_best(f, edges, edges[e].b, e);
-        }
-        for (size_t e = 0; e < count; e++)
-            if (f->best[edges[e].a] == e || f->best[edges[e].b] == e)
-                join_ends(f, &edges[e]);
-    }
 }
 
 /* A block's points and their neighbours in it. */
@@ -354,31 +182,31 @@ static void find_level(const struct graph *g, int64_t *levels, bool cares, uint3
 }
 
 /* Joins what lies on surfaces; `surface` says of each point on which kind it does, 0 = on none. */
-static void join_surfaces(const struct graph *g, struct forest *f, const uint32_t *surface)
+static void join_surfaces(const struct graph *g, struct spl_forest *f, const uint32_t *surface)
 {
     for (uint32_t i = 0; i < g->count; i++) {
         uint8_t sign;
-        uint32_t root = surface[i] ? find_root(f, i, &sign) : i;
+        uint32_t root = surface[i] ? spl_forest_find_root(f, i, &sign) : i;
         for (unsigned a = 0; surface[i] && a < g->k; a++) {
             uint32_t j;
             float agreement = g->agreement[(size_t)i * g->k + a];
             if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] == surface[i] &&
-                f->parent[j] != root && find_root(f, j, &sign) != root) {
-                join(f, i, j, agreement < 0);
-                root = find_root(f, i, &sign);
+                f->parent[j] != root && spl_forest_find_root(f, j, &sign) != root) {
+                spl_forest_join(f, i, j, agreement < 0);
+                root = spl_forest_find_root(f, i, &sign);
             }
         }
     }
 }
 
 /* The edges between different trees, by their roots. */
-static size_t find_edges(const struct graph *g, struct forest *f, struct spl_orient_edge *edges)
+static size_t find_edges(const struct graph *g, struct spl_forest *f, struct spl_forest_edge *edges)
 {
     uint32_t *top = f->best; /* of each point: twice its root, and 1 where it has the other sign */
     size_t count = 0;
     for (uint32_t i = 0; i < g->count; i++) {
         uint8_t sign;
-        top[i] = 2 * find_root(f, i, &sign);
+        top[i] = 2 * spl_forest_find_root(f, i, &sign);
         top[i] += sign;
     }
     for (uint32_t i = 0; i < g->count; i++)
@@ -387,7 +215,7 @@ static size_t find_edges(const struct graph *g, struct forest *f, struct spl_ori
             if (!get_neighbour(g, i, a, &j) || top[i] / 2 == top[j] / 2)
                 continue;
             float agreement = g->agreement[(size_t)i * g->k + a];
-            count = spl_orient_add_edge(edges, count, top[i] / 2, top[j] / 2,
+            count = spl_forest_add_edge(edges, count, top[i] / 2, top[j] / 2,
                                         (top[i] ^ top[j]) & 1 ? -agreement : agreement);
         }
     return count;
@@ -398,7 +226,7 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 {
     uint32_t n = (uint32_t)(end - begin), components = 0, first_anchored = UINT32_MAX;
     const struct graph graph = {points, begin, n, neighbours, (float *)(orient->edges + (size_t)n * k), k};
-    struct forest forest = {
+    struct spl_forest forest = {
         orient->parent, orient->flip, orient->anchored, orient->level, orient->label, orient->place, n};
     for (uint32_t i = 0; i < n; i++) {
         if (orient->anchored[i] && first_anchored == UINT32_MAX)
@@ -412,10 +240,10 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
     for (uint32_t i = 0; i < n; i++)
         if (orient->parent[i] != i || llabs(orient->level[i]) < large)
             orient->level[i] = 0;
-    vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
+    spl_forest_vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
     for (uint32_t i = 0; i < n; i++) {
         uint8_t sign;
-        orient->label[i] = find_root(&forest, i, &sign);
+        orient->label[i] = spl_forest_find_root(&forest, i, &sign);
         for (int c = 0; sign && c < 3; c++)
             points->normal[begin + i][c] = -points->normal[begin + i][c];
     }
@@ -430,17 +258,17 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
     return components;
 }
 
-int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
+int spl_orient_components(struct spl_component *components, size_t count, struct spl_forest_edge *edges,
                           size_t edge_count, struct spl_spill *spill, struct spl_error *err)
 {
-    struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err),
-                            spl_alloc(count, 1, err),
-                            spl_alloc_raw(count, 1, err),
-                            spl_alloc_raw(count, sizeof *forest.level, err),
-                            spl_alloc(count, sizeof *forest.best, err),
-                            spl_alloc_raw(count, sizeof *forest.place, err),
-                            (uint32_t)count};
-    struct spl_orient_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
+    struct spl_forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err),
+                                spl_alloc(count, 1, err),
+                                spl_alloc_raw(count, 1, err),
+                                spl_alloc_raw(count, sizeof *forest.level, err),
+                                spl_alloc(count, sizeof *forest.best, err),
+                                spl_alloc_raw(count, sizeof *forest.place, err),
+                                (uint32_t)count};
+    struct spl_forest_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
     double *outward = spl_alloc(count, sizeof *outward, err);
     bool enough = forest.parent && forest.flip && forest.anchored && forest.level && forest.best && forest.place &&
                   spare && outward;
@@ -450,15 +278,15 @@ int spl_orient_components(struct spl_component *components, size_t count, struct
         forest.level[i] = components[i].anchored ? 0 : components[i].level;
     }
     if (enough)
-        vote(&forest, edges, spare, edge_count);
+        spl_forest_vote(&forest, edges, spare, edge_count);
     for (size_t i = 0; enough && i < count; i++) {
         uint8_t sign;
-        uint32_t root = find_root(&forest, (uint32_t)i, &sign);
+        uint32_t root = spl_forest_find_root(&forest, (uint32_t)i, &sign);
         outward[root] += sign ? -components[i].outward : components[i].outward;
     }
     for (size_t i = 0; enough && i < count; i++) {
         uint8_t sign;
-        uint32_t root = find_root(&forest, (uint32_t)i, &sign);
+        uint32_t root = spl_forest_find_root(&forest, (uint32_t)i, &sign);
         components[i].flip = sign ^ (!forest.anchored[root] && outward[root] < 0);
     }
     free(forest.parent);

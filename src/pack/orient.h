@@ -2,6 +2,7 @@
 #ifndef SPL_PACK_ORIENT_H
 #define SPL_PACK_ORIENT_H
 
+#include "pack/forest.h"
 #include "pack/points.h"
 
 /* A set of points whose normals have settled signs relative to each other: all within one block. */
@@ -12,16 +13,6 @@ struct spl_component {
     uint8_t flip;   /* result of spl_orient_components(): 1 = turn the set's normals */
 };
 
-/* What neighbours say of the signs of two points, or of two components. */
-struct spl_orient_edge {
-    uint32_t a, b; /* a < b */
-    int64_t votes; /* 2^20 * the sum of their agreements: > 0, the two agree as they are */
-};
-
-/* Adds an edge behind `count` others, or its votes to the last one, which mostly has the same ends; returns how many
- * there are now. */
-size_t spl_orient_add_edge(struct spl_orient_edge *edges, size_t count, uint32_t a, uint32_t b, float agreement);
-
 /* Scratch of one worker for a block of up to `capacity` points with `k` neighbours each. */
 struct spl_orient {
     uint32_t *parent;              /* forest over the block's points */
@@ -30,7 +21,7 @@ struct spl_orient {
     uint8_t *anchored;             /* in: 1 where the normal's side is known */
     uint32_t *place;               /* where the edges of each root lie */
     int64_t *level;                /* out: of each component, as in struct spl_component */
-    struct spl_orient_edge *edges; /* 2 * capacity * k of them */
+    struct spl_forest_edge *edges; /* 2 * capacity * k of them */
 };
 
 int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, struct spl_error *err);
@@ -44,7 +35,7 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 /* Decides component.flip over all blocks, from the edges between their components, which it moves and unites in place:
  * anchored components stay, the others show outwards on the whole. `spill` may be NULL: where as many edges more
  * lie. */
-int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
+int spl_orient_components(struct spl_component *components, size_t count, struct spl_forest_edge *edges,
                           size_t edge_count, struct spl_spill *spill, struct spl_error *err);
 
 /* How well normals i and j agree in sign, bending like an arc from one to the other, in [-1, 1]; near 0 where one point

@@ -169,7 +169,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
 
 /* Edges between the components of blocks: as many as there are, which is far fewer than there can be. */
 struct edges {
-    struct spl_orient_edge *list;
+    struct spl_forest_edge *list;
     size_t count, capacity;
 };
 
@@ -180,7 +180,7 @@ static int add_edges(struct surface *s, size_t b, size_t unsettled, struct edges
     const uint32_t *list = block->unsettled.neighbours + unsettled * s->k;
     if (edges->count + s->k > edges->capacity) {
         size_t capacity = edges->capacity + edges->capacity / 2 + 4096;
-        struct spl_orient_edge *more = spl_spill_realloc(s->points->spill, edges->list, capacity, sizeof *more, err);
+        struct spl_forest_edge *more = spl_spill_realloc(s->points->spill, edges->list, capacity, sizeof *more, err);
         if (!more)
             return SPL_E_NOMEM;
         edges->list = more;
@@ -188,7 +188,7 @@ static int add_edges(struct surface *s, size_t b, size_t unsettled, struct edges
     }
     for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
         if (list[a] / block_points != b)
-            edges->count = spl_orient_add_edge(edges->list, edges->count, block->first_component + s->label[i],
+            edges->count = spl_forest_add_edge(edges->list, edges->count, block->first_component + s->label[i],
                                                s->blocks[list[a] / block_points].first_component + s->label[list[a]],
                                                spl_orient_agreement(s->points, i, list[a]));
     return SPL_OK;

@@ -163,7 +163,7 @@ static bool turns_second(int64_t votes, bool anchored)
 {
     struct spl_component pieces[2] = {{.outward = 10000, .level = 10000, .anchored = anchored},
                                       {.outward = -9999, .level = -9999}};
-    struct spl_orient_edge edge = {0, 1, votes * (1 << 20)};
+    struct spl_forest_edge edge = {0, 1, votes * (1 << 20)};
     assert_int_equal(spl_orient_components(pieces, 2, &edge, 1, NULL, NULL), 0);
     assert_false(pieces[0].flip);
     return pieces[1].flip;
@@ -186,10 +186,10 @@ static void test_a_ceiling_hears_all_its_walls(void **state)
     (void)state;
     enum { ground, ceiling, walls, pieces = walls + 4 };
     struct spl_component room[pieces] = {{.outward = 10001, .level = 10001}, {.outward = 10000, .level = 10000}};
-    struct spl_orient_edge edges[8];
+    struct spl_forest_edge edges[8];
     for (uint32_t w = 0; w < 4; w++) {
-        edges[w] = (struct spl_orient_edge){ground, walls + w, (200 - (int64_t)w) * (1 << 20)};
-        edges[4 + w] = (struct spl_orient_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
+        edges[w] = (struct spl_forest_edge){ground, walls + w, (200 - (int64_t)w) * (1 << 20)};
+        edges[4 + w] = (struct spl_forest_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
     }
     assert_int_equal(spl_orient_components(room, pieces, edges, 8, NULL, NULL), 0);
     assert_int_not_equal(room[ceiling].flip, room[ground].flip);
