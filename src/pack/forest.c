@@ -1,4 +1,13 @@
-/* Trees that join where votes are strongest, as the head of orient.c says why. Pure; whoever has the forest owns it. */
+/* Trees join where votes are strongest. Pure; whoever has the forest owns it.
+ *
+ * Each tree joins the one that it has most votes with, all edges between the two together; then votes are counted
+ * again, until no two trees touch. So two halves of a road are not joined by way of the bush that stands on both. Votes
+ * are integers: what comes of them depends on nothing but the points.
+ *
+ * Where nobody says what is seen, what is level mostly is ground or a roof, and shows upwards. A wall with ground on
+ * both of its sides tells one of them to show downwards, and so does a bush half of the time. So where two trees join
+ * that hold large level pieces, "both up" has votes of its own: a fraction of what the whole border of these would
+ * have. A ceiling hangs on its walls by all of its border, and they still tell it to show down. */
 #include "pack/forest.h"
 
 #include <math.h>
@@ -22,16 +31,17 @@ void spl_forest_join(struct spl_forest *f, uint32_t a, uint32_t b, bool opposed)
 {
     uint8_t sa, sb;
     uint32_t ra = spl_forest_find_root(f, a, &sa), rb = spl_forest_find_root(f, b, &sb);
-    if (ra == rb || (f->anchored[ra] && f->anchored[rb]))
+    if (ra == rb || (f->held[ra] & f->held[rb] & SPL_TREE_ANCHORED))
         return;
-    if (ra < rb ? f->anchored[rb] : !f->anchored[ra]) {
+    if (ra < rb ? f->held[rb] & SPL_TREE_ANCHORED : !(f->held[ra] & SPL_TREE_ANCHORED)) {
         uint32_t r = ra;
         ra = rb;
         rb = r;
     }
     f->parent[rb] = ra;
     f->flip[rb] = sa ^ sb ^ opposed;
-    if (!f->anchored[ra])
+    f->held[ra] |= f->held[rb];
+    if (!(f->held[ra] & SPL_TREE_ANCHORED))
         f->level[ra] += f->flip[rb] ? -f->level[rb] : f->level[rb];
 }
 
@@ -79,7 +89,7 @@ static size_t unite(struct spl_forest *f, struct spl_forest_edge *edges, struct 
     for (size_t i = 0; i < count; i++) {
         uint8_t sa, sb;
         uint32_t a = spl_forest_find_root(f, edges[i].a, &sa), b = spl_forest_find_root(f, edges[i].b, &sb);
-        if (a == b || (f->anchored[a] && f->anchored[b]))
+        if (a == b || (f->held[a] & f->held[b] & (SPL_TREE_ANCHORED | SPL_TREE_WAITS)))
             continue;
         edges[moved] =
             (struct spl_forest_edge){a < b ? a : b, a < b ? b : a, sa == sb ? edges[i].votes : -edges[i].votes};
@@ -103,6 +113,8 @@ static size_t unite(struct spl_forest *f, struct spl_forest_edge *edges, struct 
 
 static void take_best(struct spl_forest *f, const struct spl_forest_edge *edges, uint32_t root, size_t edge)
 {
+    if (f->held[root] & SPL_TREE_WAITS)
+        return;
     if (f->best[root] == UINT32_MAX || llabs(edges[edge].votes) > llabs(edges[f->best[root]].votes))
         f->best[root] = (uint32_t)edge;
 }

@@ -13,15 +13,21 @@ struct spl_forest_edge {
     int64_t votes; /* 2^20 * the sum of their agreements: > 0, the two agree as they are */
 };
 
+/* What a tree is held by. */
+enum {
+    SPL_TREE_ANCHORED = 1, /* its signs are known: it is never turned */
+    SPL_TREE_WAITS = 2,    /* it touches what is not in the forest: others join it, it joins none itself */
+};
+
 /* `count` of each, numbered from 0; all arrays are the caller's. */
 struct spl_forest {
     uint32_t *parent;
-    uint8_t *flip;     /* sign relative to the parent */
-    uint8_t *anchored; /* of roots: the tree is never turned */
-    int64_t *level;    /* of roots: points of large level pieces that show upwards, less those that show downwards */
-    uint32_t *best;    /* scratch: the edge of each root that has most votes */
-    uint32_t *place;   /* scratch: where the edges of each root lie, then whether it has joined another in this round */
-    uint32_t count;    /* of all of these */
+    uint8_t *flip;   /* sign relative to the parent */
+    uint8_t *held;   /* of roots: SPL_TREE_* */
+    int64_t *level;  /* of roots: points of large level pieces that show upwards, less those that show downwards */
+    uint32_t *best;  /* scratch: the edge of each root that has most votes */
+    uint32_t *place; /* scratch: where the edges of each root lie, then whether it has joined another in this round */
+    uint32_t count;  /* of all of these */
 };
 
 /* Adds an edge behind `count` others, or its votes to the last one, which mostly has the same ends; `agreement` of a
@@ -49,8 +55,8 @@ static inline uint32_t spl_forest_find_root(struct spl_forest *f, uint32_t i, ui
  * trees. Anchored trees keep their sign, so two of them never join. */
 void spl_forest_join(struct spl_forest *f, uint32_t a, uint32_t b, bool opposed);
 
-/* Joins all that touches by votes, as the head of orient.c says. Edges are moved and united in place; `spare` has room
- * for as many. */
+/* Joins by votes all that touches, but no two that wait, as the head of forest.c says. Edges are moved and united in
+ * place; `spare` has room for as many. */
 void spl_forest_vote(struct spl_forest *f, struct spl_forest_edge *edges, struct spl_forest_edge *spare, size_t count);
 
 #endif

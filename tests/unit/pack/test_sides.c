@@ -10,7 +10,7 @@
 #include "base/memory.h"
 #include "clouds.h"
 #include "pack/order.h"
-#include "pack/orient.h"
+#include "pack/orient_join.h"
 
 enum { points_most = 60000 };
 static const double step = 0.05, noise = 0.003;
@@ -158,13 +158,27 @@ static void test_ceilings_agree_with_their_room(void **state)
     spl_points_finish(&p);
 }
 
+/* Decides over `count` components of a block each, between which are so many edges of which each end agrees wholly, or
+ * not at all where there are less than none. */
+static void decide(struct spl_component *components, size_t count, const int edges[][3], size_t edge_count)
+{
+    struct spl_orient_join join;
+    assert_int_equal(spl_orient_join_init(&join, components, count, NULL, NULL), 0);
+    for (size_t e = 0; e < edge_count; e++)
+        for (int i = 0; i < abs(edges[e][2]); i++)
+            assert_int_equal(spl_orient_join_add(&join, (uint32_t)edges[e][0], (uint32_t)edges[e][1],
+                                                 edges[e][2] < 0 ? -1 : 1, false, NULL),
+                             0);
+    assert_int_equal(spl_orient_join_decide(&join, NULL), 0);
+    spl_orient_join_finish(&join);
+}
+
 /* Of two pieces of ground as large as each other, the second of which shows downwards. */
-static bool turns_second(int64_t votes, bool anchored)
+static bool turns_second(int votes, bool anchored)
 {
     struct spl_component pieces[2] = {{.outward = 10000, .level = 10000, .anchored = anchored},
                                       {.outward = -9999, .level = -9999}};
-    struct spl_forest_edge edge = {0, 1, votes * (1 << 20)};
-    assert_int_equal(spl_orient_components(pieces, 2, &edge, 1, NULL, NULL), 0);
+    decide(pieces, 2, (const int[1][3]){{0, 1, votes}}, 1);
     assert_false(pieces[0].flip);
     return pieces[1].flip;
 }
@@ -180,18 +194,49 @@ static void test_strong_votes_outdo_up(void **state)
     assert_false(turns_second(400, false));
 }
 
+/* Two halves of a roof in two blocks, each too small for a say, and a gutter that tells both to show down. */
+static bool turns_roof(int seam, int odd)
+{
+    enum { ground, halves, gutter = halves + 2, pieces };
+    struct spl_component street[pieces] = {
+        {.outward = 10000, .level = 10000}, {.outward = 600, .own = 600}, {.outward = 600, .own = 600}, {.outward = 1}};
+    struct spl_orient_join join;
+    assert_int_equal(spl_orient_join_init(&join, street, pieces, NULL, NULL), 0);
+    for (int i = 0; i < seam; i++) /* the first ones disagree: noise */
+        assert_int_equal(spl_orient_join_add(&join, halves, halves + 1, i < odd ? -1 : 1, true, NULL), 0);
+    for (int i = 0; i < 15; i++)
+        for (uint32_t half = halves; half < gutter; half++)
+            assert_int_equal(spl_orient_join_add(&join, half, gutter, 1, false, NULL), 0);
+    for (int i = 0; i < 25; i++)
+        assert_int_equal(spl_orient_join_add(&join, ground, gutter, -1, false, NULL), 0);
+    assert_int_equal(spl_orient_join_decide(&join, NULL), 0);
+    spl_orient_join_finish(&join);
+    assert_false(street[ground].flip);
+    assert_int_equal(street[halves].flip, street[halves + 1].flip);
+    return street[halves].flip;
+}
+
+/* A roof has its say for up by all of its points, wherever blocks end. */
+static void test_blocks_cut_no_roof(void **state)
+{
+    (void)state;
+    assert_true(turns_roof(0, 0));
+    assert_false(turns_roof(12, 0));
+    assert_false(turns_roof(12, 3));
+}
+
 /* No wall alone outdoes up, all four do: a ceiling waits for those that hang together with its floor. */
 static void test_a_ceiling_hears_all_its_walls(void **state)
 {
     (void)state;
     enum { ground, ceiling, walls, pieces = walls + 4 };
     struct spl_component room[pieces] = {{.outward = 10001, .level = 10001}, {.outward = 10000, .level = 10000}};
-    struct spl_forest_edge edges[8];
-    for (uint32_t w = 0; w < 4; w++) {
-        edges[w] = (struct spl_forest_edge){ground, walls + w, (200 - (int64_t)w) * (1 << 20)};
-        edges[4 + w] = (struct spl_forest_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
+    int edges[8][3];
+    for (int w = 0; w < 4; w++) {
+        memcpy(edges[w], (int[3]){ground, walls + w, 200 - w}, sizeof edges[w]);
+        memcpy(edges[4 + w], (int[3]){ceiling, walls + w, w - 90}, sizeof edges[w]);
     }
-    assert_int_equal(spl_orient_components(room, pieces, edges, 8, NULL, NULL), 0);
+    decide(room, pieces, (const int(*)[3])edges, 8);
     assert_int_not_equal(room[ceiling].flip, room[ground].flip);
     for (int w = walls; w < pieces; w++)
         assert_int_equal(room[w].flip, room[ground].flip);
@@ -202,7 +247,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_wall_turns_no_yard),           cmocka_unit_test(test_bushes_turn_no_road),
         cmocka_unit_test(test_ceilings_agree_with_their_room), cmocka_unit_test(test_strong_votes_outdo_up),
-        cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
+        cmocka_unit_test(test_a_ceiling_hears_all_its_walls),  cmocka_unit_test(test_blocks_cut_no_roof),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
