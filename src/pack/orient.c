@@ -23,9 +23,9 @@
 
 #define SPL_INLINE static inline __attribute__((always_inline))
 
-static const float certain = 0.8f;    /* agreement of an edge */
-static const double points_most = 64; /* that a point stands for, however far it is from others */
-static const double level = 0.8;      /* how far a normal shows up or down; a roof's, too */
+static const float certain = 0.8f;  /* agreement of an edge */
+static const double area_most = 64; /* of a point, over that of usual ones, however far it is from others */
+static const double level = 0.8;    /* how far a normal shows up or down; a roof's, too */
 
 int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, struct spl_error *err)
 {
@@ -35,11 +35,12 @@ int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, stru
     orient->held = spl_alloc_raw(capacity, sizeof *orient->held, err);
     orient->kind = spl_alloc_raw(capacity, sizeof *orient->kind, err);
     orient->own = spl_alloc_raw(capacity, sizeof *orient->own, err);
+    orient->reach = spl_alloc_raw(capacity, sizeof *orient->reach, err);
     orient->place = spl_alloc_raw(capacity, sizeof *orient->place, err);
     orient->level = spl_alloc_raw(capacity, sizeof *orient->level, err);
     orient->edges = spl_alloc_raw(2 * capacity * k, sizeof *orient->edges, err);
     bool enough = orient->parent && orient->flip && orient->label && orient->held && orient->kind && orient->own &&
-                  orient->place && orient->level && orient->edges;
+                  orient->reach && orient->place && orient->level && orient->edges;
     return enough ? 0 : SPL_E_NOMEM;
 }
 
@@ -51,6 +52,7 @@ void spl_orient_finish(struct spl_orient *orient)
     free(orient->held);
     free(orient->kind);
     free(orient->own);
+    free(orient->reach);
     free(orient->place);
     free(orient->level);
     free(orient->edges);
@@ -97,6 +99,7 @@ struct graph {
     size_t begin;
     uint32_t count;
     const uint32_t *neighbours;
+    float *reach;     /* how far the farthest of them is, squared */
     float *agreement; /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
     unsigned k;
 };
@@ -118,6 +121,7 @@ SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
         uint32_t index[SPL_NEIGHBOURS_MAX]; /* of those in other blocks, which may change meanwhile, the point's own */
         int32_t counts[SPL_NEIGHBOURS_MAX];
         unsigned edges = 0, agreed = 0;
+        spl_floats farthest = {0};
         double at[3], apart[3][SPL_NEIGHBOURS_MAX];
         for (unsigned a = 0; a < rounded; a++) {
             uint32_t j = i;
@@ -141,12 +145,19 @@ SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
             memcpy(beside.normal, normal, sizeof beside.normal);
             memcpy(&beside.counts, counts + first, sizeof beside.counts);
             agree(g->points->normal[g->begin + i], &beside, &agreements);
+            spl_floats squared = beside.apart[0] * beside.apart[0] + beside.apart[1] * beside.apart[1] +
+                                 beside.apart[2] * beside.apart[2];
+            spl_marks farther = squared > farthest;
+            farthest = (spl_floats)(((spl_marks)squared & farther) | ((spl_marks)farthest & ~farther));
             spl_marks certainly = (agreements >= certain) | (agreements <= -certain);
             for (unsigned a = 0; a < eight && first + a < g->k; a++) {
                 agreement[first + a] = agreements[a];
                 agreed -= (unsigned)certainly[a];
             }
         }
+        g->reach[i] = 0;
+        for (unsigned a = 0; a < eight; a++)
+            g->reach[i] = fmaxf(g->reach[i], farthest[a]);
         kind[i] = 2 * agreed > edges ? SPL_PIECE_SURFACE : SPL_PIECE_OTHER;
     }
 }
@@ -170,14 +181,19 @@ static void find_agreements(const struct graph *g, uint8_t *kind)
     agree_all(g, kind);
 }
 
+/* The area that a point stands for, over that of a usual one: what its neighbours lie in. */
+static double get_area(const struct graph *g, float usual, uint32_t i)
+{
+    return fmin(g->reach[i] / (double)usual, area_most);
+}
+
 /* Fills in which way each point is level, if anybody cares, and how many usual points it stands for; has `kind` tell
  * those that are from others. */
 static void find_level(const struct graph *g, float usual, int64_t *levels, bool cares, uint8_t *kind)
 {
     for (uint32_t i = 0; i < g->count; i++) {
         double outward = cares ? spl_eyes_get_outward(g->points, g->begin + i) : 0;
-        double size = g->points->radius[g->begin + i] / usual, points = fmin(fmax(size * size, 1), points_most);
-        levels[i] = ((outward > level) - (outward < -level)) * llrint(points);
+        levels[i] = ((outward > level) - (outward < -level)) * llrint(fmax(get_area(g, usual, i), 1));
         if (kind[i] && levels[i])
             kind[i] = SPL_PIECE_LEVEL;
     }
@@ -270,7 +286,7 @@ static uint32_t list_components(struct spl_orient *orient, const struct graph *g
         }
     for (uint32_t i = 0; i < g->count; i++) {
         struct spl_component *c = &orient->components[orient->label[i] = orient->parent[orient->label[i]]];
-        c->outward += spl_eyes_get_outward(g->points, g->begin + i);
+        c->outward += get_area(g, orient->usual, i) * spl_eyes_get_outward(g->points, g->begin + i);
         c->own += orient->own[i];
     }
     for (uint32_t c = 0; c < count; c++)
@@ -283,7 +299,8 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
                           const uint32_t *neighbours, unsigned k)
 {
     uint32_t n = (uint32_t)(end - begin), first_anchored = UINT32_MAX;
-    const struct graph graph = {points, begin, n, neighbours, (float *)(orient->edges + (size_t)n * k), k};
+    const struct graph graph = {points, begin, n, neighbours, orient->reach, (float *)(orient->edges + (size_t)n * k),
+                                k};
     struct spl_forest forest = {
         orient->parent, orient->flip, orient->held, orient->level, orient->label, orient->place, n};
     for (uint32_t i = 0; i < n; i++) {

@@ -14,7 +14,7 @@ enum spl_piece_kind { SPL_PIECE_OTHER, SPL_PIECE_SURFACE, SPL_PIECE_LEVEL };
 /* A set of points whose normals have settled signs relative to each other: all within one block. At most one piece in
  * it goes on in other blocks, unless it is anchored. */
 struct spl_component {
-    double outward; /* sum over its normals of spl_eyes_get_outward() */
+    double outward; /* sum over its points of their area, in usual ones', times spl_eyes_get_outward() */
     int64_t
         level;   /* usual points of its large level pieces that show up, less those that show down; 0: it has no say */
     int32_t own; /* the same of the piece that goes on, which is not among them, however small it is here */
@@ -24,7 +24,8 @@ struct spl_component {
 
 /* Scratch of one worker for a block of up to `capacity` points with `k` neighbours each. */
 struct spl_orient {
-    float usual;      /* in: radius of most points */
+    float usual;      /* in: squared distance of most points' farthest neighbours */
+    float *reach;     /* that of each point, of those in the block */
     uint32_t *parent; /* forest over the block's points */
     uint8_t *flip;    /* sign relative to the parent */
     uint8_t *held;    /* in: SPL_TREE_ANCHORED where the normal's side is known, 0 elsewhere */

@@ -27,7 +27,6 @@
 enum { block_points = 1 << 16 };
 _Static_assert((int)block_points <= UINT16_MAX + 1, "components of a block are told apart by 16 bits");
 static const float lone_radius = 0.01f;             /* of a point without any other, metres */
-static const double radius_spacing = 1.128;         /* radius of a disc amid a surface, over its points' spacing */
 static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
 static const float flat_limit = 4, round_limit = 2; /* times what is usual in the run of points around */
 enum { wide_factor = 3 };
@@ -244,19 +243,19 @@ static void settle_rest(void *context, size_t begin, size_t end, unsigned worker
         spl_settle_find(s->points, s->k, &s->blocks[b].unsettled);
 }
 
-/* The radius that most points have, from a sample of them. */
-static float find_usual_radius(const struct spl_points *p, const struct spl_neighbours *neighbours, unsigned k)
+/* How far the farthest neighbours of most points are, squared, from a sample of them. */
+static float find_usual_reach(const struct spl_points *p, const struct spl_neighbours *neighbours, unsigned k)
 {
     enum { sample_most = 1024 };
-    float radii[sample_most];
+    float reach[sample_most];
     size_t n = p->count < sample_most ? p->count : sample_most;
     struct spl_nearest near;
     spl_nearest_init(&near);
     for (size_t i = 0; i < n; i++) {
         spl_neighbours_find(neighbours, i * p->count / n, k, &near);
-        radii[i] = (float)(near.farthest * sqrt(M_PI / near.count) * radius_spacing);
+        reach[i] = (float)(near.farthest * near.farthest);
     }
-    return fmaxf(spl_median(radii, n), smallest_radius);
+    return fmaxf(spl_median(reach, n), smallest_radius * smallest_radius);
 }
 
 static bool all_sides_known(const struct spl_points *p)
@@ -303,7 +302,7 @@ static int allocate(struct surface *s, struct spl_error *err)
     if (!s->neighbours)
         return SPL_E_NOMEM;
     if (s->label && p->count > 1) {
-        float usual = find_usual_radius(p, s->neighbours, s->k);
+        float usual = find_usual_reach(p, s->neighbours, s->k);
         for (unsigned t = 0; t < s->stage->threads; t++)
             s->scratch[t].orient.usual = usual;
     }

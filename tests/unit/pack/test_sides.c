@@ -12,7 +12,7 @@
 #include "pack/order.h"
 #include "pack/orient_join.h"
 
-enum { points_most = 60000 };
+enum { points_most = 120000 };
 static const double step = 0.05, noise = 0.003;
 
 /* A cloud in the making, upright; `up` says which axis becomes its z. */
@@ -21,11 +21,13 @@ struct scene {
     size_t count;
     uint64_t random;
     int up;
+    double solid[2][2][3]; /* nothing is seen of others where these stand */
+    int solids;
 };
 
 static struct scene begin(int up)
 {
-    struct scene s = {spl_alloc(points_most, sizeof(double[3]), NULL), 0, 7, up};
+    struct scene s = {.position = spl_alloc(points_most, sizeof(double[3]), NULL), .random = 7, .up = up};
     assert_non_null(s.position);
     return s;
 }
@@ -34,6 +36,13 @@ static void add(struct scene *s, double x, double y, double z)
 {
     const double at[3] = {x, y, z};
     assert_true(s->count < points_most);
+    for (int i = 0; i < s->solids; i++) {
+        bool inside = true;
+        for (int c = 0; c < 3; c++)
+            inside &= at[c] > s->solid[i][0][c] - 1e-9 && at[c] < s->solid[i][1][c] + 1e-9;
+        if (inside)
+            return;
+    }
     for (int c = 0; c < 3; c++)
         s->position[s->count][(c + s->up + 1) % 3] = at[c] + noise * (2 * uniform(&s->random) - 1);
     s->count++;
@@ -158,6 +167,88 @@ static void test_ceilings_agree_with_their_room(void **state)
     spl_points_finish(&p);
 }
 
+/* The six faces of a box, but for those whose bit is not in `faces`: 2 * axis, + 1 for the far one. */
+static void add_box(struct scene *s, const double min[3], const double max[3], unsigned faces)
+{
+    for (int face = 0; face < 6; face++) {
+        double low[3], high[3];
+        memcpy(low, min, sizeof low);
+        memcpy(high, max, sizeof high);
+        low[face / 2] = high[face / 2] = face % 2 ? max[face / 2] : min[face / 2];
+        if (faces >> face & 1)
+            add_sheet(s, low, high);
+    }
+}
+
+enum { all_faces = 63, bottom = 1 << 4, top = 1 << 5 };
+
+/* A box that stands in what is added later. */
+static void add_solid(struct scene *s, const double min[3], const double max[3], unsigned faces)
+{
+    int solids = s->solids;
+    s->solids = 0;
+    add_box(s, min, max, faces);
+    s->solids = solids;
+    memcpy(s->solid[solids][0], min, sizeof s->solid[solids][0]);
+    memcpy(s->solid[s->solids++][1], max, sizeof s->solid[solids][1]);
+}
+
+/* A deck on two piers, seen from all sides: its underside shows down, whatever the ground below says, and where blocks
+ * end. */
+static void test_a_bridge_shows_down_below(void **state)
+{
+    (void)state;
+    for (int up = 1; up < 3; up++) {
+        struct scene s = begin(up);
+        size_t wrong = 0, level = 0, below = 0;
+        for (int pier = 0; pier < 2; pier++)
+            add_solid(&s, (double[3]){pier ? 9 : 2, 0.5, 0}, (double[3]){pier ? 10 : 3, 3.5, 3},
+                      all_faces - bottom - top);
+        add_sheet(&s, (double[3]){-1, -1, 0}, (double[3]){13, 5, 0});
+        add_box(&s, (double[3]){0, 0, 3}, (double[3]){12, 4, 3.4}, all_faces);
+        struct spl_points p = finish(&s, up);
+        for (size_t i = 0; i < p.count; i++) {
+            double z = p.axis[up][i];
+            float n = p.normal[i][up];
+            bool under = z > 2.95 && z < 3.05;
+            if (fabsf(n) < 0.9f)
+                continue;
+            level++;
+            below += under;
+            wrong += under ? n > 0 : n < 0;
+        }
+        assert_true(below > 10000);
+        if (wrong > level / 100)
+            fail_msg("%zu of the bridge's %zu level points show to the wrong side", wrong, level);
+        spl_points_finish(&p);
+    }
+}
+
+/* The six faces of a room, its ceiling scanned `dense` times as densely, and a cupboard at a wall whose upper half
+ * hangs over its lower one: more of what shows up is seen than of the ceiling. */
+static void test_rooms_show_in(void **state)
+{
+    (void)state;
+    for (int dense = 1; dense < 3; dense++) {
+        struct scene s = begin(2);
+        size_t inwards = 0, level = 0;
+        add_solid(&s, (double[3]){0, 1, 0}, (double[3]){0.6, 3, 1}, all_faces - bottom - top - 1);
+        add_solid(&s, (double[3]){0, 1, 1}, (double[3]){1.6, 3, 2}, all_faces - bottom - 1);
+        add_box(&s, (double[3]){0}, (double[3]){5, 4, 2.5}, all_faces);
+        for (int more = 1; more < dense * dense; more++)
+            add_sheet(&s, (double[3]){0, 0, 2.5}, (double[3]){5, 4, 2.5});
+        struct spl_points p = finish(&s, 2);
+        for (size_t i = 0; i < p.count; i++) {
+            bool is_ceiling = p.axis[2][i] > 2.4 && fabsf(p.normal[i][2]) > 0.9f;
+            level += fabsf(p.normal[i][2]) > 0.9f;
+            inwards += fabsf(p.normal[i][2]) > 0.9f && is_ceiling == (p.normal[i][2] < 0);
+        }
+        if (inwards < level - level / 100)
+            fail_msg("%zu of the room's %zu level points show in", inwards, level);
+        spl_points_finish(&p);
+    }
+}
+
 /* Decides over `count` components of a block each, between which are so many edges of which each end agrees wholly, or
  * not at all where there are less than none. */
 static void decide(struct spl_component *components, size_t count, const int edges[][3], size_t edge_count)
@@ -245,9 +336,14 @@ static void test_a_ceiling_hears_all_its_walls(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_wall_turns_no_yard),           cmocka_unit_test(test_bushes_turn_no_road),
-        cmocka_unit_test(test_ceilings_agree_with_their_room), cmocka_unit_test(test_strong_votes_outdo_up),
-        cmocka_unit_test(test_a_ceiling_hears_all_its_walls),  cmocka_unit_test(test_blocks_cut_no_roof),
+        cmocka_unit_test(test_a_wall_turns_no_yard),
+        cmocka_unit_test(test_bushes_turn_no_road),
+        cmocka_unit_test(test_ceilings_agree_with_their_room),
+        cmocka_unit_test(test_strong_votes_outdo_up),
+        cmocka_unit_test(test_a_bridge_shows_down_below),
+        cmocka_unit_test(test_rooms_show_in),
+        cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
+        cmocka_unit_test(test_blocks_cut_no_roof),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
