@@ -99,8 +99,8 @@ struct graph {
     size_t begin;
     uint32_t count;
     const uint32_t *neighbours;
-    float *reach;     /* how far the farthest of them is, squared */
-    float *agreement; /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
+    const float *reach; /* how far the farthest of them is, squared */
+    float *agreement;   /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
     unsigned k;
 };
 
@@ -121,7 +121,6 @@ SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
         uint32_t index[SPL_NEIGHBOURS_MAX]; /* of those in other blocks, which may change meanwhile, the point's own */
         int32_t counts[SPL_NEIGHBOURS_MAX];
         unsigned edges = 0, agreed = 0;
-        spl_floats farthest = {0};
         double at[3], apart[3][SPL_NEIGHBOURS_MAX];
         for (unsigned a = 0; a < rounded; a++) {
             uint32_t j = i;
@@ -145,19 +144,12 @@ SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
             memcpy(beside.normal, normal, sizeof beside.normal);
             memcpy(&beside.counts, counts + first, sizeof beside.counts);
             agree(g->points->normal[g->begin + i], &beside, &agreements);
-            spl_floats squared = beside.apart[0] * beside.apart[0] + beside.apart[1] * beside.apart[1] +
-                                 beside.apart[2] * beside.apart[2];
-            spl_marks farther = squared > farthest;
-            farthest = (spl_floats)(((spl_marks)squared & farther) | ((spl_marks)farthest & ~farther));
             spl_marks certainly = (agreements >= certain) | (agreements <= -certain);
             for (unsigned a = 0; a < eight && first + a < g->k; a++) {
                 agreement[first + a] = agreements[a];
                 agreed -= (unsigned)certainly[a];
             }
         }
-        g->reach[i] = 0;
-        for (unsigned a = 0; a < eight; a++)
-            g->reach[i] = fmaxf(g->reach[i], farthest[a]);
         kind[i] = 2 * agreed > edges ? SPL_PIECE_SURFACE : SPL_PIECE_OTHER;
     }
 }

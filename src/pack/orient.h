@@ -25,7 +25,7 @@ struct spl_component {
 /* Scratch of one worker for a block of up to `capacity` points with `k` neighbours each. */
 struct spl_orient {
     float usual;      /* in: squared distance of most points' farthest neighbours */
-    float *reach;     /* that of each point, of those in the block */
+    float *reach;     /* in: that of each point */
     uint32_t *parent; /* forest over the block's points */
     uint8_t *flip;    /* sign relative to the parent */
     uint8_t *held;    /* in: SPL_TREE_ANCHORED where the normal's side is known, 0 elsewhere */

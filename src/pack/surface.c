@@ -132,6 +132,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
             w->moments[i - begin] = spl_moments_of(s->points, i, &near);
             w->limit[i - begin] = (float)near.farthest;
+            w->orient.reach[i - begin] = (float)(near.farthest * near.farthest);
             if ((i & 255) == 255)
                 spl_spill_keep_bound(s->points->spill);
             if ((i & 4095) == 4095)
