@@ -278,7 +278,9 @@ static uint32_t list_components(struct spl_orient *orient, const struct graph *g
         }
     for (uint32_t i = 0; i < g->count; i++) {
         struct spl_component *c = &orient->components[orient->label[i] = orient->parent[orient->label[i]]];
-        c->outward += get_area(g, orient->usual, i) * spl_eyes_get_outward(g->points, g->begin + i);
+        double area = get_area(g, orient->usual, i);
+        c->outward += area * spl_eyes_get_outward(g->points, g->begin + i);
+        c->area += area;
         c->own += orient->own[i];
     }
     for (uint32_t c = 0; c < count; c++)

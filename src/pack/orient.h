@@ -15,11 +15,13 @@ enum spl_piece_kind { SPL_PIECE_OTHER, SPL_PIECE_SURFACE, SPL_PIECE_LEVEL };
  * it goes on in other blocks, unless it is anchored. */
 struct spl_component {
     double outward; /* sum over its points of their area, in usual ones', times spl_eyes_get_outward() */
-    int64_t
-        level;   /* usual points of its large level pieces that show up, less those that show down; 0: it has no say */
-    int32_t own; /* the same of the piece that goes on, which is not among them, however small it is here */
-    bool anchored; /* holds a point whose normal was given or faces its station: the set is never turned */
-    uint8_t flip;  /* result of spl_orient_join_decide(): 1 = turn the set's normals */
+    double area;    /* of its points, in the same */
+    int64_t level;  /* area of its large level pieces that shows up, less what shows down; 0: it has no say */
+    int32_t own;    /* the same of the piece that goes on, which is not among them, however small it is here */
+    uint32_t tree;  /* by spl_orient_join_decide(): what it holds together with has the same number */
+    bool anchored;  /* holds a point whose normal was given or faces its station: the set is never turned */
+    bool doubtful;  /* by the same: as much of its tree shows up as down */
+    uint8_t flip;   /* by the same: 1 = turn the set's normals */
 };
 
 /* Scratch of one worker for a block of up to `capacity` points with `k` neighbours each. */

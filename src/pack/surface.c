@@ -23,6 +23,7 @@
 #include "pack/orient_join.h"
 #include "pack/radius.h"
 #include "pack/settle.h"
+#include "pack/shell.h"
 
 enum { block_points = 1 << 16 };
 _Static_assert((int)block_points <= UINT16_MAX + 1, "components of a block are told apart by 16 bits");
@@ -192,6 +193,39 @@ static int add_edges(struct surface *s, size_t b, size_t unsettled, struct spl_o
     return rc;
 }
 
+static struct spl_component *component_of(const struct surface *s, size_t i)
+{
+    return &s->components[s->blocks[i / block_points].first_component + s->label[i]];
+}
+
+/* What is closed all around has as much above as below, so up says nothing of it: it shows outwards. */
+static int turn_shells(struct surface *s, size_t count, struct spl_error *err)
+{
+    const struct spl_points *p = s->points;
+    bool any = false;
+    for (size_t c = 0; c < count; c++)
+        any |= s->components[c].doubtful;
+    if (!any || p->eye_count)
+        return SPL_OK;
+    struct spl_shell *shells = spl_alloc(count, sizeof *shells, err); /* of each tree */
+    if (!shells)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < p->count; i++) {
+        const struct spl_component *c = component_of(s, i);
+        double place[3];
+        if (i % 4096 == 0)
+            spl_spill_keep_bound(p->spill);
+        for (int x = 0; c->doubtful && x < 3; x++)
+            place[x] = spl_points_at(p, x, i) - spl_points_at(p, x, 0);
+        if (c->doubtful)
+            spl_shell_add(&shells[c->tree], place, p->normal[i], (double)p->radius[i] * p->radius[i], c->flip);
+    }
+    for (size_t c = 0; c < count; c++)
+        s->components[c].flip ^= spl_shell_shows_in(&shells[s->components[c].tree]);
+    free(shells);
+    return SPL_OK;
+}
+
 static int join_blocks(struct surface *s, struct spl_error *err)
 {
     size_t components = 0;
@@ -215,7 +249,7 @@ static int join_blocks(struct surface *s, struct spl_error *err)
         }
     rc = rc ? rc : spl_orient_join_decide(&join, err);
     spl_orient_join_finish(&join);
-    return rc;
+    return rc ? rc : turn_shells(s, components, err);
 }
 
 static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
@@ -223,7 +257,7 @@ static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
     struct surface *s = context;
     (void)worker;
     for (size_t i = begin; i < end; i++)
-        if (s->components[s->blocks[i / block_points].first_component + s->label[i]].flip)
+        if (component_of(s, i)->flip)
             for (int c = 0; c < 3; c++)
                 s->points->normal[i][c] = -s->points->normal[i][c];
 }

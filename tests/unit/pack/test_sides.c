@@ -249,6 +249,48 @@ static void test_rooms_show_in(void **state)
     }
 }
 
+/* What was seen from all sides, and lies on nothing: a ball, or a brick; from below `below` times as densely. */
+static void add_thing(struct scene *s, bool ball, int below)
+{
+    const int count = 20000;
+    const double half[3] = {1, 0.7, 0.6};
+    for (int i = 0; i < count; i++) {
+        double at[3], turn = 2 * M_PI * uniform(&s->random), z = 2 * uniform(&s->random) - 1, r = sqrt(1 - z * z);
+        int face = (int)(3 * uniform(&s->random));
+        for (int c = 0; c < 3; c++)
+            at[c] = half[c] * (c != face ? 2 * uniform(&s->random) - 1 : z < 0 ? -1 : 1);
+        if (ball)
+            memcpy(at, (double[3]){r * cos(turn), r * sin(turn), z}, sizeof at);
+        if (at[2] < 0 || uniform(&s->random) * below < 1)
+            add(s, at[0], at[1], at[2]);
+    }
+}
+
+/* Up says nothing of them: half of them showed in. */
+static void test_things_show_out(void **state)
+{
+    (void)state;
+    for (int ball = 0; ball < 2; ball++)
+        for (int below = 1; below < 4; below += 2)
+            for (uint64_t seed = 1; seed < 4; seed++) {
+                struct scene s = begin(2);
+                size_t out = 0;
+                s.random = seed;
+                add_thing(&s, ball, below);
+                struct spl_points p = finish(&s, 1);
+                for (size_t i = 0; i < p.count; i++) {
+                    double sum = 0;
+                    for (int c = 0; c < 3; c++)
+                        sum += (double)p.normal[i][c] * p.axis[c][i];
+                    out += sum > 0;
+                }
+                if (out < p.count - p.count / 100)
+                    fail_msg("%s, %d times as dense below, %d: %zu of %zu points show out", ball ? "ball" : "brick",
+                             below, (int)seed, out, p.count);
+                spl_points_finish(&p);
+            }
+}
+
 /* Decides over `count` components of a block each, between which are so many edges of which each end agrees wholly, or
  * not at all where there are less than none. */
 static void decide(struct spl_component *components, size_t count, const int edges[][3], size_t edge_count)
@@ -342,6 +384,7 @@ int main(void)
         cmocka_unit_test(test_strong_votes_outdo_up),
         cmocka_unit_test(test_a_bridge_shows_down_below),
         cmocka_unit_test(test_rooms_show_in),
+        cmocka_unit_test(test_things_show_out),
         cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
         cmocka_unit_test(test_blocks_cut_no_roof),
     };
