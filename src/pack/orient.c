@@ -1,21 +1,17 @@
-/* Signs of normals by the votes of neighbours.
+/* Signs of normals by the votes of neighbours, within a block.
  *
  * Two neighbouring normals agree in sign when one, mirrored in the plane between the points, resembles the other: that
  * is right on a plane and around a corner alike, where the plain scalar product is a coin toss. It says little of
  * points that lie one behind the other, in the noise of a surface or on both sides of a thin wall: such edges count
  * little.
  *
- * Where most edges of a point are certain it lies on a surface, and such points hold together. That leaves pieces, and
- * each joins the one that it has most votes with, all edges between the two together; then votes are counted again,
- * until no two pieces touch. So two halves of a road are not joined by way of the bush that stands on both. Votes are
- * integers: what comes of them depends on nothing but the points. Blocks are done in parallel, then their pieces are
- * joined in the same way.
+ * Where most edges of a point are certain it lies on a surface, and such points hold together. That leaves pieces,
+ * which join by votes (forest.c). A piece that goes on in other blocks has edges there that its block does not see:
+ * others join it, but it joins none itself before all blocks are done (orient_join.c). So what a block decides by
+ * itself would be decided in the same way among all of them, and where blocks end decides nothing.
  *
- * Where nobody says what is seen, what is level mostly is ground or a roof, and shows upwards. A wall with ground on
- * both of its sides tells one of them to show downwards, and so does a bush half of the time. So level points and
- * others make pieces of their own, and where two trees join that hold large level pieces, "both up" has votes of its
- * own: a fraction of what the whole border of these would have. A ceiling hangs on its walls by all of its border, and
- * they still tell it to show down. */
+ * Level points and others make pieces of their own, since what is level has a say for up. A point that is far from
+ * others stands for as many as would lie there usually: a far roof of a few hundred points is as large as it looks. */
 #include "pack/orient.h"
 
 #include <math.h>
@@ -27,34 +23,24 @@
 
 #define SPL_INLINE static inline __attribute__((always_inline))
 
-static const float certain = 0.8f; /* agreement of an edge */
-#define ORIENT_VOTE (1 << 20)      /* of an edge whose normals agree */
-static const double level = 0.8;   /* how far a normal shows up or down; a roof's, too */
-enum { large = 1024 };             /* points of a level piece that counts */
-static const double border = 1; /* votes for "both up" of what is level and has a point; sqrt(n) times as many of n */
-
-/* Trees of points, or of pieces: all that know their signs relative to each other. */
-struct forest {
-    uint32_t *parent;
-    uint8_t *flip;     /* sign relative to the parent */
-    uint8_t *anchored; /* of roots: the tree is never turned */
-    int64_t *level;    /* of roots: points of large level pieces that show upwards, less those that show downwards */
-    uint32_t *best;    /* scratch: the edge of each root that has most votes */
-    uint32_t *place;   /* scratch: where the edges of each root lie, then whether it has joined another in this round */
-    uint32_t count;    /* of all of these */
-};
+static const float certain = 0.8f;  /* agreement of an edge */
+static const double area_most = 64; /* of a point, over that of usual ones, however far it is from others */
+static const double level = 0.8;    /* how far a normal shows up or down; a roof's, too */
 
 int spl_orient_init(struct spl_orient *orient, size_t capacity, unsigned k, struct spl_error *err)
 {
     orient->parent = spl_alloc_raw(capacity, sizeof *orient->parent, err);
     orient->flip = spl_alloc_raw(capacity, sizeof *orient->flip, err);
     orient->label = spl_alloc_raw(capacity, sizeof *orient->label, err);
-    orient->anchored = spl_alloc_raw(capacity, sizeof *orient->anchored, err);
+    orient->held = spl_alloc_raw(capacity, sizeof *orient->held, err);
+    orient->kind = spl_alloc_raw(capacity, sizeof *orient->kind, err);
+    orient->own = spl_alloc_raw(capacity, sizeof *orient->own, err);
+    orient->reach = spl_alloc_raw(capacity, sizeof *orient->reach, err);
     orient->place = spl_alloc_raw(capacity, sizeof *orient->place, err);
     orient->level = spl_alloc_raw(capacity, sizeof *orient->level, err);
     orient->edges = spl_alloc_raw(2 * capacity * k, sizeof *orient->edges, err);
-    bool enough = orient->parent && orient->flip && orient->label && orient->anchored && orient->place &&
-                  orient->level && orient->edges;
+    bool enough = orient->parent && orient->flip && orient->label && orient->held && orient->kind && orient->own &&
+                  orient->reach && orient->place && orient->level && orient->edges;
     return enough ? 0 : SPL_E_NOMEM;
 }
 
@@ -63,7 +49,10 @@ void spl_orient_finish(struct spl_orient *orient)
     free(orient->parent);
     free(orient->flip);
     free(orient->label);
-    free(orient->anchored);
+    free(orient->held);
+    free(orient->kind);
+    free(orient->own);
+    free(orient->reach);
     free(orient->place);
     free(orient->level);
     free(orient->edges);
@@ -104,172 +93,14 @@ float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j)
     return agreement[0];
 }
 
-size_t spl_orient_add_edge(struct spl_orient_edge *edges, size_t count, uint32_t a, uint32_t b, float agreement)
-{
-    struct spl_orient_edge edge = {a < b ? a : b, a < b ? b : a, lrintf(agreement * ORIENT_VOTE)};
-    if (count > 0 && edges[count - 1].a == edge.a && edges[count - 1].b == edge.b)
-        edges[count - 1].votes += edge.votes;
-    else
-        edges[count++] = edge;
-    return count;
-}
-
-/* The root of `i`, with the sign of i relative to it; halves the path. */
-static uint32_t find_root(struct forest *f, uint32_t i, uint8_t *sign)
-{
-    uint8_t s = 0;
-    while (f->parent[i] != i) {
-        uint32_t up = f->parent[i];
-        if (f->parent[up] != up) {
-            f->flip[i] ^= f->flip[up];
-            f->parent[i] = f->parent[up];
-        }
-        s ^= f->flip[i];
-        i = f->parent[i];
-    }
-    *sign = s;
-    return i;
-}
-
-/* Joins the trees of a and b; the smaller root stays, so that roots precede their trees. Anchored trees keep their
- * sign, so two of them never join. */
-static void join(struct forest *f, uint32_t a, uint32_t b, bool opposed)
-{
-    uint8_t sa, sb;
-    uint32_t ra = find_root(f, a, &sa), rb = find_root(f, b, &sb);
-    if (ra == rb || (f->anchored[ra] && f->anchored[rb]))
-        return;
-    if (ra < rb ? f->anchored[rb] : !f->anchored[ra]) {
-        uint32_t r = ra;
-        ra = rb;
-        rb = r;
-    }
-    f->parent[rb] = ra;
-    f->flip[rb] = sa ^ sb ^ opposed;
-    if (!f->anchored[ra])
-        f->level[ra] += f->flip[rb] ? -f->level[rb] : f->level[rb];
-}
-
-static int compare_edges(const void *a, const void *b)
-{
-    const struct spl_orient_edge *x = a, *y = b;
-    return (x->b > y->b) - (x->b < y->b);
-}
-
-/* Makes one of all edges that have the same second end; those that are left are in its order. Returns how many. `at`
- * tells of each end where its edge may be. */
-static size_t unite_run(struct spl_orient_edge *edges, size_t count, uint32_t *at)
-{
-    enum { few = 32 };
-    size_t kept = 0;
-    for (size_t e = 0; e < count; e++) {
-        struct spl_orient_edge edge = edges[e];
-        uint32_t to = at[edge.b];
-        if (to < kept && edges[to].b == edge.b) {
-            edges[to].votes += edge.votes;
-        } else {
-            at[edge.b] = (uint32_t)kept;
-            edges[kept++] = edge;
-        }
-    }
-    if (kept > few)
-        qsort(edges, kept, sizeof *edges, compare_edges);
-    for (size_t e = 1; kept <= few && e < kept; e++) {
-        struct spl_orient_edge edge = edges[e];
-        size_t to = e;
-        for (; to > 0 && edges[to - 1].b > edge.b; to--)
-            edges[to] = edges[to - 1];
-        edges[to] = edge;
-    }
-    return kept;
-}
-
-/* Moves the edges to the roots of their ends, one for all of the same two, and leaves out those that can't join. Leaves
- * them by their ends. `spare` has room for as many. */
-static size_t unite(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
-{
-    uint32_t *place = f->place, sum = 0;
-    size_t moved = 0, kept = 0;
-    memset(place, 0, f->count * sizeof *place);
-    for (size_t i = 0; i < count; i++) {
-        uint8_t sa, sb;
-        uint32_t a = find_root(f, edges[i].a, &sa), b = find_root(f, edges[i].b, &sb);
-        if (a == b || (f->anchored[a] && f->anchored[b]))
-            continue;
-        edges[moved] =
-            (struct spl_orient_edge){a < b ? a : b, a < b ? b : a, sa == sb ? edges[i].votes : -edges[i].votes};
-        place[edges[moved++].a]++;
-    }
-    for (uint32_t i = 0; i < f->count; i++) {
-        uint32_t here = place[i];
-        place[i] = sum;
-        sum += here;
-    }
-    for (size_t e = 0; e < moved; e++)
-        spare[place[edges[e].a]++] = edges[e];
-    for (size_t begin = 0, end; begin < moved; begin = end) {
-        end = place[spare[begin].a];
-        size_t run = unite_run(spare + begin, end - begin, f->best);
-        memcpy(edges + kept, spare + begin, run * sizeof *edges);
-        kept += run;
-    }
-    return kept;
-}
-
-static void take_best(struct forest *f, const struct spl_orient_edge *edges, uint32_t root, size_t edge)
-{
-    if (f->best[root] == UINT32_MAX || llabs(edges[edge].votes) > llabs(edges[f->best[root]].votes))
-        f->best[root] = (uint32_t)edge;
-}
-
-/* Votes for two roots to show to the same side, by what is level in their trees. */
-static int64_t count_up(const struct forest *f, uint32_t a, uint32_t b)
-{
-    int64_t x = f->level[a], y = f->level[b], least = llabs(x) < llabs(y) ? llabs(x) : llabs(y);
-    int64_t votes = llrint(border * sqrt((double)least) * ORIENT_VOTE);
-    return (x < 0) == (y < 0) ? votes : -votes;
-}
-
-/* Joins the trees of an edge's ends. Where up says something else than the edge, and one of the two trees has joined
- * another in this round, there may be more edges between them: then it waits until these are counted together. */
-static void join_ends(struct forest *f, const struct spl_orient_edge *edge)
-{
-    uint8_t sa, sb;
-    uint32_t a = find_root(f, edge->a, &sa), b = find_root(f, edge->b, &sb);
-    int64_t up = sa == sb ? count_up(f, a, b) : -count_up(f, a, b);
-    bool opposed = edge->votes + up < 0;
-    if (opposed != (edge->votes < 0) && (f->place[a] || f->place[b]))
-        return;
-    join(f, edge->a, edge->b, opposed);
-    f->place[a] = f->place[b] = 1;
-}
-
-/* Joins all that touches, as the head of this file says. Each round joins at least the two whose edge is the first of
- * those with most votes, and mostly halves the number of trees. */
-static void vote(struct forest *f, struct spl_orient_edge *edges, struct spl_orient_edge *spare, size_t count)
-{
-    while ((count = unite(f, edges, spare, count)) > 0) {
-        for (size_t e = 0; e < count; e++) {
-            f->best[edges[e].a] = f->best[edges[e].b] = UINT32_MAX;
-            f->place[edges[e].a] = f->place[edges[e].b] = 0;
-        }
-        for (size_t e = 0; e < count; e++) {
-            take_best(f, edges, edges[e].a, e);
-            take_best(f, edges, edges[e].b, e);
-        }
-        for (size_t e = 0; e < count; e++)
-            if (f->best[edges[e].a] == e || f->best[edges[e].b] == e)
-                join_ends(f, &edges[e]);
-    }
-}
-
 /* A block's points and their neighbours in it. */
 struct graph {
     const struct spl_points *points;
     size_t begin;
     uint32_t count;
     const uint32_t *neighbours;
-    float *agreement; /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
+    const float *reach; /* how far the farthest of them is, squared */
+    float *agreement;   /* with each of them; 0 of those in other blocks. Lies where edges are sorted to later */
     unsigned k;
 };
 
@@ -281,8 +112,8 @@ SPL_INLINE bool get_neighbour(const struct graph *g, uint32_t i, unsigned a, uin
     return index >= g->begin && index - g->begin < g->count;
 }
 
-/* Fills in how normals agree, and in `surface` of each point whether it lies on one. */
-SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
+/* Fills in how normals agree, and the kind of each point: whether it lies on a surface. */
+SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
 {
     const unsigned rounded = (g->k + eight - 1) / eight * eight;
     for (uint32_t i = 0; i < g->count; i++) {
@@ -319,66 +150,107 @@ SPL_INLINE void agree_all(const struct graph *g, uint32_t *surface)
                 agreed -= (unsigned)certainly[a];
             }
         }
-        surface[i] = 2 * agreed > edges;
+        kind[i] = 2 * agreed > edges ? SPL_PIECE_SURFACE : SPL_PIECE_OTHER;
     }
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) static void agree_all_avx2(const struct graph *g, uint32_t *surface)
+__attribute__((target("avx2"))) static void agree_all_avx2(const struct graph *g, uint8_t *kind)
 {
-    agree_all(g, surface);
+    agree_all(g, kind);
 }
 #endif
 
 /* Compiled twice; contraction is off, so both give the same bits. */
-static void find_agreements(const struct graph *g, uint32_t *surface)
+static void find_agreements(const struct graph *g, uint8_t *kind)
 {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2")) {
-        agree_all_avx2(g, surface);
+        agree_all_avx2(g, kind);
         return;
     }
 #endif
-    agree_all(g, surface);
+    agree_all(g, kind);
 }
 
-/* Fills in which way each point is level, if anybody cares, and has `surface` tell those that are from others. */
-static void find_level(const struct graph *g, int64_t *levels, bool cares, uint32_t *surface)
+/* The area that a point stands for, over that of a usual one: what its neighbours lie in. */
+static double get_area(const struct graph *g, float usual, uint32_t i)
+{
+    return fmin(g->reach[i] / (double)usual, area_most);
+}
+
+/* Fills in which way each point is level, if anybody cares, and how many usual points it stands for; has `kind` tell
+ * those that are from others. */
+static void find_level(const struct graph *g, float usual, int64_t *levels, bool cares, uint8_t *kind)
 {
     for (uint32_t i = 0; i < g->count; i++) {
         double outward = cares ? spl_eyes_get_outward(g->points, g->begin + i) : 0;
-        levels[i] = (outward > level) - (outward < -level);
-        if (surface[i] && levels[i])
-            surface[i] = 2;
+        levels[i] = ((outward > level) - (outward < -level)) * llrint(fmax(get_area(g, usual, i), 1));
+        if (kind[i] && levels[i])
+            kind[i] = SPL_PIECE_LEVEL;
     }
 }
 
-/* Joins what lies on surfaces; `surface` says of each point on which kind it does, 0 = on none. */
-static void join_surfaces(const struct graph *g, struct forest *f, const uint32_t *surface)
+/* Joins what lies on surfaces of the same kind. */
+static void join_surfaces(const struct graph *g, struct spl_forest *f, const uint8_t *kind)
 {
     for (uint32_t i = 0; i < g->count; i++) {
         uint8_t sign;
-        uint32_t root = surface[i] ? find_root(f, i, &sign) : i;
-        for (unsigned a = 0; surface[i] && a < g->k; a++) {
+        uint32_t root = kind[i] ? spl_forest_find_root(f, i, &sign) : i;
+        for (unsigned a = 0; kind[i] && a < g->k; a++) {
             uint32_t j;
             float agreement = g->agreement[(size_t)i * g->k + a];
-            if (fabsf(agreement) >= certain && get_neighbour(g, i, a, &j) && surface[j] == surface[i] &&
-                f->parent[j] != root && find_root(f, j, &sign) != root) {
-                join(f, i, j, agreement < 0);
-                root = find_root(f, i, &sign);
+            if (spl_orient_is_certain(agreement) && get_neighbour(g, i, a, &j) && kind[j] == kind[i] &&
+                f->parent[j] != root && spl_forest_find_root(f, j, &sign) != root) {
+                spl_forest_join(f, i, j, agreement < 0);
+                root = spl_forest_find_root(f, i, &sign);
             }
         }
     }
 }
 
+static bool reaches_out(const struct graph *g, uint32_t i)
+{
+    const uint32_t *list = g->neighbours + (size_t)i * g->k, begin = (uint32_t)g->begin;
+    unsigned outside = 0;
+    for (unsigned a = 0; a < g->k; a++)
+        outside |= (list[a] - begin >= g->count) & (list[a] != UINT32_MAX);
+    return outside;
+}
+
+/* Has pieces wait that go on in other blocks, and what is anchored. Leaves `kind` to the points of such as are level.
+ */
+static void hold(const struct graph *g, struct spl_forest *f, uint8_t *kind)
+{
+    uint8_t sign;
+    for (uint32_t i = 0; i < g->count; i++)
+        if ((f->held[i] & SPL_TREE_ANCHORED) || (kind[i] != SPL_PIECE_OTHER && reaches_out(g, i)))
+            f->held[spl_forest_find_root(f, i, &sign)] |= SPL_TREE_WAITS;
+    for (uint32_t i = 0; i < g->count; i++)
+        if (kind[i] != SPL_PIECE_LEVEL || !(f->held[spl_forest_find_root(f, i, &sign)] & SPL_TREE_WAITS))
+            kind[i] = SPL_PIECE_OTHER;
+}
+
+/* Which pieces have a say for up: large ones. What waits may be larger than it looks, so how much of it there is is
+ * kept in `own`. */
+static void count_level(const struct graph *g, struct spl_forest *f, int32_t *own)
+{
+    for (uint32_t i = 0; i < g->count; i++) {
+        bool is_root = f->parent[i] == i;
+        own[i] = is_root && f->held[i] & SPL_TREE_WAITS && !(f->held[i] & SPL_TREE_ANCHORED) ? (int32_t)f->level[i] : 0;
+        if (!is_root || !spl_orient_is_large(f->level[i]))
+            f->level[i] = 0;
+    }
+}
+
 /* The edges between different trees, by their roots. */
-static size_t find_edges(const struct graph *g, struct forest *f, struct spl_orient_edge *edges)
+static size_t find_edges(const struct graph *g, struct spl_forest *f, struct spl_forest_edge *edges)
 {
     uint32_t *top = f->best; /* of each point: twice its root, and 1 where it has the other sign */
     size_t count = 0;
     for (uint32_t i = 0; i < g->count; i++) {
         uint8_t sign;
-        top[i] = 2 * find_root(f, i, &sign);
+        top[i] = 2 * spl_forest_find_root(f, i, &sign);
         top[i] += sign;
     }
     for (uint32_t i = 0; i < g->count; i++)
@@ -387,87 +259,64 @@ static size_t find_edges(const struct graph *g, struct forest *f, struct spl_ori
             if (!get_neighbour(g, i, a, &j) || top[i] / 2 == top[j] / 2)
                 continue;
             float agreement = g->agreement[(size_t)i * g->k + a];
-            count = spl_orient_add_edge(edges, count, top[i] / 2, top[j] / 2,
+            count = spl_forest_add_edge(edges, count, top[i] / 2, top[j] / 2,
                                         (top[i] ^ top[j]) & 1 ? -agreement : agreement);
         }
+    return count;
+}
+
+/* Tells of the trees, which are numbered in the order of their roots, and of each point which one holds it. */
+static uint32_t list_components(struct spl_orient *orient, const struct graph *g)
+{
+    uint32_t count = 0;
+    orient->components = (struct spl_component *)orient->edges; /* which nobody needs any more */
+    for (uint32_t i = 0; i < g->count; i++)
+        if (orient->label[i] == i) {
+            orient->components[count] =
+                (struct spl_component){.level = orient->level[i], .anchored = orient->held[i] & SPL_TREE_ANCHORED};
+            orient->parent[i] = count++; /* which is free to hold the numbers now */
+        }
+    for (uint32_t i = 0; i < g->count; i++) {
+        struct spl_component *c = &orient->components[orient->label[i] = orient->parent[orient->label[i]]];
+        double area = get_area(g, orient->usual, i);
+        c->outward += area * spl_eyes_get_outward(g->points, g->begin + i);
+        c->area += area;
+        c->own += orient->own[i];
+    }
+    for (uint32_t c = 0; c < count; c++)
+        if (spl_orient_is_large(orient->components[c].own))
+            orient->components[c].level -= orient->components[c].own;
     return count;
 }
 
 uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, size_t begin, size_t end,
                           const uint32_t *neighbours, unsigned k)
 {
-    uint32_t n = (uint32_t)(end - begin), components = 0, first_anchored = UINT32_MAX;
-    const struct graph graph = {points, begin, n, neighbours, (float *)(orient->edges + (size_t)n * k), k};
-    struct forest forest = {
-        orient->parent, orient->flip, orient->anchored, orient->level, orient->label, orient->place, n};
+    uint32_t n = (uint32_t)(end - begin), first_anchored = UINT32_MAX;
+    const struct graph graph = {points, begin, n, neighbours, orient->reach, (float *)(orient->edges + (size_t)n * k),
+                                k};
+    struct spl_forest forest = {
+        orient->parent, orient->flip, orient->held, orient->level, orient->label, orient->place, n};
     for (uint32_t i = 0; i < n; i++) {
-        if (orient->anchored[i] && first_anchored == UINT32_MAX)
+        if (orient->held[i] && first_anchored == UINT32_MAX)
             first_anchored = i;
-        orient->parent[i] = orient->anchored[i] ? first_anchored : i;
+        orient->parent[i] = orient->held[i] ? first_anchored : i;
         orient->flip[i] = 0;
     }
-    find_agreements(&graph, orient->label);
-    find_level(&graph, orient->level, first_anchored == UINT32_MAX && !points->eye_count, orient->label);
-    join_surfaces(&graph, &forest, orient->label);
-    for (uint32_t i = 0; i < n; i++)
-        if (orient->parent[i] != i || llabs(orient->level[i]) < large)
-            orient->level[i] = 0;
-    vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
+    find_agreements(&graph, orient->kind);
+    find_level(&graph, orient->usual, orient->level, first_anchored == UINT32_MAX && !points->eye_count, orient->kind);
+    join_surfaces(&graph, &forest, orient->kind);
+    if (n < points->count)
+        hold(&graph, &forest, orient->kind);
+    count_level(&graph, &forest, orient->own);
+    spl_forest_vote(&forest, orient->edges, orient->edges + (size_t)n * k, find_edges(&graph, &forest, orient->edges));
     for (uint32_t i = 0; i < n; i++) {
         uint8_t sign;
-        orient->label[i] = find_root(&forest, i, &sign);
+        orient->label[i] = spl_forest_find_root(&forest, i, &sign);
         for (int c = 0; sign && c < 3; c++)
             points->normal[begin + i][c] = -points->normal[begin + i][c];
+        if (sign)
+            orient->own[i] = -orient->own[i];
     }
-    /* Roots are numbered where they stand; parent is free to hold the numbers now. */
-    for (uint32_t i = 0; i < n; i++)
-        if (orient->label[i] == i) {
-            orient->level[components] = orient->level[i];
-            orient->parent[i] = components++;
-        }
-    for (uint32_t i = 0; i < n; i++)
-        orient->label[i] = orient->parent[orient->label[i]];
-    return components;
-}
-
-int spl_orient_components(struct spl_component *components, size_t count, struct spl_orient_edge *edges,
-                          size_t edge_count, struct spl_spill *spill, struct spl_error *err)
-{
-    struct forest forest = {spl_alloc_raw(count, sizeof *forest.parent, err),
-                            spl_alloc(count, 1, err),
-                            spl_alloc_raw(count, 1, err),
-                            spl_alloc_raw(count, sizeof *forest.level, err),
-                            spl_alloc(count, sizeof *forest.best, err),
-                            spl_alloc_raw(count, sizeof *forest.place, err),
-                            (uint32_t)count};
-    struct spl_orient_edge *spare = spl_spill_alloc_raw(spill, edge_count, sizeof *spare, err);
-    double *outward = spl_alloc(count, sizeof *outward, err);
-    bool enough = forest.parent && forest.flip && forest.anchored && forest.level && forest.best && forest.place &&
-                  spare && outward;
-    for (size_t i = 0; enough && i < count; i++) {
-        forest.parent[i] = (uint32_t)i;
-        forest.anchored[i] = components[i].anchored;
-        forest.level[i] = components[i].anchored ? 0 : components[i].level;
-    }
-    if (enough)
-        vote(&forest, edges, spare, edge_count);
-    for (size_t i = 0; enough && i < count; i++) {
-        uint8_t sign;
-        uint32_t root = find_root(&forest, (uint32_t)i, &sign);
-        outward[root] += sign ? -components[i].outward : components[i].outward;
-    }
-    for (size_t i = 0; enough && i < count; i++) {
-        uint8_t sign;
-        uint32_t root = find_root(&forest, (uint32_t)i, &sign);
-        components[i].flip = sign ^ (!forest.anchored[root] && outward[root] < 0);
-    }
-    free(forest.parent);
-    free(forest.flip);
-    free(forest.anchored);
-    free(forest.level);
-    free(forest.best);
-    free(forest.place);
-    spl_spill_free(spill, spare);
-    free(outward);
-    return enough ? SPL_OK : SPL_E_NOMEM;
+    return list_components(orient, &graph);
 }

@@ -40,13 +40,16 @@ static void limit_runs(const struct spl_settle_block *block)
     }
 }
 
-static bool waits(const struct spl_settle_block *block, const uint32_t *list)
+static bool waits(const struct spl_settle_block *block, uint32_t point)
 {
     const uint32_t begin = (uint32_t)block->begin, points = (uint32_t)(block->end - block->begin);
-    unsigned outside = 0;
+    const uint32_t *list = block->neighbours + (size_t)point * block->k;
+    unsigned outside = 0, other = 0;
     for (unsigned a = 0; a < block->k; a++)
         outside |= (list[a] - begin >= points) & (list[a] != UINT32_MAX);
-    return outside;
+    for (unsigned a = 0; block->label && !outside && a < block->k && list[a] != UINT32_MAX; a++)
+        other |= block->label[list[a] - begin] != block->label[point];
+    return outside | other;
 }
 
 int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_block *block)
@@ -55,7 +58,7 @@ int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_
     unsettled->spill = block->points->spill;
     limit_runs(block);
     for (size_t i = 0; i < points; i++)
-        count += waits(block, block->neighbours + i * k);
+        count += waits(block, (uint32_t)i);
     unsettled->points = spl_spill_take(block->points->spill, count, sizeof *unsettled->points, NULL);
     unsettled->neighbours = spl_spill_take(block->points->spill, count, k * sizeof *unsettled->neighbours, NULL);
     if (!unsettled->points || !unsettled->neighbours)
@@ -63,7 +66,7 @@ int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_
     unsettled->neighbour_bytes = count * k * sizeof *unsettled->neighbours;
     for (size_t i = 0; i < points; i++) {
         const uint32_t *list = block->neighbours + i * k;
-        if (!waits(block, list))
+        if (!waits(block, (uint32_t)i))
             continue;
         unsettled->points[unsettled->count].index = (uint32_t)(block->begin + i);
         unsettled->points[unsettled->count].limit = block->limit[i];

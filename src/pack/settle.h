@@ -9,12 +9,14 @@ struct spl_settle_block {
     struct spl_points *points;
     size_t begin, end;
     const uint32_t *neighbours; /* k a point of the block, unused ones UINT32_MAX */
+    const uint32_t *label;      /* of each point, whose signs agree where it is the same; NULL: all do */
     unsigned k;
     const struct spl_vicinity *vicinity; /* the same points */
     float *limit; /* in: times the median radius of its surroundings, which a point's radius may be */
 };
 
-/* Those that have a neighbour outside their block: they wait until all blocks have radii and signs. */
+/* Those that have a neighbour outside their block, or of another label: they wait until all blocks have radii and
+ * signs. */
 struct spl_unsettled {
     struct spl_spill *spill; /* the points' */
     struct spl_unsettled_point {

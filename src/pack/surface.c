@@ -19,10 +19,11 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "pack/clip.h"
-#include "pack/eyes.h"
-#include "pack/orient.h"
+#include "pack/median.h"
+#include "pack/orient_join.h"
 #include "pack/radius.h"
 #include "pack/settle.h"
+#include "pack/shell.h"
 
 enum { block_points = 1 << 16 };
 _Static_assert((int)block_points <= UINT16_MAX + 1, "components of a block are told apart by 16 bits");
@@ -55,9 +56,10 @@ struct surface {
     struct scratch *scratch;
     struct block *blocks;
     size_t block_count;
-    uint8_t *edge;   /* a bit of each point: its surface may end there, and nobody has looked; NULL: no clip lines */
+    uint8_t *edge; /* a bit of each point: its surface may end there, and nobody has looked; NULL: no clip lines */
     struct spl_clip_turns turns;
-    uint16_t *label; /* component of each point within its block; NULL when every side is known */
+    uint16_t *label;  /* component of each point within its block; NULL when every side is known */
+    uint8_t *goes_on; /* a bit of each point, where there are labels: it is one of a level piece that goes on */
     struct spl_component *components;
     unsigned k, wide;
     atomic_bool failed;
@@ -91,16 +93,13 @@ static bool orient_inner(struct surface *s, struct block *block, struct scratch 
 {
     struct spl_orient *o = &w->orient;
     block->component_count = spl_orient_block(o, s->points, begin, end, w->neighbours, s->k);
-    block->components = spl_alloc(block->component_count, sizeof *block->components, NULL);
+    block->components = spl_alloc_raw(block->component_count, sizeof *block->components, NULL);
     if (!block->components)
         return false;
-    for (uint32_t c = 0; c < block->component_count; c++)
-        block->components[c].level = o->level[c];
+    memcpy(block->components, o->components, block->component_count * sizeof *block->components);
     for (size_t i = begin; i < end; i++) {
-        struct spl_component *c = &block->components[o->label[i - begin]];
-        c->outward += spl_eyes_get_outward(s->points, i);
-        c->anchored |= o->anchored[i - begin];
         s->label[i] = (uint16_t)o->label[i - begin];
+        s->goes_on[i / 8] |= (uint8_t)((o->kind[i - begin] != 0) << i % 8); /* blocks share no byte */
     }
     return true;
 }
@@ -134,6 +133,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
             w->moments[i - begin] = spl_moments_of(s->points, i, &near);
             w->limit[i - begin] = (float)near.farthest;
+            w->orient.reach[i - begin] = (float)(near.farthest * near.farthest);
             if ((i & 255) == 255)
                 spl_spill_keep_bound(s->points->spill);
             if ((i & 4095) == 4095)
@@ -149,17 +149,21 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             size_t at = (i - begin) % SPL_SPREADS;
             if (!at)
                 spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
-            w->orient.anchored[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at],
-                                                     &near, &w->limit[i - begin], &edge);
+            w->orient.held[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at], &near,
+                                                 &w->limit[i - begin], &edge)
+                                            ? SPL_TREE_ANCHORED
+                                            : 0;
             const bool kept = !s->points->halo || !s->points->halo[i]; /* of others nobody asks for lines */
             if (edge == SPL_EDGE_ASKED && kept && s->edge)
                 line_count += spl_clip_foresee(s->points, i, &near, &s->turns, &w->lines[line_count]);
             else if (edge && kept && s->edge)
                 s->edge[i / 8] |= (uint8_t)(1 << i % 8); /* blocks share no byte */
         }
-        const struct spl_settle_block settle = {s->points, begin, end, w->neighbours, s->k, &vicinity, w->limit};
-        if (!keep_lines(s, &s->blocks[b], w, line_count) || spl_unsettled_init(&s->blocks[b].unsettled, &settle) ||
-            (s->label && !orient_inner(s, &s->blocks[b], w, begin, end))) {
+        const struct spl_settle_block settle = {
+            s->points, begin, end, w->neighbours, s->label ? w->orient.label : NULL, s->k, &vicinity, w->limit};
+        if (!keep_lines(s, &s->blocks[b], w, line_count) ||
+            (s->label && !orient_inner(s, &s->blocks[b], w, begin, end)) ||
+            spl_unsettled_init(&s->blocks[b].unsettled, &settle)) {
             atomic_store(&s->failed, true);
             return;
         }
@@ -167,57 +171,85 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     }
 }
 
-/* Edges between the components of blocks: as many as there are, which is far fewer than there can be. */
-struct edges {
-    struct spl_orient_edge *list;
-    size_t count, capacity;
-};
+static bool goes_on(const struct surface *s, size_t i)
+{
+    return s->goes_on[i / 8] >> i % 8 & 1;
+}
 
-static int add_edges(struct surface *s, size_t b, size_t unsettled, struct edges *edges, struct spl_error *err)
+/* What a point that waits says of its component and those of its neighbours. */
+static int add_edges(struct surface *s, size_t b, size_t unsettled, struct spl_orient_join *join, struct spl_error *err)
 {
     const struct block *block = &s->blocks[b];
-    uint32_t i = block->unsettled.points[unsettled].index;
+    const uint32_t i = block->unsettled.points[unsettled].index, own = block->first_component + s->label[i];
     const uint32_t *list = block->unsettled.neighbours + unsettled * s->k;
-    if (edges->count + s->k > edges->capacity) {
-        size_t capacity = edges->capacity + edges->capacity / 2 + 4096;
-        struct spl_orient_edge *more = spl_spill_realloc(s->points->spill, edges->list, capacity, sizeof *more, err);
-        if (!more)
-            return SPL_E_NOMEM;
-        edges->list = more;
-        edges->capacity = capacity;
+    int rc = SPL_OK;
+    for (unsigned a = 0; !rc && a < s->k && list[a] != UINT32_MAX; a++) {
+        size_t in = list[a] / block_points;
+        uint32_t other = s->blocks[in].first_component + s->label[list[a]];
+        if (other != own)
+            rc = spl_orient_join_add(join, own, other, spl_orient_agreement(s->points, i, list[a]),
+                                     in != b && goes_on(s, i) && goes_on(s, list[a]), err);
     }
-    for (unsigned a = 0; a < s->k && list[a] != UINT32_MAX; a++)
-        if (list[a] / block_points != b)
-            edges->count = spl_orient_add_edge(edges->list, edges->count, block->first_component + s->label[i],
-                                               s->blocks[list[a] / block_points].first_component + s->label[list[a]],
-                                               spl_orient_agreement(s->points, i, list[a]));
+    return rc;
+}
+
+static struct spl_component *component_of(const struct surface *s, size_t i)
+{
+    return &s->components[s->blocks[i / block_points].first_component + s->label[i]];
+}
+
+/* What is closed all around has as much above as below, so up says nothing of it: it shows outwards. */
+static int turn_shells(struct surface *s, size_t count, struct spl_error *err)
+{
+    const struct spl_points *p = s->points;
+    bool any = false;
+    for (size_t c = 0; c < count; c++)
+        any |= s->components[c].doubtful;
+    if (!any || p->eye_count)
+        return SPL_OK;
+    struct spl_shell *shells = spl_alloc(count, sizeof *shells, err); /* of each tree */
+    if (!shells)
+        return SPL_E_NOMEM;
+    for (size_t i = 0; i < p->count; i++) {
+        const struct spl_component *c = component_of(s, i);
+        double place[3];
+        if (i % 4096 == 0)
+            spl_spill_keep_bound(p->spill);
+        for (int x = 0; c->doubtful && x < 3; x++)
+            place[x] = spl_points_at(p, x, i) - spl_points_at(p, x, 0);
+        if (c->doubtful)
+            spl_shell_add(&shells[c->tree], place, p->normal[i], (double)p->radius[i] * p->radius[i], c->flip);
+    }
+    for (size_t c = 0; c < count; c++)
+        s->components[c].flip ^= spl_shell_shows_in(&shells[s->components[c].tree]);
+    free(shells);
     return SPL_OK;
 }
 
 static int join_blocks(struct surface *s, struct spl_error *err)
 {
     size_t components = 0;
-    struct edges edges = {0};
+    struct spl_orient_join join;
     for (size_t b = 0; b < s->block_count; b++) {
         s->blocks[b].first_component = (uint32_t)components;
         components += s->blocks[b].component_count;
     }
     s->components = spl_alloc_raw(components, sizeof *s->components, err);
-    int rc = s->components ? 0 : SPL_E_NOMEM;
-    for (size_t b = 0; !rc && b < s->block_count; b++) {
-        struct block *block = &s->blocks[b];
-        memcpy(s->components + block->first_component, block->components,
-               block->component_count * sizeof *block->components);
-        for (size_t d = 0; !rc && d < block->unsettled.count; d++) {
+    if (!s->components)
+        return SPL_E_NOMEM;
+    for (size_t b = 0; b < s->block_count; b++)
+        memcpy(s->components + s->blocks[b].first_component, s->blocks[b].components,
+               s->blocks[b].component_count * sizeof *s->components);
+    int rc = spl_orient_join_init(&join, s->components, components, s->points->spill, err);
+    for (size_t b = 0; !rc && b < s->block_count; b++)
+        for (size_t d = 0; !rc && d < s->blocks[b].unsettled.count; d++) {
             if (d % 256 == 0)
                 spl_spill_keep_bound(s->points->spill);
-            rc = add_edges(s, b, d, &edges, err);
+            rc = add_edges(s, b, d, &join, err);
         }
-    }
-    if (!rc)
-        rc = spl_orient_components(s->components, components, edges.list, edges.count, s->points->spill, err);
-    spl_spill_free(s->points->spill, edges.list);
-    return rc;
+    rc = rc ? rc : spl_orient_join_decide(&join, err);
+    spl_orient_join_finish(&join);
+    return rc ? rc : turn_shells(s, components, err);
 }
 
 static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
@@ -225,7 +257,7 @@ static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
     struct surface *s = context;
     (void)worker;
     for (size_t i = begin; i < end; i++)
-        if (s->components[s->blocks[i / block_points].first_component + s->label[i]].flip)
+        if (component_of(s, i)->flip)
             for (int c = 0; c < 3; c++)
                 s->points->normal[i][c] = -s->points->normal[i][c];
 }
@@ -244,6 +276,21 @@ static void settle_rest(void *context, size_t begin, size_t end, unsigned worker
     (void)worker;
     for (size_t b = begin; b < end; b++)
         spl_settle_find(s->points, s->k, &s->blocks[b].unsettled);
+}
+
+/* How far the farthest neighbours of most points are, squared, from a sample of them. */
+static float find_usual_reach(const struct spl_points *p, const struct spl_neighbours *neighbours, unsigned k)
+{
+    enum { sample_most = 1024 };
+    float reach[sample_most];
+    size_t n = p->count < sample_most ? p->count : sample_most;
+    struct spl_nearest near;
+    spl_nearest_init(&near);
+    for (size_t i = 0; i < n; i++) {
+        spl_neighbours_find(neighbours, i * p->count / n, k, &near);
+        reach[i] = (float)(near.farthest * near.farthest);
+    }
+    return fmaxf(spl_median(reach, n), smallest_radius * smallest_radius);
 }
 
 static bool all_sides_known(const struct spl_points *p)
@@ -282,11 +329,19 @@ static int allocate(struct surface *s, struct spl_error *err)
     }
     if (!all_sides_known(p)) {
         s->label = spl_spill_alloc_raw(p->spill, p->count, sizeof *s->label, err);
-        if (!s->label)
+        s->goes_on = spl_spill_alloc(p->spill, p->count / 8 + 1, 1, err);
+        if (!s->label || !s->goes_on)
             return SPL_E_NOMEM;
     }
     s->neighbours = spl_neighbours_create(p, s->stage->threads, err);
-    return s->neighbours ? 0 : SPL_E_NOMEM;
+    if (!s->neighbours)
+        return SPL_E_NOMEM;
+    if (s->label && p->count > 1) {
+        float usual = find_usual_reach(p, s->neighbours, s->k);
+        for (unsigned t = 0; t < s->stage->threads; t++)
+            s->scratch[t].orient.usual = usual;
+    }
+    return SPL_OK;
 }
 
 /* What clip lines are not made of. */
@@ -307,9 +362,11 @@ static void finish_scratch(struct surface *s)
     free(s->scratch);
     free(s->components);
     spl_spill_free(s->points->spill, s->label);
+    spl_spill_free(s->points->spill, s->goes_on);
     s->scratch = NULL;
     s->components = NULL;
     s->label = NULL;
+    s->goes_on = NULL;
     malloc_trim(0); /* a tenth of what there is, in pieces, which would stay until the end */
 }
 

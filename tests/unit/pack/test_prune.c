@@ -487,7 +487,9 @@ static void a_packed_file_is_pruned(void **state)
 }
 
 /* A small scan has few nodes to choose among, and panels have other cells than the scan has points: the number is
- * reached all the same, or what is reached is told. */
+ * reached all the same, or what is reached is told. Which cuts there are hangs on the normals, whose sides the scan
+ * leaves open: of 30000 points there is one of 90 and one of 120, none between, so no more than 1.2 times can be asked
+ * for of 100. */
 static void what_is_asked_for_is_left(void **state)
 {
     static const struct {

@@ -10,9 +10,9 @@
 #include "base/memory.h"
 #include "clouds.h"
 #include "pack/order.h"
-#include "pack/orient.h"
+#include "pack/orient_join.h"
 
-enum { points_most = 60000 };
+enum { points_most = 120000 };
 static const double step = 0.05, noise = 0.003;
 
 /* A cloud in the making, upright; `up` says which axis becomes its z. */
@@ -21,11 +21,13 @@ struct scene {
     size_t count;
     uint64_t random;
     int up;
+    double solid[2][2][3]; /* nothing is seen of others where these stand */
+    int solids;
 };
 
 static struct scene begin(int up)
 {
-    struct scene s = {spl_alloc(points_most, sizeof(double[3]), NULL), 0, 7, up};
+    struct scene s = {.position = spl_alloc(points_most, sizeof(double[3]), NULL), .random = 7, .up = up};
     assert_non_null(s.position);
     return s;
 }
@@ -34,6 +36,13 @@ static void add(struct scene *s, double x, double y, double z)
 {
     const double at[3] = {x, y, z};
     assert_true(s->count < points_most);
+    for (int i = 0; i < s->solids; i++) {
+        bool inside = true;
+        for (int c = 0; c < 3; c++)
+            inside &= at[c] > s->solid[i][0][c] - 1e-9 && at[c] < s->solid[i][1][c] + 1e-9;
+        if (inside)
+            return;
+    }
     for (int c = 0; c < 3; c++)
         s->position[s->count][(c + s->up + 1) % 3] = at[c] + noise * (2 * uniform(&s->random) - 1);
     s->count++;
@@ -158,13 +167,151 @@ static void test_ceilings_agree_with_their_room(void **state)
     spl_points_finish(&p);
 }
 
+/* The six faces of a box, but for those whose bit is not in `faces`: 2 * axis, + 1 for the far one. */
+static void add_box(struct scene *s, const double min[3], const double max[3], unsigned faces)
+{
+    for (int face = 0; face < 6; face++) {
+        double low[3], high[3];
+        memcpy(low, min, sizeof low);
+        memcpy(high, max, sizeof high);
+        low[face / 2] = high[face / 2] = face % 2 ? max[face / 2] : min[face / 2];
+        if (faces >> face & 1)
+            add_sheet(s, low, high);
+    }
+}
+
+enum { all_faces = 63, bottom = 1 << 4, top = 1 << 5 };
+
+/* A box that stands in what is added later. */
+static void add_solid(struct scene *s, const double min[3], const double max[3], unsigned faces)
+{
+    int solids = s->solids;
+    s->solids = 0;
+    add_box(s, min, max, faces);
+    s->solids = solids;
+    memcpy(s->solid[solids][0], min, sizeof s->solid[solids][0]);
+    memcpy(s->solid[s->solids++][1], max, sizeof s->solid[solids][1]);
+}
+
+/* A deck on two piers, seen from all sides: its underside shows down, whatever the ground below says, and where blocks
+ * end. */
+static void test_a_bridge_shows_down_below(void **state)
+{
+    (void)state;
+    for (int up = 1; up < 3; up++) {
+        struct scene s = begin(up);
+        size_t wrong = 0, level = 0, below = 0;
+        for (int pier = 0; pier < 2; pier++)
+            add_solid(&s, (double[3]){pier ? 9 : 2, 0.5, 0}, (double[3]){pier ? 10 : 3, 3.5, 3},
+                      all_faces - bottom - top);
+        add_sheet(&s, (double[3]){-1, -1, 0}, (double[3]){13, 5, 0});
+        add_box(&s, (double[3]){0, 0, 3}, (double[3]){12, 4, 3.4}, all_faces);
+        struct spl_points p = finish(&s, up);
+        for (size_t i = 0; i < p.count; i++) {
+            double z = p.axis[up][i];
+            float n = p.normal[i][up];
+            bool under = z > 2.95 && z < 3.05;
+            if (fabsf(n) < 0.9f)
+                continue;
+            level++;
+            below += under;
+            wrong += under ? n > 0 : n < 0;
+        }
+        assert_true(below > 10000);
+        if (wrong > level / 100)
+            fail_msg("%zu of the bridge's %zu level points show to the wrong side", wrong, level);
+        spl_points_finish(&p);
+    }
+}
+
+/* The six faces of a room, its ceiling scanned `dense` times as densely, and a cupboard at a wall whose upper half
+ * hangs over its lower one: more of what shows up is seen than of the ceiling. */
+static void test_rooms_show_in(void **state)
+{
+    (void)state;
+    for (int dense = 1; dense < 3; dense++) {
+        struct scene s = begin(2);
+        size_t inwards = 0, level = 0;
+        add_solid(&s, (double[3]){0, 1, 0}, (double[3]){0.6, 3, 1}, all_faces - bottom - top - 1);
+        add_solid(&s, (double[3]){0, 1, 1}, (double[3]){1.6, 3, 2}, all_faces - bottom - 1);
+        add_box(&s, (double[3]){0}, (double[3]){5, 4, 2.5}, all_faces);
+        for (int more = 1; more < dense * dense; more++)
+            add_sheet(&s, (double[3]){0, 0, 2.5}, (double[3]){5, 4, 2.5});
+        struct spl_points p = finish(&s, 2);
+        for (size_t i = 0; i < p.count; i++) {
+            bool is_ceiling = p.axis[2][i] > 2.4 && fabsf(p.normal[i][2]) > 0.9f;
+            level += fabsf(p.normal[i][2]) > 0.9f;
+            inwards += fabsf(p.normal[i][2]) > 0.9f && is_ceiling == (p.normal[i][2] < 0);
+        }
+        if (inwards < level - level / 100)
+            fail_msg("%zu of the room's %zu level points show in", inwards, level);
+        spl_points_finish(&p);
+    }
+}
+
+/* What was seen from all sides, and lies on nothing: a ball, or a brick; from below `below` times as densely. */
+static void add_thing(struct scene *s, bool ball, int below)
+{
+    const int count = 20000;
+    const double half[3] = {1, 0.7, 0.6};
+    for (int i = 0; i < count; i++) {
+        double at[3], turn = 2 * M_PI * uniform(&s->random), z = 2 * uniform(&s->random) - 1, r = sqrt(1 - z * z);
+        int face = (int)(3 * uniform(&s->random));
+        for (int c = 0; c < 3; c++)
+            at[c] = half[c] * (c != face ? 2 * uniform(&s->random) - 1 : z < 0 ? -1 : 1);
+        if (ball)
+            memcpy(at, (double[3]){r * cos(turn), r * sin(turn), z}, sizeof at);
+        if (at[2] < 0 || uniform(&s->random) * below < 1)
+            add(s, at[0], at[1], at[2]);
+    }
+}
+
+/* Up says nothing of them: half of them showed in. */
+static void test_things_show_out(void **state)
+{
+    (void)state;
+    for (int ball = 0; ball < 2; ball++)
+        for (int below = 1; below < 4; below += 2)
+            for (uint64_t seed = 1; seed < 4; seed++) {
+                struct scene s = begin(2);
+                size_t out = 0;
+                s.random = seed;
+                add_thing(&s, ball, below);
+                struct spl_points p = finish(&s, 1);
+                for (size_t i = 0; i < p.count; i++) {
+                    double sum = 0;
+                    for (int c = 0; c < 3; c++)
+                        sum += (double)p.normal[i][c] * p.axis[c][i];
+                    out += sum > 0;
+                }
+                if (out < p.count - p.count / 100)
+                    fail_msg("%s, %d times as dense below, %d: %zu of %zu points show out", ball ? "ball" : "brick",
+                             below, (int)seed, out, p.count);
+                spl_points_finish(&p);
+            }
+}
+
+/* Decides over `count` components of a block each, between which are so many edges of which each end agrees wholly, or
+ * not at all where there are less than none. */
+static void decide(struct spl_component *components, size_t count, const int edges[][3], size_t edge_count)
+{
+    struct spl_orient_join join;
+    assert_int_equal(spl_orient_join_init(&join, components, count, NULL, NULL), 0);
+    for (size_t e = 0; e < edge_count; e++)
+        for (int i = 0; i < abs(edges[e][2]); i++)
+            assert_int_equal(spl_orient_join_add(&join, (uint32_t)edges[e][0], (uint32_t)edges[e][1],
+                                                 edges[e][2] < 0 ? -1 : 1, false, NULL),
+                             0);
+    assert_int_equal(spl_orient_join_decide(&join, NULL), 0);
+    spl_orient_join_finish(&join);
+}
+
 /* Of two pieces of ground as large as each other, the second of which shows downwards. */
-static bool turns_second(int64_t votes, bool anchored)
+static bool turns_second(int votes, bool anchored)
 {
     struct spl_component pieces[2] = {{.outward = 10000, .level = 10000, .anchored = anchored},
                                       {.outward = -9999, .level = -9999}};
-    struct spl_orient_edge edge = {0, 1, votes * (1 << 20)};
-    assert_int_equal(spl_orient_components(pieces, 2, &edge, 1, NULL, NULL), 0);
+    decide(pieces, 2, (const int[1][3]){{0, 1, votes}}, 1);
     assert_false(pieces[0].flip);
     return pieces[1].flip;
 }
@@ -180,18 +327,49 @@ static void test_strong_votes_outdo_up(void **state)
     assert_false(turns_second(400, false));
 }
 
+/* Two halves of a roof in two blocks, each too small for a say, and a gutter that tells both to show down. */
+static bool turns_roof(int seam, int odd)
+{
+    enum { ground, halves, gutter = halves + 2, pieces };
+    struct spl_component street[pieces] = {
+        {.outward = 10000, .level = 10000}, {.outward = 600, .own = 600}, {.outward = 600, .own = 600}, {.outward = 1}};
+    struct spl_orient_join join;
+    assert_int_equal(spl_orient_join_init(&join, street, pieces, NULL, NULL), 0);
+    for (int i = 0; i < seam; i++) /* the first ones disagree: noise */
+        assert_int_equal(spl_orient_join_add(&join, halves, halves + 1, i < odd ? -1 : 1, true, NULL), 0);
+    for (int i = 0; i < 15; i++)
+        for (uint32_t half = halves; half < gutter; half++)
+            assert_int_equal(spl_orient_join_add(&join, half, gutter, 1, false, NULL), 0);
+    for (int i = 0; i < 25; i++)
+        assert_int_equal(spl_orient_join_add(&join, ground, gutter, -1, false, NULL), 0);
+    assert_int_equal(spl_orient_join_decide(&join, NULL), 0);
+    spl_orient_join_finish(&join);
+    assert_false(street[ground].flip);
+    assert_int_equal(street[halves].flip, street[halves + 1].flip);
+    return street[halves].flip;
+}
+
+/* A roof has its say for up by all of its points, wherever blocks end. */
+static void test_blocks_cut_no_roof(void **state)
+{
+    (void)state;
+    assert_true(turns_roof(0, 0));
+    assert_false(turns_roof(12, 0));
+    assert_false(turns_roof(12, 3));
+}
+
 /* No wall alone outdoes up, all four do: a ceiling waits for those that hang together with its floor. */
 static void test_a_ceiling_hears_all_its_walls(void **state)
 {
     (void)state;
     enum { ground, ceiling, walls, pieces = walls + 4 };
     struct spl_component room[pieces] = {{.outward = 10001, .level = 10001}, {.outward = 10000, .level = 10000}};
-    struct spl_orient_edge edges[8];
-    for (uint32_t w = 0; w < 4; w++) {
-        edges[w] = (struct spl_orient_edge){ground, walls + w, (200 - (int64_t)w) * (1 << 20)};
-        edges[4 + w] = (struct spl_orient_edge){ceiling, walls + w, ((int64_t)w - 90) * (1 << 20)};
+    int edges[8][3];
+    for (int w = 0; w < 4; w++) {
+        memcpy(edges[w], (int[3]){ground, walls + w, 200 - w}, sizeof edges[w]);
+        memcpy(edges[4 + w], (int[3]){ceiling, walls + w, w - 90}, sizeof edges[w]);
     }
-    assert_int_equal(spl_orient_components(room, pieces, edges, 8, NULL, NULL), 0);
+    decide(room, pieces, (const int(*)[3])edges, 8);
     assert_int_not_equal(room[ceiling].flip, room[ground].flip);
     for (int w = walls; w < pieces; w++)
         assert_int_equal(room[w].flip, room[ground].flip);
@@ -200,9 +378,15 @@ static void test_a_ceiling_hears_all_its_walls(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_wall_turns_no_yard),           cmocka_unit_test(test_bushes_turn_no_road),
-        cmocka_unit_test(test_ceilings_agree_with_their_room), cmocka_unit_test(test_strong_votes_outdo_up),
+        cmocka_unit_test(test_a_wall_turns_no_yard),
+        cmocka_unit_test(test_bushes_turn_no_road),
+        cmocka_unit_test(test_ceilings_agree_with_their_room),
+        cmocka_unit_test(test_strong_votes_outdo_up),
+        cmocka_unit_test(test_a_bridge_shows_down_below),
+        cmocka_unit_test(test_rooms_show_in),
+        cmocka_unit_test(test_things_show_out),
         cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
+        cmocka_unit_test(test_blocks_cut_no_roof),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
