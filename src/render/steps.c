@@ -344,15 +344,40 @@ static void go_round(struct spl_frame_steps *steps)
     steps->prepared = false;
 }
 
+/* Waits no longer for tiles, which cannot be read or have not come in time. */
+static void do_without_tiles(struct spl_frame_job *job)
+{
+    spl_hold_release(&job->hold);
+    job->hurries = true;
+}
+
+static bool may_do_without_tiles(const struct spl_frame_steps *steps)
+{
+    return steps->wanted.without_late_tiles && spl_dataset_get_info(steps->dataset)->tiles && !steps->job.hurries;
+}
+
+void spl_frame_stop_waiting(struct spl_frame_steps *steps)
+{
+    if (may_do_without_tiles(steps))
+        do_without_tiles(&steps->job);
+}
+
 /* SPL_SLOT_PENDING: it waits. */
 static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    struct spl_error why = {0};
     if (spl_is_cancelled(steps->job.cancelled))
         return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
     int rc = spl_residency_upload(&steps->job.renderer->residency, err);
     if (!rc)
-        rc = spl_hold_poll(&steps->job.hold, err);
+        rc = spl_hold_poll(&steps->job.hold, &why);
+    if (rc == SPL_E_TIMEOUT && why.code && may_do_without_tiles(steps)) {
+        do_without_tiles(&steps->job);
+        rc = SPL_OK;
+    } else if (why.code) {
+        spl_fail(err, rc, "%s", why.message);
+    }
     if (rc >= 0 && clock >= deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "%s",
                         rc ? "the deadline passed before the frame's pages had come" : SPL_FRAME_LATE);

@@ -70,6 +70,7 @@ static struct flight *find(struct spl_service *service, const struct spl_view_re
     struct flight *flight;
     LIST_FOREACH(flight, &service->views->flights, link)
     if (!flight->request.planned && flight->request.view.partial == request->view.partial &&
+        flight->request.view.without_late_tiles == request->view.without_late_tiles &&
         spl_key_equal(&flight->key, key))
         return flight;
     return NULL;
