@@ -329,8 +329,8 @@ static int resample(struct spl_frame_steps *steps, struct spl_error *err)
         spl_around_look_up(steps->around, &steps->wanted, steps->resampled.images, steps->row, end);
     for (int layer = 0; layer < SPL_LAYER_COUNT && !steps->around; layer++)
         if (steps->resampled.images[layer].pixels)
-            spl_image_resample(&steps->frame.images[layer], steps->wanted.supersample, &steps->resampled.images[layer],
-                               steps->row, end);
+            spl_image_resample(&steps->frame.images[layer], steps->wanted.supersample, spl_view_get_rim(&steps->wanted),
+                               &steps->resampled.images[layer], steps->row, end);
     steps->row = end;
     return SPL_OK;
 }
