@@ -93,6 +93,20 @@ bool spl_dataset_is_late(const struct spl_dataset *dataset, uint32_t part)
     return part && atomic_load(&dataset->tiles->fault_count) && atomic_load(&dataset->tiles->list[part - 1].late);
 }
 
+bool spl_dataset_tell_late(const struct spl_dataset *dataset, char *out, size_t size)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    bool found = false;
+    if (!tiles || !atomic_load(&tiles->fault_count))
+        return false;
+    pthread_mutex_lock(&tiles->mutex);
+    for (uint32_t i = 0; i < tiles->count && !found; i++)
+        if ((found = tiles->list[i].fault && atomic_load(&tiles->list[i].late)))
+            snprintf(out, size, "%s", tiles->list[i].fault);
+    pthread_mutex_unlock(&tiles->mutex);
+    return found;
+}
+
 void spl_dataset_find_late(const struct spl_dataset *dataset, uint32_t part)
 {
     struct spl_error why = {0}, told = {0};

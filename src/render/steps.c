@@ -21,6 +21,7 @@
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
+#include "render/slot.h"
 #include "render/turns.h"
 #include "render/view.h"
 
@@ -356,10 +357,24 @@ static bool may_do_without_tiles(const struct spl_frame_steps *steps)
     return steps->wanted.without_late_tiles && spl_dataset_get_info(steps->dataset)->tiles && !steps->job.hurries;
 }
 
+/* For whoever asks why the view did not come. */
+static void note_late_tiles(struct spl_frame_steps *steps)
+{
+    const struct spl_hold *hold = &steps->job.hold;
+    for (size_t i = hold->come; hold->waits && i < hold->count; i++) {
+        const uint32_t part = spl_slot_get_part(steps->dataset, hold->slots[i]);
+        if (part && !hold->pages[hold->slots[i]].filled &&
+            spl_io_part_hangs(steps->job.renderer->residency.io, steps->dataset, part))
+            spl_dataset_find_late(steps->dataset, part);
+    }
+}
+
 void spl_frame_stop_waiting(struct spl_frame_steps *steps)
 {
     if (may_do_without_tiles(steps))
         do_without_tiles(&steps->job);
+    else if (!steps->wanted.without_late_tiles)
+        note_late_tiles(steps);
 }
 
 /* SPL_SLOT_PENDING: it waits. */

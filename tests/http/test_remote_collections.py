@@ -404,11 +404,18 @@ def test_a_server_that_says_nothing_costs_a_view_no_more_than_its_tile():
                 assert part.headers["Cache-Control"] == "no-store" and "ETag" not in part.headers, part.headers
                 assert least_s <= took_s < most_s, (where, took_s)
                 assert "nothing of it came" in reason(d)
-            assert view(d, IN[1] + "&wait=1").status == 503
+            whole = view(d, IN[1] + "&wait=1")
+            assert whole.status == 503 and "its tile tile-1.spld cannot be read" in whole.json()["detail"], whole.body
             assert good(d, IN[0]) == TRUTH[0]
             slow.delay_s = 0
             eventually(lambda: view(d, IN[1]).headers.get("Splatd-Complete") == "true", 60)
             assert good(d, IN[1]) == TRUTH[1] and good(d, ALL) == TRUTH[3] and good(d, IN[1] + "&wait=1") and not reason(d)
+        slow.delay_s = 25 + 40 * SANITIZED
+        with Daemon(REAL, "--watch", "0", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            whole = view(d, IN[1] + "&wait=1")  # the first that needs it
+            assert whole.status == 503 and "its tile tile-1.spld cannot be read" in whole.json()["detail"], whole.body
+            assert good(d, IN[0] + "&wait=1") == TRUTH[0] and "nothing of it came" in reason(d)
 
 
 def test_a_collection_of_one_tile_is_drawn_without_it():

@@ -76,6 +76,12 @@ static struct flight *find(struct spl_service *service, const struct spl_view_re
     return NULL;
 }
 
+void spl_ticket_fail_late(const struct ticket *ticket, double deadline_ms, struct spl_error *err)
+{
+    const struct flight *flight = ticket->flight;
+    spl_view_fail_late(flight ? &flight->request.view : NULL, flight ? flight->entry->dataset : NULL, deadline_ms, err);
+}
+
 static void board(struct ticket *ticket, struct flight *flight)
 {
     ticket->flight = flight;
