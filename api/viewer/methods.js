@@ -33,6 +33,19 @@ export const counts = ({name, textures, maps, primitives}, method, dataset) =>
       (dataset.primitives || !primitives),
   );
 
+const OF_COLORS = ["color_by", "range", "shade", "background"]; // and what the table says of others
+
+/** What of a view's setting its layer takes: what colours show, their shading and textures are of none but color. */
+export function taken(setting, layer = "color") {
+  if (layer === "color") return setting;
+  const isColors = (name) => OF_COLORS.includes(name) || findParameter(name)?.textures || findParameter(name)?.colors;
+  return Object.fromEntries(Object.entries(setting).filter(([name]) => !isColors(name)));
+}
+
+/** Does `method` draw the layer of `dataset`? Of points alone not every one has normals. */
+export const draws = (method, layer, dataset) =>
+  layer !== "normal" || Boolean(findMethod(method)?.normals) || dataset.methods.some((name) => findMethod(name)?.stand_in);
+
 /** What of a view's setting picks take, so that they find what the picture shows: its method, and what changes what is
  * seen where. */
 export function pickable(setting) {
@@ -40,10 +53,10 @@ export function pickable(setting) {
   return Object.fromEntries(names.filter((name) => name in setting).map((name) => [name, setting[name]]));
 }
 
-/** What draws `dataset` where `method` is asked for. */
-export function offered(method = table.default, dataset) {
+/** What draws the layer of `dataset` where `method` is asked for. */
+export function offered(method = table.default, dataset, layer) {
   const names = [method, findMethod(method)?.stand_in, table.default, ...dataset.methods];
-  return names.find((name) => dataset.methods.includes(name));
+  return names.find((name) => dataset.methods.includes(name) && draws(name, layer, dataset));
 }
 
 /** Sets a select, to a value that it may not offer yet. */

@@ -1,6 +1,6 @@
 // The renderer's own controls, for those who know it: layer, method and its parameters, level, samples, budget.
 
-import {Controls, choose, counts, findMethod, listed, offered} from "./methods.js";
+import {Controls, choose, counts, draws, findMethod, listed, offered} from "./methods.js";
 
 const $ = (id) => document.getElementById(id);
 const SETTINGS = ["layer", "method", "lod", "supersample", "budget"]; // and the parameters of methods
@@ -33,6 +33,8 @@ export class Picture {
       control = (name) => this.parameters.get(name) ?? $(name);
     const read = (name) => (before && !control(name).checkValidity() ? before[name] : control(name).value) ?? "";
     const settings = Object.fromEntries(all.map((name) => [name, read(name)]));
+    for (const option of $("method").options) option.disabled = !draws(option.value, settings.layer, this.dataset);
+    $("method").value = settings.method = offered(settings.method, this.dataset, settings.layer);
     for (const name of all) control(name).disabled = settings.budget !== "" && !["layer", "budget"].includes(name);
     for (const parameter of listed()) {
       const {name} = parameter,

@@ -6,6 +6,7 @@
 // "state" (detail: a Problem, or null when all is well).
 
 import {distance, fitted, fromParams, params, rounded, same, warp} from "./camera.js";
+import {taken} from "./methods.js";
 import {Problem, ask, query} from "./service.js";
 import {keptOf} from "./soft_setting.js";
 
@@ -170,7 +171,8 @@ export class Stage extends EventTarget {
   params(full = true) {
     const [width, height] = this.size;
     const ratio = Math.min(devicePixelRatio, 2, Math.sqrt(this.pixels / (width * height)));
-    const {layer, budget, ...setting} = this.settings;
+    const {layer, budget, ...given} = this.settings,
+      setting = taken(given, layer);
     const coarse = COARSE[this.coarse];
     // A budget chooses the rest, but in motion not the method nor how it fills: what changes from frame to frame flickers.
     const {lod, supersample, atoms, ...kept} = setting;
@@ -185,7 +187,7 @@ export class Stage extends EventTarget {
       layer,
       ...quality,
       ...this.planes(setting, back),
-      background: this.settings.background ?? getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", ""),
+      ...taken({background: this.settings.background ?? getComputedStyle(this.element).getPropertyValue("--ground").trim().replace("#", "")}, layer),
       format: "jpeg",
     };
   }

@@ -1,6 +1,7 @@
 // Has the service make a tour: begins it, says how far it is, offers what came out.
 
 import {isNumber} from "./link.js";
+import {taken} from "./methods.js";
 import {Problem, ask, askJson, download} from "./service.js";
 
 const POLL_MS = 700;
@@ -54,7 +55,7 @@ export function renderTours(tour, say) {
     if (![width, height].every((input) => input.reportValidity())) return;
     const settings = {
       ...Object.fromEntries(
-        Object.entries(setting)
+        Object.entries(taken(setting, setting.layer))
           .filter(([, value]) => value !== "")
           .map(([name, value]) => [name, isNumber(name) ? Number(value) : value]),
       ),

@@ -44,6 +44,9 @@ struct spl_view {
     bool surrounded;            /* a piece of something larger, as a map's tile is: what lies beyond the borders acts on
                                    pixels at them as in the middle (eye-dome lighting, smoothing, specks that close) */
     const struct spl_rays *rays; // may be NULL: of projection RAYS alone; borrowed while the view is rendered
+    bool without_late_tiles;    /* a tile of a collection whose server does not answer, or that spl_frame_stop_waiting()
+                                   waits for no longer, is drawn as it is from afar, as one that cannot be read is; else
+                                   why it does not come is an error */
 };
 
 /* Fills everything with defaults, of the camera near (0.01) and far (infinite) alone: the first method, color, lod 1,
@@ -257,6 +260,10 @@ SPL_API int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, 
 /* Does it wait for pages? A step has nothing to do then; others may have come, or room, after each
  * spl_renderer_upload() and step of another frame. Who renders another frame to its end instead lets it wait again. */
 SPL_API bool spl_frame_is_waiting(struct spl_frame_steps *steps);
+
+/* Its deadline is near: tiles that it waits for are drawn as they are from afar where the view is without_late_tiles;
+ * other pages are waited for. Idempotent. */
+SPL_API void spl_frame_stop_waiting(struct spl_frame_steps *steps);
 
 /* Of spl_view_get_samples(), what is still to be made: a guess for whoever shares out turns. */
 SPL_API uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);

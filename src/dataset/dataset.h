@@ -92,6 +92,16 @@ bool spl_dataset_has_changed(const struct spl_dataset *dataset);
  * is tried again by who needs it after 2 s, then after twice as long each time, a minute at most. Any thread. */
 bool spl_dataset_is_without(const struct spl_dataset *dataset, uint32_t part);
 
+/* The same, from then until something of it has been read, where it was its server that did not answer: who can do
+ * without need not wait for it. Any thread. */
+bool spl_dataset_is_late(const struct spl_dataset *dataset, uint32_t part);
+
+/* Why one of its tiles is late, the first in the order of the file; false: none is. Any thread. */
+bool spl_dataset_tell_late(const struct spl_dataset *dataset, char *out, size_t size);
+
+/* Finds it to be so: nothing of it came for as long as somebody could wait, and its read goes on. */
+void spl_dataset_find_late(const struct spl_dataset *dataset, uint32_t part);
+
 /* Finds the tile that has page `page` to be damaged: what was read of it by itself does not fit together. */
 void spl_dataset_spoil_tile(const struct spl_dataset *dataset, uint32_t page, const struct spl_error *why);
 

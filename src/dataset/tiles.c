@@ -207,8 +207,8 @@ int spl_tiles_borrow(const struct spl_dataset *dataset, struct spl_tile *tile, c
     while (tile->opening && !(rc = spl_dataset_check_cancelled(dataset, &why))) // who opens it has a deadline
         spl_condition_wait(&tiles->opened, &tiles->mutex, spl_now_ns() + look_around_ns);
     if (!rc && !tile->open) {
+        opened = !spl_remaining_ns(tile->rests_until_ns);
         rc = open_for_all(dataset, tile, &why);
-        opened = true;
     }
     if (!rc) {
         tile->users++;
@@ -229,7 +229,8 @@ void spl_tiles_give_back(const struct spl_dataset *dataset, struct spl_tile *til
     pthread_mutex_lock(&tiles->mutex);
     if (spoilt)
         tile->spoilt = true;
-    const bool stays = !tile->spoilt && !tile->fault && tiles->open_count <= tiles->open_most; // it may be put back
+    const bool replaced = tile->fault && !atomic_load(&tile->late); // it may be put back
+    const bool stays = !tile->spoilt && !replaced && tiles->open_count <= tiles->open_most;
     if (!--tile->users && !stays)
         surplus = take(tiles, tile);
     pthread_mutex_unlock(&tiles->mutex);

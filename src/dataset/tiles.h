@@ -27,6 +27,7 @@ struct spl_tile {
     /* What of it could not be read last and was not read since; it is as good as not there until then. */
     char *fault;       // owned; why; NULL: nothing
     uint64_t faulty;   /* which that was, as of spl_tiles_note() */
+    _Atomic bool late; /* its server did not answer: anything that is read of it ends that */
     uint64_t pause_ns; /* after which it is tried again, doubled each time */
     _Atomic uint64_t without_until_ns;
 };
@@ -83,8 +84,9 @@ static inline uint64_t spl_tile_page(uint32_t page, bool tables)
     return 2 * (uint64_t)page + tables;
 }
 
-/* How reading it went: SPL_E_CORRUPT is a fault of the tile, which is logged once, and SPL_OK of the same ends that;
- * other codes say nothing of it. The mutex is not held. */
+/* How reading it went: SPL_E_CORRUPT is a fault of the tile, which is logged once, and SPL_OK of the same ends that; so
+ * is SPL_E_TIMEOUT, its server did not answer, which any SPL_OK ends. Other codes say nothing of it. The mutex is not
+ * held. */
 void spl_tiles_note(const struct spl_dataset *dataset, struct spl_tile *tile, uint64_t what, int rc,
                     const struct spl_error *why);
 

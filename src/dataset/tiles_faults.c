@@ -1,6 +1,7 @@
 /* Tiles of a collection that cannot be read: missing, another one, damaged. A view that needs one draws the tile's leaf
  * instead of it and says that it is not complete; so each is remembered for a while, in which nobody looks for it, and
- * then tried again. Servers that do not answer are no fault of a tile. Any thread.
+ * then tried again. So is one whose server does not answer, which views that can do without it do not wait for until
+ * something of it has come. Any thread.
  *
  * Invariant: a tile has a fault from what was found wrong on until the same is found right, however long it rests: who
  * tries it again in between learns it anew. */
@@ -25,16 +26,18 @@ static void end_fault(struct spl_tiles *tiles, struct spl_tile *tile)
     free(tile->fault);
     tile->fault = NULL;
     tile->pause_ns = 0;
+    atomic_store(&tile->late, false);
     atomic_store(&tile->without_until_ns, 0);
     atomic_fetch_sub(&tiles->fault_count, 1);
 }
 
 /* True where it is news. The mutex is held. */
-static bool begin_fault(struct spl_tiles *tiles, struct spl_tile *tile, uint64_t what, const char *message)
+static bool begin_fault(struct spl_tiles *tiles, struct spl_tile *tile, uint64_t what, bool late, const char *message)
 {
     const uint64_t now_ns = spl_now_ns();
-    const bool news = !tile->fault || strcmp(tile->fault, message);
-    if (news) {
+    const bool other = !tile->fault || strcmp(tile->fault, message);
+    const bool news = other && !(late && atomic_load(&tile->late)); // how often it was asked is none
+    if (other) {
         char *fault = strdup(message);
         atomic_fetch_add(&tiles->fault_count, fault && !tile->fault);
         free(fault ? tile->fault : NULL);
@@ -47,6 +50,7 @@ static bool begin_fault(struct spl_tiles *tiles, struct spl_tile *tile, uint64_t
         atomic_store(&tile->without_until_ns, now_ns + tile->pause_ns);
     }
     tile->faulty = what;
+    atomic_store(&tile->late, late);
     return news;
 }
 
@@ -55,14 +59,14 @@ void spl_tiles_note(const struct spl_dataset *dataset, struct spl_tile *tile, ui
 {
     struct spl_tiles *tiles = dataset->tiles;
     bool news = false;
-    if (rc && rc != SPL_E_CORRUPT)
+    if (rc && rc != SPL_E_CORRUPT && rc != SPL_E_TIMEOUT)
         return;
     if (!rc && !atomic_load(&tiles->fault_count))
         return;
     pthread_mutex_lock(&tiles->mutex);
     if (rc)
-        news = begin_fault(tiles, tile, what, why->message);
-    else if ((news = tile->fault && (tile->faulty == what ||
+        news = begin_fault(tiles, tile, what, rc == SPL_E_TIMEOUT, why->message);
+    else if ((news = tile->fault && (tile->faulty == what || (atomic_load(&tile->late) && what != SPL_TILE_THERE) ||
                                      (tile->faulty == SPL_TILE_THERE && what == SPL_TILE_OPENED))))
         end_fault(tiles, tile);
     pthread_mutex_unlock(&tiles->mutex);
@@ -82,6 +86,35 @@ bool spl_dataset_is_without(const struct spl_dataset *dataset, uint32_t part)
         return false;
     const uint64_t until_ns = atomic_load(&dataset->tiles->list[part - 1].without_until_ns);
     return until_ns && spl_now_ns() < until_ns;
+}
+
+bool spl_dataset_is_late(const struct spl_dataset *dataset, uint32_t part)
+{
+    return part && atomic_load(&dataset->tiles->fault_count) && atomic_load(&dataset->tiles->list[part - 1].late);
+}
+
+bool spl_dataset_tell_late(const struct spl_dataset *dataset, char *out, size_t size)
+{
+    struct spl_tiles *tiles = dataset->tiles;
+    bool found = false;
+    if (!tiles || !atomic_load(&tiles->fault_count))
+        return false;
+    pthread_mutex_lock(&tiles->mutex);
+    for (uint32_t i = 0; i < tiles->count && !found; i++)
+        if ((found = tiles->list[i].fault && atomic_load(&tiles->list[i].late)))
+            snprintf(out, size, "%s", tiles->list[i].fault);
+    pthread_mutex_unlock(&tiles->mutex);
+    return found;
+}
+
+void spl_dataset_find_late(const struct spl_dataset *dataset, uint32_t part)
+{
+    struct spl_error why = {0}, told = {0};
+    if (spl_dataset_is_late(dataset, part))
+        return;
+    spl_fail(&why, SPL_E_TIMEOUT, "nothing of it came for as long as a view could wait");
+    spl_tiles_fail(dataset, &dataset->tiles->list[part - 1], &why, &told);
+    spl_tiles_note(dataset, &dataset->tiles->list[part - 1], SPL_TILE_OPENED, SPL_E_TIMEOUT, &told);
 }
 
 void spl_dataset_spoil_tile(const struct spl_dataset *dataset, uint32_t page, const struct spl_error *why)

@@ -15,6 +15,7 @@ struct job {
     const struct spl_image *from;
     struct spl_image *to;
     double scale;
+    uint32_t rim;
     uint32_t first; /* row */
 };
 
@@ -49,9 +50,10 @@ static struct axis cover(double at, double scale, uint32_t size)
 }
 
 /* Of pixel `at` of the wanted image. */
-static struct axis find_axis(double at, double scale, uint32_t size)
+static struct axis find_axis(const struct job *job, double at, uint32_t size)
 {
-    return scale < 1 ? place((at + 0.5) * scale, size) : cover(at * scale, scale, size);
+    const double scale = job->scale;
+    return scale < 1 ? place((at + 0.5) * scale + job->rim, size) : cover(at * scale + job->rim, scale, size);
 }
 
 static struct taps place_taps(const struct axis *x, const struct axis *y, uint32_t width)
@@ -162,9 +164,9 @@ static void resample_rows(void *context, size_t begin, size_t end, unsigned work
     for (uint32_t first = 0; first < j->to->width; first += strip) {
         const uint32_t count = j->to->width - first < strip ? j->to->width - first : strip;
         for (uint32_t x = 0; x < count; x++)
-            columns[x] = find_axis(first + x, j->scale, j->from->width);
+            columns[x] = find_axis(j, first + x, j->from->width);
         for (size_t y = j->first + begin; y < j->first + end; y++) {
-            struct axis row = find_axis((double)y, j->scale, j->from->height);
+            struct axis row = find_axis(j, (double)y, j->from->height);
             char *to = (char *)spl_image_row(j->to, y) + first * pixel_bytes;
             for (uint32_t x = 0; x < count; x++, to += pixel_bytes) {
                 struct taps t = place_taps(&columns[x], &row, j->from->width);
@@ -181,8 +183,9 @@ void spl_image_sample(const struct spl_image *small, double x, double y, float t
     sample(small, &t, false, tolerance, to);
 }
 
-void spl_image_resample(const struct spl_image *from, double scale, struct spl_image *to, uint32_t begin, uint32_t end)
+void spl_image_resample(const struct spl_image *from, double scale, uint32_t rim, struct spl_image *to, uint32_t begin,
+                        uint32_t end)
 {
-    struct job job = {.from = from, .to = to, .scale = scale, .first = begin};
+    struct job job = {.from = from, .to = to, .scale = scale, .rim = rim, .first = begin};
     spl_parallel_for(0, end - begin, 32, resample_rows, &job);
 }

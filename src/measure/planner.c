@@ -134,6 +134,27 @@ void spl_planner_finish(struct spl_planner *planner)
     *planner = (struct spl_planner){0};
 }
 
+void spl_planner_draw_bare(struct spl_planner *planner)
+{
+    size_t count = 0;
+    for (int own = 1; own >= 0; own--) // those that are drawn as they are first
+        for (size_t i = own ? 0 : count; i < planner->count; i++) {
+            struct spl_candidate candidate = planner->candidates[i];
+            const struct spl_method_info *method = spl_method_get(candidate.setting.method);
+            bool known = false;
+            if (own == method->needs_surface)
+                continue;
+            candidate.setting.method = own ? candidate.setting.method : method->stand_in;
+            for (size_t k = 0; k < count && !own; k++)
+                known |= spl_setting_equal(&planner->candidates[k].setting, &candidate.setting);
+            if (known)
+                continue;
+            planner->candidates[i] = planner->candidates[count];
+            planner->candidates[count++] = candidate;
+        }
+    planner->count = count;
+}
+
 double spl_planner_estimate(const struct spl_planner *planner, size_t index, uint32_t width, uint32_t height,
                             enum spl_layer layer)
 {

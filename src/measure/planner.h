@@ -63,6 +63,10 @@ int spl_planner_init(struct spl_planner *planner, const struct spl_profile *prof
                      bool (*usable)(const struct spl_setting *setting), struct spl_error *err);
 void spl_planner_finish(struct spl_planner *planner);
 
+/* Of a dataset without a surface: settings of a method that needs one become those of what is drawn instead, where that
+ * has none of its own, so that what is chosen is what is drawn, and learned of. */
+void spl_planner_draw_bare(struct spl_planner *planner);
+
 /* budget alone: the most accurate setting whose 98 % quantile stays below 1.1 times the budget and whose expected time
  * stays within it. psnr alone: the cheapest setting whose bound reaches it. Both: the cheapest that does both; if there
  * is none, the most accurate within the budget. What no setting meets gets the fastest (budget) or the most

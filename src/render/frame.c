@@ -23,25 +23,32 @@ static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
 
 /* A frame that waits is selected as if what is on its way were there: the walk that draws it then gets the same
  * answers. One that does not takes what is there, but for the first page. Of a tile of a collection that cannot be read
- * nothing is there, and its leaf stands in. */
+ * nothing is there, and its leaf stands in; so it does for one whose server does not answer where the view does
+ * without: such views do not wait for it until something of it has come. */
 static enum spl_select_answer ask_slot(struct spl_frame_job *job, uint32_t slot)
 {
     const uint32_t part = spl_slot_get_part(job->resident->dataset, slot);
+    const bool late = spl_dataset_is_late(job->resident->dataset, part);
+    const bool spares = part && (job->view->partial || job->view->without_late_tiles);
     struct spl_error why = {0};
-    if (spl_dataset_is_without(job->resident->dataset, part))
+    if (spl_dataset_is_without(job->resident->dataset, part) && (spares || !late))
         return SPL_SELECT_NO;
     if (job->counts && slot < spl_slot_of_tables(job->resident->dataset, 0))
         return !job->had || job->had[slot] ? SPL_SELECT_YES : SPL_SELECT_NO;
-    bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold)) || slot == SPL_FIRST_SLOT;
+    bool awaited = (!job->view->partial && !spl_hold_gives_up(&job->hold) && !(spares && (late || job->hurries))) ||
+                   slot == SPL_FIRST_SLOT;
     int rc = spl_is_cancelled(job->cancelled)
                  ? spl_fail(&why, SPL_E_CANCELLED, "the frame was cancelled")
                  : spl_residency_ask(&job->renderer->residency, job->resident, slot, awaited, &why);
     /* for which a coarser one stands in */
     bool no_room = rc == SPL_E_LIMIT || (rc == SPL_E_NOMEM && slot != SPL_FIRST_SLOT);
-    if (rc < 0 && !no_room && !spl_slot_may_miss(job->resident->dataset, slot, rc))
+    if (rc < 0 && !no_room && !spl_slot_may_miss(job->resident->dataset, slot, rc) && !(spares && rc == SPL_E_TIMEOUT))
         spl_fail(&job->page_error, rc, "%s", why.message);
-    if (rc == SPL_SLOT_PENDING && !awaited)
+    if (rc == SPL_SLOT_PENDING && !awaited) {
+        if (job->hurries && spares && spl_io_part_hangs(job->renderer->residency.io, job->resident->dataset, part))
+            spl_dataset_find_late(job->resident->dataset, part);
         return SPL_SELECT_LATER;
+    }
     return rc == SPL_SLOT_READY || rc == SPL_SLOT_PENDING ? SPL_SELECT_YES : SPL_SELECT_NO;
 }
 

@@ -24,6 +24,7 @@ struct spl_frame_job {
     struct spl_error page_error;   /* why a page could not be loaded, unless it was only the limit */
     struct spl_hold hold;          /* what the frame waits with, between its steps */
     struct spl_frame_whole whole;  /* of a tile that is cut */
+    bool hurries;                  /* tiles that are not there are not waited for any more */
     bool counts;                   /* nothing is drawn of what is walked: pages count as if they were there, */
     const bool *had;               // these alone, by slot; may be NULL: all
     struct spl_soft_pause pause;   /* what of the piece is walked */

@@ -21,6 +21,7 @@
 #include "render/frame.h"
 #include "render/method.h"
 #include "render/pick.h"
+#include "render/slot.h"
 #include "render/turns.h"
 #include "render/view.h"
 
@@ -356,8 +357,8 @@ static int resample(struct spl_frame_steps *steps, struct spl_error *err)
         spl_around_look_up(steps->around, &steps->wanted, steps->resampled.images, steps->row, end);
     for (int layer = 0; layer < SPL_LAYER_COUNT && !steps->around; layer++)
         if (steps->resampled.images[layer].pixels)
-            spl_image_resample(&steps->frame.images[layer], steps->wanted.supersample, &steps->resampled.images[layer],
-                               steps->row, end);
+            spl_image_resample(&steps->frame.images[layer], steps->wanted.supersample, spl_view_get_rim(&steps->wanted),
+                               &steps->resampled.images[layer], steps->row, end);
     steps->row = end;
     return SPL_OK;
 }
@@ -371,15 +372,54 @@ static void go_round(struct spl_frame_steps *steps)
     steps->prepared = false;
 }
 
+/* Waits no longer for tiles, which cannot be read or have not come in time. */
+static void do_without_tiles(struct spl_frame_job *job)
+{
+    spl_hold_release(&job->hold);
+    job->hurries = true;
+}
+
+static bool may_do_without_tiles(const struct spl_frame_steps *steps)
+{
+    return steps->wanted.without_late_tiles && spl_dataset_get_info(steps->dataset)->tiles && !steps->job.hurries;
+}
+
+/* For whoever asks why the view did not come. */
+static void note_late_tiles(struct spl_frame_steps *steps)
+{
+    const struct spl_hold *hold = &steps->job.hold;
+    for (size_t i = hold->come; hold->waits && i < hold->count; i++) {
+        const uint32_t part = spl_slot_get_part(steps->dataset, hold->slots[i]);
+        if (part && !hold->pages[hold->slots[i]].filled &&
+            spl_io_part_hangs(steps->job.renderer->residency.io, steps->dataset, part))
+            spl_dataset_find_late(steps->dataset, part);
+    }
+}
+
+void spl_frame_stop_waiting(struct spl_frame_steps *steps)
+{
+    if (may_do_without_tiles(steps))
+        do_without_tiles(&steps->job);
+    else if (!steps->wanted.without_late_tiles)
+        note_late_tiles(steps);
+}
+
 /* SPL_SLOT_PENDING: it waits. */
 static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    struct spl_error why = {0};
     if (spl_is_cancelled(steps->job.cancelled))
         return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
     int rc = spl_residency_upload(&steps->job.renderer->residency, err);
     if (!rc)
-        rc = spl_hold_poll(&steps->job.hold, err);
+        rc = spl_hold_poll(&steps->job.hold, &why);
+    if (rc == SPL_E_TIMEOUT && why.code && may_do_without_tiles(steps)) {
+        do_without_tiles(&steps->job);
+        rc = SPL_OK;
+    } else if (why.code) {
+        spl_fail(err, rc, "%s", why.message);
+    }
     if (rc >= 0 && clock >= deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "%s",
                         rc ? "the deadline passed before the frame's pages had come" : SPL_FRAME_LATE);

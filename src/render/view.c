@@ -53,15 +53,30 @@ bool spl_view_is_resampled(const struct spl_view *view)
     return view->supersample != floor(view->supersample);
 }
 
+uint32_t spl_view_get_rim(const struct spl_view *view)
+{
+    return view->surrounded && view->supersample < 1 && !spl_camera_is_bent(&view->camera);
+}
+
+static void coarsen(const struct spl_view *view, struct spl_camera *camera)
+{
+    const uint32_t rim = spl_view_get_rim(view);
+    spl_camera_coarsen(camera, view->supersample);
+    camera->width += 2 * rim;
+    camera->height += 2 * rim;
+    camera->cx += rim;
+    camera->cy += rim;
+}
+
 void spl_view_resize(struct spl_view *view)
 {
     const double scale = view->supersample;
     if (!spl_view_is_resampled(view))
         return;
+    coarsen(view, &view->camera);
     view->supersample = 1;
     view->shade.radius = (uint32_t)fmax(rint(view->shade.radius * scale), 1);
     view->fill.kernel = view->fill.kernel > 0 ? fmax(view->fill.kernel * scale, 3) : 0;
-    spl_camera_coarsen(&view->camera, scale);
 }
 
 /* What samples are taken of. */
@@ -69,7 +84,7 @@ static struct spl_camera coarsened(const struct spl_view *view)
 {
     struct spl_camera camera = view->camera;
     if (spl_view_is_resampled(view))
-        spl_camera_coarsen(&camera, view->supersample);
+        coarsen(view, &camera);
     return camera;
 }
 

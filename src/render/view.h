@@ -22,6 +22,9 @@ bool spl_supersample_is_known(double side);
 bool spl_view_is_resampled(const struct spl_view *view);
 /* To what is drawn of it: another size, where it is resampled. */
 void spl_view_resize(struct spl_view *view);
+/* How many pixels of that lie beyond each border: what is enlarged looks at those, and a piece of something larger has
+ * them. */
+uint32_t spl_view_get_rim(const struct spl_view *view);
 
 /* Do bent views take samples of the same lens, so that it is traced once? Poses may differ. */
 bool spl_view_shares_lens(const struct spl_view *a, const struct spl_view *b);

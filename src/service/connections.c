@@ -80,7 +80,19 @@ static bool has_ended_early(const struct connection *connection)
            socket.revents & (POLLRDHUP | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
 }
 
-/* Cuts connections whose phase lasts too long; MHD then sees them closed. */
+/* libmicrohttpd then sees it closed. A request whose rest does not come is told so, where its first line is there. */
+static void cut(const struct connection *connection)
+{
+    struct request *request = connection->request;
+    bool comes = connection->phase == PHASE_READING || connection->phase == PHASE_UPLOADING;
+    if (request && comes && !request->prepared && !request->suspended && !request->abandoned)
+        spl_refuse_on_socket(request, MHD_HTTP_REQUEST_TIMEOUT, request->started ? "body" : "headers",
+                             "the rest of the request did not come in time");
+    else
+        shutdown(connection->fd, SHUT_RDWR);
+}
+
+/* Cuts connections whose phase lasts too long. */
 static void on_slow_timer(uv_timer_t *timer)
 {
     struct spl_service *service = timer->data;
@@ -94,7 +106,7 @@ static void on_slow_timer(uv_timer_t *timer)
         if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
             continue;
         spl_count(service->counters, slow_closed);
-        shutdown(connection->fd, SHUT_RDWR);
+        cut(connection);
         connection->since_ns = now;
     }
 }

@@ -24,6 +24,7 @@ struct request {
     char *uri;         /* path, cut at '?'; NULL when the URI was too long */
     const char *query; /* inside uri, "" when there is none */
     const char *target_begin, *target_end; // of libmicrohttpd's own text; for framing.c alone
+    const char *chunks; // may be NULL; where libmicrohttpd keeps a body in chunks, for malformed.c alone
     char *body;        // may be NULL
     size_t body_length, body_capacity, body_seen;
     size_t body_counted; /* bytes of it in spl_http.body_bytes */

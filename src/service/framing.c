@@ -5,9 +5,8 @@
  * takes a line that begins with a colon for the end of the headers. Such a request is refused once its headers are
  * there, and the connection ends, so that nothing behind them is read.
  *
- * What cannot be done here, since libmicrohttpd acts before it asks: a single length that is no number gets its own
- * 400, an HTML page after two heads, and then the connection ends; a bare LF ends a line, also one that is a colon
- * alone. Owned by the loop's thread.
+ * What cannot be done here, since libmicrohttpd acts before it asks: a single length that is no number (malformed.c); a
+ * bare LF ends a line, also one that is a colon alone. Owned by the loop's thread.
  */
 #include <stdio.h>
 #include <string.h>
@@ -153,6 +152,8 @@ bool spl_check_framing(struct request *request, const char *line, const char *ve
     }
     if (!framing.fault[0])
         judge(&framing, version);
+    if (!framing.fault[0] && framing.codings)
+        request->chunks = framing.end;
     if (!framing.fault[0])
         return true;
     request->closes = true;

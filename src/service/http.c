@@ -173,11 +173,12 @@ static bool take_body(struct request *request, const char *data, size_t length)
     if (request->change)
         return spl_change_take(request, data, length);
     bool refused = request->response != NULL;
-    if (!refused && !spl_body_append(request, data, length) && request->body_seen <= spl_body_get_drained(request))
-        return false; // no memory
-    if (refused)
+    bool endless = spl_chunk_get_size(request, data) > spl_body_get_drained(request); // and need not go on coming
+    if (refused || endless)
         request->body_seen += length; // read and dropped
-    if (request->body_seen <= spl_body_get_drained(request))
+    else if (!spl_body_append(request, data, length) && request->body_seen <= spl_body_get_drained(request))
+        return false; // no memory
+    if (!endless && request->body_seen <= spl_body_get_drained(request))
         return true;
     spl_refuse_on_socket(request, refused ? request->status : MHD_HTTP_CONTENT_TOO_LARGE, "body",
                          "the body is not taken, and too long to be read to its end");
@@ -305,8 +306,9 @@ int spl_http_start(struct spl_service *service, struct spl_error *err)
 {
     struct spl_http *http = service->http;
     http->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, service, MHD_OPTION_LISTEN_SOCKET,
-        http->listen_fd, MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
+        MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ERROR_LOG, 0, NULL, NULL, on_request, service,
+        MHD_OPTION_EXTERNAL_LOGGER, spl_malformed_log, service, MHD_OPTION_LISTEN_SOCKET, http->listen_fd,
+        MHD_OPTION_URI_LOG_CALLBACK, on_uri, service, MHD_OPTION_NOTIFY_COMPLETED, on_completed,
         service, MHD_OPTION_NOTIFY_CONNECTION, spl_connection_notify, service, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)service->options->connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
         (unsigned)service->options->connections_per_address, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)idle_s,

@@ -4,6 +4,7 @@
 #define SPL_SERVICE_HTTP_H
 
 #include <microhttpd.h>
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/queue.h>
@@ -94,6 +95,11 @@ size_t spl_body_get_drained(const struct request *request); /* that are read at 
 char *spl_body_take(struct request *request);    /* the caller's, to free; may be NULL */
 void spl_body_drop(struct request *request);     /* idempotent, as the next */
 void spl_body_end_long(struct request *request); /* its place among long ones is another's */
+
+/* malformed.c: libmicrohttpd's log, where it says that it refuses a request by itself. */
+void spl_malformed_log(void *service, const char *format, va_list arguments);
+/* What the chunk that begins at `data` says of its size; 0: none begins there, or its size came earlier. */
+uint64_t spl_chunk_get_size(const struct request *request, const char *data);
 
 /* oversize.c: requests that libmicrohttpd would not answer are `abandoned`, answered past it. The first looks at the
  * target, still encoded; the second is for when the headers are there. */

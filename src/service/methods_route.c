@@ -23,7 +23,8 @@ static json_t *list_params(uint32_t params)
 static json_t *describe_method(const struct spl_method_info *method)
 {
     json_t *json =
-        json_pack("{s:s, s:s, s:b}", "name", method->name, "description", method->help, "textures", method->textures);
+        json_pack("{s:s, s:s, s:b, s:b}", "name", method->name, "description", method->help, "textures",
+                             method->textures, "normals", method->finds_normals);
     set(json, "stand_in", method->needs_surface ? json_string(spl_method_name(method->stand_in)) : json_null());
     set(json, "parameters", list_params(method->params));
     return json;

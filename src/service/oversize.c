@@ -9,6 +9,7 @@
 
 #include "service/exchange.h"
 #include "service/http.h"
+#include "service/ops/access_log.h"
 #include "service/ops/counters.h"
 #include "service/reply.h"
 #include "service/state.h"
@@ -25,7 +26,10 @@ enum {
 void spl_refuse_on_socket(struct request *request, unsigned status, const char *field, const char *detail)
 {
     bool head = !strcmp(request->method, MHD_HTTP_METHOD_HEAD); // the body's length is told all the same
-    char *text = spl_problem_print(request, status, "limit", field, detail), *reply = NULL;
+    if (!request->started) // its id is read with the headers
+        spl_request_set_id(request, MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, "X-Request-Id"));
+    const char *type = status == MHD_HTTP_BAD_REQUEST ? "input" : "limit";
+    char *text = spl_problem_print(request, status, type, field, detail), *reply = NULL;
     int length = !text
                      ? -1
                      : asprintf(&reply,

@@ -33,8 +33,7 @@ static void let_go(struct request *request)
 static void give_up(struct request *request)
 {
     struct spl_error err = {0};
-    spl_fail(&err, SPL_E_TIMEOUT, "the deadline of %llu ms passed before the reply was ready",
-             (unsigned long long)request->service->options->deadline_ms);
+    spl_ticket_fail_late(&request->ticket, (double)request->service->options->deadline_ms, &err);
     spl_count(request->service->counters, deadline_missed);
     spl_reply_error(request, &err);
     let_go(request);

@@ -383,6 +383,46 @@ def test_colours_and_shading():
         assert link(tab)["color_by"] == "height" and link(tab)["ramp"] == "turbo", link(tab)
 
 
+def asked(tab):
+    """The parameters of the newest view that was asked for."""
+    return dict(urllib.parse.parse_qsl(tab.run(VIEWS)[-1][0].split("?", 1)[1]))
+
+
+def test_layers_are_asked_for_with_what_they_take():
+    """Colours, their shading and background are of layer color; the link keeps them for who comes back to it."""
+    colors = {"color_by": "height", "shade": "edl", "range": "-5..5", "ramp": "turbo", "background": "ff0000"}
+    with page(f"{SITE}/{FACING}&edl_radius=3&{urllib.parse.urlencode(colors)}") as tab:
+        digest = settled(tab)
+        assert colors.items() <= asked(tab).items() and asked(tab)["edl_radius"] == "3", asked(tab)
+        for layer in "depth", "normal", "id":
+            tab.choose("#layer", layer)
+            digest = settled(tab, digest)
+            query = asked(tab)
+            assert query["layer"] == layer and not {*colors, "edl_radius"} & set(query), query
+            assert colors.items() <= link(tab).items(), link(tab)
+        tab.choose("#layer", "color")
+        settled(tab, digest)
+        assert colors.items() <= asked(tab).items(), asked(tab)
+
+
+def test_methods_that_draw_no_normals_of_bare_points_are_not_offered_for_them():
+    with tempfile.TemporaryDirectory() as folder:
+        cloud, bare = pathlib.Path(folder, "cloud.xyz"), pathlib.Path(folder, "bare.spld")
+        cloud.write_text("".join(f"0 {0.02 * (i % 100) - 1} {0.02 * (i // 100)}\n" for i in range(10000)))
+        subprocess.run([REAL, "pack", cloud, "--points-only", "-o", bare], check=True, stderr=subprocess.DEVNULL)
+        with Daemon(REAL, datasets=[bare]) as d, page(f"http://127.0.0.1:{d.port}/#dataset=bare&method=points") as tab:
+            digest = settled(tab)
+            assert asked(tab)["method"] == "points"
+            tab.choose("#layer", "normal")
+            digest = settled(tab, digest)
+            assert asked(tab)["method"] == "fill" and tab.run("document.querySelector('#notice').hidden"), asked(tab)
+            enabled = "[...document.querySelector('#method').options].filter(o => !o.disabled).map(o => o.value)"
+            assert tab.run(enabled) == ["fill"]
+            tab.choose("#layer", "color")
+            settled(tab, digest)
+            assert tab.run(enabled) == ["points", "fill"]
+
+
 def test_the_address_restores_the_picture():
     with page() as tab:
         x, y = middle(tab)

@@ -267,7 +267,7 @@ static void other_sizes_are_resampled(void **state)
             struct spl_image *image = &frame.images[layer], wanted = *image;
             const size_t bytes = 83 * 61 * spl_pixel_bytes(image->type);
             assert_non_null(wanted.pixels = malloc(bytes));
-            spl_image_resample(&whole.images[layer], sides[i], &wanted, 0, 61);
+            spl_image_resample(&whole.images[layer], sides[i], 0, &wanted, 0, 61);
             assert_memory_equal(wanted.pixels, image->pixels, bytes);
             free(wanted.pixels);
         }

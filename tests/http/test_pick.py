@@ -258,6 +258,19 @@ def test_bare_points():
             assert d.ask(f"{at}/view?{camera}&layer=normal&budget=1ms").status == 200
             tags = {d.ask(f"{at}/view?{camera}&{extra}").headers["ETag"] for extra in ("", "kernel=9", "visibility=none")}
             assert len(tags) == 3, tags
+            for what in ("view?", "view?layer=depth&", "view?clip=z<1&", "pick?x=32&y=24&", "tiles/0/0/0.png?"):  # one picture, one tag
+                own = "" if "tiles" in what else camera
+                replies = [d.ask(f"{at}/{what}{own}&method={method}{more}") for method, more in (
+                    ("splat", ""), ("nearest", ""), ("fill", ""), ("splat", "&margin=1.5"))]
+                assert len({reply.headers["ETag"] for reply in replies}) == len({reply.body for reply in replies}) == 1, what
+                assert all(reply.headers["Splatd-Cache"] == "hit" for reply in replies[1:]), what
+            for demand in ("budget=1s", "psnr=90", "budget=1s&method=splat", "budget=1s&method=nearest&lod=2", "budget=1s&supersample=2"):
+                reply = d.ask(f"{at}/view?{camera}&{demand}&format=raw")
+                chosen = dict(part.split("=") for part in reply.headers["Splatd-Chosen"].split("; "))
+                assert chosen["method"] in ("fill", "points"), (demand, chosen)
+                assert ("method=" not in demand) or chosen["method"] == "fill", (demand, chosen)
+                drawn = d.ask(f"{at}/view?{camera}&format=raw&method={chosen['method']}&lod={chosen['lod']}&supersample={chosen['supersample']}")
+                assert drawn.body == reply.body, (demand, chosen)
 
 
 run(globals())

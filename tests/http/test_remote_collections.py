@@ -291,7 +291,10 @@ def expect_coarse(daemon, what, said):
 
 
 def expect_late(daemon, what, said):
-    bad = view(daemon, IN[1])
+    coarse = view(daemon, IN[1])
+    assert coarse.status == 200 and coarse.headers["Splatd-Complete"] == "false" and "ETag" not in coarse.headers, (what, coarse.status, coarse.body)
+    assert "city: its tile tile-1.spld " in reason(daemon) and said in reason(daemon), (what, reason(daemon))
+    bad = view(daemon, IN[1] + "&wait=1")  # nothing but the whole picture will do
     assert bad.status == 503 and bad.headers["Retry-After"], (what, bad.status)
     detail = bad.json()["detail"]
     assert "city: its tile tile-1.spld " in detail and said in detail, (what, detail)
@@ -341,7 +344,7 @@ def test_a_tile_that_goes_while_it_is_read():
     data = DATA["tile-1"]
     faults = {"vanishes": (Later(data, 0, always=404), False, "answers 404"), "changes": (Later(data, 1, etag='"2"'), False, "changed while it was served"),
               "shrinks": (Later(data, 1, data=data[:1 << 20]), False, "changed while it was served"),
-              "is shut": (Later(data, 0, always=403), False, "answers 403"), "is down": (Later(data, 0, always="reset"), True, "given up after")}
+              "is shut": (Later(data, 0, always=403), False, "answers 403"), "is down": (Later(data, 0, always="reset"), True, "given up a")}
     with Server(files()) as server:
         for what, (file, late, said) in faults.items():
             server.files["/tile-1.spld"] = file
@@ -383,6 +386,55 @@ def test_a_tile_that_is_slow():
             slow.delay_s = 0
             eventually(lambda: view(d, IN[1] + "&wait=0").headers["Splatd-Complete"] == "true", 60)
             assert good(d, IN[1]) == TRUTH[1]
+
+
+def test_a_server_that_says_nothing_costs_a_view_no_more_than_its_tile():
+    """With the deadline near a view takes the tile as it is from afar; whoever comes then does not wait for it."""
+    slow = File(DATA["tile-1"], delay_s=25 + 40 * SANITIZED)
+    deadline_s = 6 + 20 * SANITIZED
+    with Server(files(tile_1=slow)) as server:
+        with Daemon(REAL, "--watch", "0", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            assert good(d, IN[0]) == TRUTH[0] and good(d, IN[2]) == TRUTH[2]
+            for where, least_s, most_s in ((IN[1], deadline_s / 2, deadline_s), (ALL, 0, deadline_s / 2), (IN[1], 0, deadline_s / 2)):
+                began = time.monotonic()
+                part = view(d, where)
+                took_s = time.monotonic() - began
+                assert part.status == 200 and part.headers["Splatd-Complete"] == "false", (where, part.status, part.body)
+                assert part.headers["Cache-Control"] == "no-store" and "ETag" not in part.headers, part.headers
+                assert least_s <= took_s < most_s, (where, took_s)
+                assert "nothing of it came" in reason(d)
+            whole = view(d, IN[1] + "&wait=1")
+            assert whole.status == 503 and "its tile tile-1.spld cannot be read" in whole.json()["detail"], whole.body
+            assert good(d, IN[0]) == TRUTH[0]
+            slow.delay_s = 0
+            eventually(lambda: view(d, IN[1]).headers.get("Splatd-Complete") == "true", 60)
+            assert good(d, IN[1]) == TRUTH[1] and good(d, ALL) == TRUTH[3] and good(d, IN[1] + "&wait=1") and not reason(d)
+        slow.delay_s = 25 + 40 * SANITIZED
+        with Daemon(REAL, "--watch", "0", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            whole = view(d, IN[1] + "&wait=1")  # the first that needs it
+            assert whole.status == 503 and "its tile tile-1.spld cannot be read" in whole.json()["detail"], whole.body
+            assert good(d, IN[0] + "&wait=1") == TRUTH[0] and "nothing of it came" in reason(d)
+
+
+def test_a_collection_of_one_tile_is_drawn_without_it():
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        (folder / "tile-0.spld").write_bytes(DATA["tile-0"])
+        splatd("collect", folder, "-o", folder / "city.spld")
+        one = (folder / "city.spld").read_bytes()
+        down = File(DATA["tile-0"], always=503)
+        with Server({"/city.spld": File(one), "/tile-0.spld": down}) as server:
+            with Daemon(REAL, "--watch", "0", "--deadline", "4000", datasets=[server.url("city.spld")]) as d:
+                opened(d)
+                coarse = view(d, IN[0])
+                assert coarse.status == 200 and coarse.headers["Splatd-Complete"] == "false", (coarse.status, coarse.body)
+                assert int(coarse.headers["Splatd-Splats"]) > 0  # what it is from afar
+                pick = d.ask(f"/v1/datasets/city/pick?{VIEW.replace('&format=png', '')}&{IN[0]}&x=80&y=60")
+                assert pick.status == 200, pick.body
+                down.always = None
+                eventually(lambda: view(d, IN[0]).headers.get("Splatd-Complete") == "true", 60)
 
 
 def test_a_collection_that_is_made_anew():

@@ -85,6 +85,7 @@ def test_methods_are_those_of_the_document():
         methods = {method["name"]: method for method in table["methods"]}
         assert methods["splat"]["textures"] and not methods["points"]["textures"]
         assert methods["splat"]["stand_in"] == "fill" and methods["fill"]["stand_in"] is None
+        assert [name for name, method in methods.items() if method["normals"]] == ["fill"]
         assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"] + SOFT + COLORS
         assert methods["points"]["parameters"] == SOFT + COLORS
         for parameter in table["parameters"]:

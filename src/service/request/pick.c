@@ -39,6 +39,7 @@ static int resolve(struct values *values, const struct spl_camera_defaults *defa
         return rc;
     spl_values_resolve_version(values, out);
     out->view.camera = *camera;
+    out->view.without_late_tiles = true;
     rc = spl_pick_view(&out->view, out->pick.x, out->pick.y, &out->view, err);
     return rc ? rc : spl_view_check(&out->view, err);
 }

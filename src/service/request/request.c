@@ -241,6 +241,7 @@ int spl_values_resolve(struct values *values, const struct spl_camera_defaults *
         return rc;
     spl_values_resolve_version(values, out);
     out->view.partial = get(values, PARAM_wait, 1) == 0;
+    out->view.without_late_tiles = !given(values, PARAM_wait);
     rc = spl_view_check(&out->view, err);
     return rc ? rc : check_cost(&out->view, limits, err);
 }

@@ -70,9 +70,16 @@ static struct flight *find(struct spl_service *service, const struct spl_view_re
     struct flight *flight;
     LIST_FOREACH(flight, &service->views->flights, link)
     if (!flight->request.planned && flight->request.view.partial == request->view.partial &&
+        flight->request.view.without_late_tiles == request->view.without_late_tiles &&
         spl_key_equal(&flight->key, key))
         return flight;
     return NULL;
+}
+
+void spl_ticket_fail_late(const struct ticket *ticket, double deadline_ms, struct spl_error *err)
+{
+    const struct flight *flight = ticket->flight;
+    spl_view_fail_late(flight ? &flight->request.view : NULL, flight ? flight->entry->dataset : NULL, deadline_ms, err);
 }
 
 static void board(struct ticket *ticket, struct flight *flight)

@@ -30,6 +30,8 @@ struct ticket {
  * given up with its last ticket. */
 int spl_flight_board(struct spl_service *service, struct ticket *ticket, struct spl_catalog_entry *entry,
                      const struct spl_view_request *request, const struct spl_key *key, struct spl_error *err);
+/* Why it is not there though its deadline of so many ms has passed, as an error. */
+void spl_ticket_fail_late(const struct ticket *ticket, double deadline_ms, struct spl_error *err);
 void spl_ticket_drop(struct ticket *ticket); /* harmless where nothing is claimed */
 
 #endif

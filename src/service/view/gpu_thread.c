@@ -238,9 +238,18 @@ static void drop_over(struct gpu *gpu)
         spl_gpu_leave(gpu, gpu->behind);
 }
 
-/* Has the job what it waited for? */
+/* Three quarters of its time are over: the rest is for drawing what there is. */
+static bool is_near_deadline(const struct spl_job *job)
+{
+    const struct spl_job *whole = spl_job_get_whole((struct spl_job *)(uintptr_t)job);
+    return spl_remaining_ns(whole->deadline_ns) <= (whole->deadline_ns - whole->accepted_ns) / 4;
+}
+
+/* Has the job what it waited for, or to do without? */
 static void look_after(struct spl_job *job)
 {
+    if (job->waits && is_near_deadline(job))
+        spl_frame_stop_waiting(job->steps);
     if (!job->waits || spl_frame_is_waiting(job->steps))
         return;
     uint64_t now = spl_now_ns();

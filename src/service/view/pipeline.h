@@ -86,6 +86,11 @@ struct spl_job {
 /* Releases everything and the job itself, of a whole once its last part is destroyed; NULL-safe. The loop's thread. */
 void spl_job_destroy(struct spl_job *job);
 
+/* Why a view of the dataset is not there though its deadline of so many ms has passed: with the name of a tile that is
+ * late, where it does not do without. Both may be NULL. */
+void spl_view_fail_late(const struct spl_view *view, const struct spl_dataset *dataset, double deadline_ms,
+                        struct spl_error *err);
+
 /* Who says whether it is dropped, and how long it has: the job, or what it is part of. */
 static inline struct spl_job *spl_job_get_whole(struct spl_job *job)
 {

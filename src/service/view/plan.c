@@ -40,6 +40,15 @@ struct spl_plan {
     double encoding[SPL_LAYER_COUNT][SPL_FORMAT_COUNT]; // guarded by: mutex; ms a megapixel
 };
 
+static int init_planner(const struct spl_plan *plan, const struct spl_profile *profile, struct spl_planner *planner,
+                        struct spl_error *err)
+{
+    int rc = spl_planner_init(planner, profile, NULL, err);
+    if (!rc && !plan->info->has_surface)
+        spl_planner_draw_bare(planner);
+    return rc;
+}
+
 int spl_plan_create(const char *dataset_path, const struct spl_dataset_info *info, struct spl_plan **out,
                     struct spl_error *err)
 {
@@ -52,7 +61,7 @@ int spl_plan_create(const char *dataset_path, const struct spl_dataset_info *inf
     spl_fail(&plan->refused, SPL_E_NOT_FOUND, "the profile of '%s' has not been read yet", info->id);
     pthread_mutex_init(&plan->mutex, NULL);
     pthread_mutex_init(&plan->planning, NULL);
-    if (!(plan->path = spl_profile_path(dataset_path, err)) || spl_planner_init(&plan->planner, NULL, NULL, err)) {
+    if (!(plan->path = spl_profile_path(dataset_path, err)) || init_planner(plan, NULL, &plan->planner, err)) {
         spl_plan_destroy(plan);
         return SPL_E_NOMEM;
     }
@@ -97,7 +106,7 @@ static void read_profile(struct spl_plan *plan)
         spl_log_warn("profile ignored: %s", err.message);
     if (rc)
         hide_place(plan, &err);
-    if (!spl_planner_init(&planner, rc ? NULL : &profile, NULL, &err)) {
+    if (!init_planner(plan, rc ? NULL : &profile, &planner, &err)) {
         spl_planner_finish(&plan->planner);
         plan->planner = planner;
     } else {
@@ -151,9 +160,10 @@ int spl_plan_apply(struct spl_plan *plan, struct spl_view_request *request, doub
     demand.soft_share = spl_soft_share_of_all(&request->view.soft, plan->info);
     demand.keep_atoms &= plan->info->atoms > 0;
     demand.keep_maps &= plan->info->maps > 0;
+    demand.kept.method = spl_method_for(demand.kept.method, plan->info);
     if (!plan->info->has_surface && request->layer == SPL_LAYER_NORMAL && !demand.keep_method) {
         demand.keep_method = true; /* not every method has normals of bare points */
-        demand.kept.method = SPL_METHOD_DEFAULT;
+        demand.kept.method = spl_method_for(SPL_METHOD_DEFAULT, plan->info);
     }
     pthread_mutex_lock(&plan->mutex);
     demand.extra_ms = *encoding_of(plan, request) * megapixels(request) * encoding_margin;
@@ -177,7 +187,7 @@ void spl_plan_learn(struct spl_plan *plan, const struct spl_view_request *reques
     const struct spl_view *view = &request->view;
     if (view->clip.count || spl_camera_is_bent(&view->camera))
         return; /* profiles are of whole datasets and pinholes */
-    uint32_t params = spl_method_get(spl_method_for(view->method, plan->info))->params;
+    uint32_t params = spl_method_get(view->method)->params;
     params &= ~(SPL_PARAM_BIT(atoms) | SPL_PARAM_BIT(maps)); /* which are settings */
     params &= ~SPL_PARAMS_OF_ALL;
     for (int i = 0; i < SPL_PARAM_COUNT; i++)

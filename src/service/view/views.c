@@ -125,6 +125,8 @@ int spl_view_check_dataset(struct spl_view_request *view, const struct spl_datas
         return spl_fail_field(err, SPL_E_NOT_FOUND, "v",
                               "version %016llx of dataset '%s' is not served; it is %016llx now",
                               (unsigned long long)view->version, info->id, (unsigned long long)info->version);
+    if (!view->planned) // what is drawn is what is said, kept and learned of
+        view->view.method = spl_method_for(view->view.method, info);
     if (view->picks && !spl_method_has_normals(view->view.method, info)) // the reply says null
         view->view.layers &= ~(1u << SPL_LAYER_NORMAL);
     int rc = view->planned ? spl_view_check_colors(&view->view, info, err) // it may get another method

@@ -79,12 +79,12 @@ def _chunks(data, at):
 
 
 def _behind_double_head(data, at):
-    """Where the reply at `at` really begins. libmicrohttpd 0.9.75 refuses a Content-Length that is no number, and cookies that its
-    pool has no room for, with its head twice, so that Content-Length ends within the text; the connection is closed behind it and nothing is read out of step."""
+    """Where the reply at `at` really begins. Where several requests could be meant, libmicrohttpd 0.9.75 refuses cookies that its
+    pool has no room for itself, with its head twice; the connection is closed behind it and nothing is read out of step."""
     end = data.find(b"\r\n\r\n", at) + 4
     head = data[at:end]
     double = end > 4 and data.startswith(head, end) and b"X-Request-Id" not in head and b"\r\nConnection: close\r\n" in head
-    return end if double and re.match(rb"HTTP/1\.1 4(00|13|31) ", head) else at
+    return end if double and head.startswith(b"HTTP/1.1 431 ") else at
 
 
 def read_reply(data, at, method, ended):
@@ -108,7 +108,7 @@ def read_reply(data, at, method, ended):
         if coding or length not in (None, "0"):
             raise Fault(f"a {status} with a body")
         return Reply(status, headers, b"", at, True)
-    unread = status >= 400 and "x-request-id" not in headers or status == 414  # nobody had read the method yet
+    unread = status in (400, 408, 413, 414, 431)  # nobody may have read the method yet
     if status == 304 or method == "HEAD" and not (unread and at < len(data) and headers.get("connection") == "close"):
         return Reply(status, headers, b"", at, True)
     if coding is not None:
