@@ -17,7 +17,8 @@
 #define SPL_F32 float
 #endif
 
-/* A chunk: the unit of culling and decoding. Its splats lie in pruning order: the first n are an even subsample. */
+/* A chunk: the unit of culling and decoding. Its splats lie in pruning order: the first runs are an even subsample, and
+ * so nearly is what is drawn of the one behind them, whose SPL_LANES drawn at a time are of about one size. */
 #define SPL_CHUNK_SPLATS 128
 /* A draw-list entry is a run of splats of one chunk: chunk index << 2 | run. SPL_LANES invocations share an entry and
  * draw its splats in steps, so that the chunk's header is loaded once for several splats. Counts are multiples of

@@ -1,4 +1,4 @@
-/* One node's splats, cut into compact chunks and put in pruning order. */
+/* One node's splats, cut into compact chunks and put in pruning order, and that into the order in which lanes draw. */
 #ifndef SPL_PACK_CHUNKS_H
 #define SPL_PACK_CHUNKS_H
 
