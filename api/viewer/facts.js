@@ -34,7 +34,8 @@ export function showFrame(frame, {layer}, dataset) {
     );
   const {frame: rendering, encode = 0} = frame.stages; // nothing was rendered for what comes from a cache
   const took = rendering === undefined ? "kept from before" : `${(rendering + encode).toFixed(0)} ms`;
-  $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? "" : ", coarse"}`;
+  const lacks = frame.whole || frame.pending ? "" : dataset.tiles ? ", tiles missing" : ", parts missing";
+  $("facts").textContent = `${frame.width} × ${frame.height}, ${took}${frame.full ? lacks : ", coarse"}`;
   if (!frame.full) return;
   const {chosen, promised, demand} = frame;
   $("chosen").textContent = chosen

@@ -29,6 +29,7 @@ function readHeaders(headers) {
     near: number("Splatd-Depth-Near"),
     far: number("Splatd-Depth-Far"),
     pending: headers.get("Splatd-Pending") === "true",
+    whole: headers.get("Splatd-Complete") !== "false",
   };
 }
 

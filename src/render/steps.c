@@ -418,7 +418,10 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
         do_without_tiles(&steps->job);
         rc = SPL_OK;
     } else if (why.code) {
-        spl_fail(err, rc, "%s", why.message);
+        char late[sizeof why.message] = "";
+        note_late_tiles(steps);
+        bool told = rc == SPL_E_TIMEOUT && spl_dataset_tell_late(steps->dataset, late, sizeof late);
+        spl_fail(err, rc, "%s%s%s", why.message, told ? ": " : "", late);
     }
     if (rc >= 0 && clock >= deadline_ns)
         return spl_fail(err, SPL_E_TIMEOUT, "%s",

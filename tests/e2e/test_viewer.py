@@ -1386,6 +1386,18 @@ def lonlat(world):
     return ",".join(map(repr, reply.json()["position"]))
 
 
+def test_that_tiles_are_missing():
+    """What stands there from afar is no picture of what the scan shows: the page says so."""
+    with tempfile.TemporaryDirectory() as top:
+        folder = pathlib.Path(top)
+        shutil.copy(WALL, folder / "tile.spld")
+        subprocess.run([REAL, "collect", folder / "tile.spld", "-o", folder / "city.spld"], check=True, stderr=subprocess.DEVNULL)
+        (folder / "tile.spld").unlink()
+        with Daemon(REAL, datasets=[folder / "city.spld"]) as other:
+            with page(f"http://127.0.0.1:{other.port}/#dataset=city&eye=3,0,1&target=0,0,1&up=0,0,1&fov=50") as tab:
+                tab.until("document.querySelector('#facts').textContent.endsWith(', tiles missing')")
+
+
 def test_longitude_and_latitude():
     if os.environ["SPLATD_PROJ"] != "1":
         return

@@ -416,6 +416,10 @@ def test_a_server_that_says_nothing_costs_a_view_no_more_than_its_tile():
             whole = view(d, IN[1] + "&wait=1")  # the first that needs it
             assert whole.status == 503 and "its tile tile-1.spld cannot be read" in whole.json()["detail"], whole.body
             assert good(d, IN[0] + "&wait=1") == TRUTH[0] and "nothing of it came" in reason(d)
+            command = [REAL, "render", server.url("city.spld"), *(word for part in IN[1].split("&") for word in ("--" + part).split("=", 1)),
+                       "-o", "-", "--format", "png"]
+            done = subprocess.run(command, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            assert done.returncode == 1 and "tile-1.spld" in done.stderr, done.stderr
 
 
 def test_a_collection_of_one_tile_is_drawn_without_it():
