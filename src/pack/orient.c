@@ -281,6 +281,7 @@ static uint32_t list_components(struct spl_orient *orient, const struct graph *g
         double area = get_area(g, orient->usual, i);
         c->outward += area * spl_eyes_get_outward(g->points, g->begin + i);
         c->area += area;
+        c->count++;
         c->own += orient->own[i];
     }
     for (uint32_t c = 0; c < count; c++)

@@ -18,8 +18,10 @@ struct spl_component {
     double area;    /* of its points, in the same */
     int64_t level;  /* area of its large level pieces that shows up, less what shows down; 0: it has no say */
     int32_t own;    /* the same of the piece that goes on, which is not among them, however small it is here */
+    uint32_t count; /* of its points */
     uint32_t tree;  /* by spl_orient_join_decide(): what it holds together with has the same number */
     bool anchored;  /* holds a point whose normal was given or faces its station: the set is never turned */
+    bool unsure;    /* by the same: its tree shows up little more than down */
     bool doubtful;  /* by the same: as much of its tree shows up as down */
     uint8_t flip;   /* by the same: 1 = turn the set's normals */
 };

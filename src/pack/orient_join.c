@@ -13,7 +13,7 @@
 #include "base/memory.h"
 #include "pack/spill.h"
 
-static const double doubt = 0.02, least = 256; /* of a tree's area; usual points of such a tree */
+static const double unsure = 0.25, doubt = 0.02, least = 256; /* of a tree's area; usual points of such a tree */
 
 int spl_orient_join_init(struct spl_orient_join *join, struct spl_component *components, size_t count,
                          struct spl_spill *spill, struct spl_error *err)
@@ -116,7 +116,8 @@ int spl_orient_join_decide(struct spl_orient_join *join, struct spl_error *err)
         uint32_t root = spl_forest_find_root(f, i, &sign);
         bool anchored = f->held[root] & SPL_TREE_ANCHORED;
         join->components[i].flip = sign ^ (!anchored && outward[root] < 0);
-        join->components[i].doubtful = !anchored && area[root] > least && fabs(outward[root]) < doubt * area[root];
+        join->components[i].unsure = !anchored && area[root] > least && fabs(outward[root]) < unsure * area[root];
+        join->components[i].doubtful = join->components[i].unsure && fabs(outward[root]) < doubt * area[root];
         join->components[i].tree = root;
     }
     spl_spill_free(join->spill, spare);

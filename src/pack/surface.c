@@ -198,13 +198,15 @@ static struct spl_component *component_of(const struct surface *s, size_t i)
     return &s->components[s->blocks[i / block_points].first_component + s->label[i]];
 }
 
-/* What is closed all around has as much above as below, so up says nothing of it: it shows outwards. */
+/* What is closed all around has as much above as below, so up says little of it: a room shows in, a thing out. Of large
+ * components some points stand for all. */
 static int turn_shells(struct surface *s, size_t count, struct spl_error *err)
 {
+    enum { many = 4096, some = 8 };
     const struct spl_points *p = s->points;
     bool any = false;
     for (size_t c = 0; c < count; c++)
-        any |= s->components[c].doubtful;
+        any |= s->components[c].unsure;
     if (!any || p->eye_count)
         return SPL_OK;
     struct spl_shell *shells = spl_alloc(count, sizeof *shells, err); /* of each tree */
@@ -212,16 +214,18 @@ static int turn_shells(struct surface *s, size_t count, struct spl_error *err)
         return SPL_E_NOMEM;
     for (size_t i = 0; i < p->count; i++) {
         const struct spl_component *c = component_of(s, i);
-        double place[3];
+        const bool sampled = c->count > many;
+        double place[3], area = (double)p->radius[i] * p->radius[i] * (sampled ? some : 1);
         if (i % 4096 == 0)
             spl_spill_keep_bound(p->spill);
-        for (int x = 0; c->doubtful && x < 3; x++)
+        if (!c->unsure || (sampled && i % some))
+            continue;
+        for (int x = 0; x < 3; x++)
             place[x] = spl_points_at(p, x, i) - spl_points_at(p, x, 0);
-        if (c->doubtful)
-            spl_shell_add(&shells[c->tree], place, p->normal[i], (double)p->radius[i] * p->radius[i], c->flip);
+        spl_shell_add(&shells[c->tree], place, p->normal[i], p->up, area, c->flip);
     }
     for (size_t c = 0; c < count; c++)
-        s->components[c].flip ^= spl_shell_shows_in(&shells[s->components[c].tree]);
+        s->components[c].flip ^= spl_shell_is_inside_out(&shells[s->components[c].tree], s->components[c].doubtful);
     free(shells);
     return SPL_OK;
 }

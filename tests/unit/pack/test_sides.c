@@ -249,8 +249,142 @@ static void test_rooms_show_in(void **state)
     }
 }
 
+/* How many of the points that lie on the box from `min` to `max` show into it. */
+static size_t count_inwards(const struct spl_points *p, const double min[3], const double max[3], size_t *on)
+{
+    size_t inwards = 0;
+    *on = 0;
+    for (size_t i = 0; i < p->count; i++)
+        for (int face = 0; face < 6; face++) {
+            const double *end = face % 2 ? max : min;
+            float n = p->normal[i][face / 2];
+            if (fabs(p->axis[face / 2][i] - end[face / 2]) < 2 * noise && fabsf(n) > 0.9f) {
+                ++*on;
+                inwards += face % 2 ? n < 0 : n > 0;
+            }
+        }
+    return inwards;
+}
+
+/* Up says nothing, or the wrong thing, of a room that nobody stands beside: with a door, through which some of the
+ * floor before it is seen, and crates that hide a part of its own. */
+static void test_rooms_are_no_things(void **state)
+{
+    (void)state;
+    for (int crates = 0; crates < 3; crates++)
+        for (uint64_t seed = 1; seed < 4; seed++) {
+            struct scene s = begin(2);
+            const double low[3] = {0}, high[3] = {5, 4, 2.5};
+            size_t on;
+            s.random = seed;
+            for (int crate = 0; crate < crates; crate++)
+                add_solid(&s, (double[3]){3 * crate + 0.5, 1.2, -step},
+                          (double[3]){3 * crate + 1.4, 3, crate ? 0.8 : 1.2}, all_faces - bottom);
+            add_box(&s, low, high, all_faces - 1);
+            add_sheet(&s, low, (double[3]){0, 1, 2.5});
+            add_sheet(&s, (double[3]){0, 2, 0}, (double[3]){0, 4, 2.5});
+            add_sheet(&s, (double[3]){0, 1, 2}, (double[3]){0, 2, 2.5});
+            add_sheet(&s, (double[3]){-1, 1, 0}, (double[3]){0, 2, 0});
+            struct spl_points p = finish(&s, 2);
+            size_t inwards = count_inwards(&p, low, high, &on);
+            assert_true(on > 25000);
+            if (inwards < on - on / 100)
+                fail_msg("%d crates, %d: %zu of the room's %zu points show in", crates, (int)seed, inwards, on);
+            spl_points_finish(&p);
+        }
+}
+
+/* Things as high as a room, on ground that is not there: a cabinet of whose underside only the rim is seen, a tower
+ * whose upper half juts out, and a statue that leans over its foot. */
+static void add_high_thing(struct scene *s, int which)
+{
+    if (which == 0) {
+        add_solid(s, (double[3]){0.1, 0.1, -0.1}, (double[3]){1.9, 1.4, 0.05}, 0);
+        add_box(s, (double[3]){0}, (double[3]){2, 1.5, 2.5}, all_faces);
+    }
+    if (which == 1) {
+        add_solid(s, (double[3]){0, -0.25, 0}, (double[3]){2, 1.75, 5}, all_faces - bottom - top);
+        add_box(s, (double[3]){-0.4, -0.65, 5}, (double[3]){2.4, 2.15, 9}, all_faces);
+    }
+    for (int i = 0; which == 2 && i < 30000; i++) {
+        double z = 3 * uniform(&s->random), turn = 2 * M_PI * uniform(&s->random);
+        double r = 0.4 + 0.25 * sin(3 * z) + (z > 2.6 ? (sqrt(fmax(0.16 - (z - 2.6) * (z - 2.6), 0)) - 0.4) : 0);
+        add(s, 1 + r * cos(turn) + 0.3 * z, 0.75 + r * sin(turn), z);
+    }
+}
+
+static void test_high_things_show_out(void **state)
+{
+    (void)state;
+    for (int which = 0; which < 3; which++)
+        for (uint64_t seed = 1; seed < 4; seed++) {
+            struct scene s = begin(2);
+            size_t out = 0, wall = 0;
+            s.random = seed;
+            add_high_thing(&s, which);
+            struct spl_points p = finish(&s, 1);
+            for (size_t i = 0; i < p.count; i++) {
+                double z = p.axis[2][i], x = p.axis[0][i] - (which == 2 ? 1 + 0.3 * z : 1), y = p.axis[1][i] - 0.75;
+                bool is_wall = z > 0.1 && z < 2.4 && fabsf(p.normal[i][2]) < 0.7f;
+                wall += is_wall;
+                out += is_wall && x * (double)p.normal[i][0] + y * (double)p.normal[i][1] > 0;
+            }
+            assert_true(wall > 3000);
+            if (out < wall - wall / 50)
+                fail_msg("%d, %d: %zu of %zu points show out", which, (int)seed, out, wall);
+            spl_points_finish(&p);
+        }
+}
+
+/* A girder that nobody saw the middle of from below, nor what it lies on. */
+static void test_a_girder_shows_out(void **state)
+{
+    (void)state;
+    struct scene s = begin(2);
+    size_t wrong = 0, level = 0;
+    add_box(&s, (double[3]){0}, (double[3]){36, 2.5, 1.9}, all_faces - bottom);
+    for (int end = 0; end < 2; end++)
+        add_sheet(&s, (double[3]){27 * end, 0, 0}, (double[3]){27 * end + 9, 2.5, 0});
+    struct spl_points p = finish(&s, 2);
+    for (size_t i = 0; i < p.count; i++) {
+        level += fabsf(p.normal[i][2]) > 0.9f;
+        wrong += fabsf(p.normal[i][2]) > 0.9f && (p.axis[2][i] < 1) == (p.normal[i][2] > 0);
+    }
+    assert_true(level > 40000);
+    if (wrong > level / 100)
+        fail_msg("%zu of the girder's %zu level points show in", wrong, level);
+    spl_points_finish(&p);
+}
+
+/* Two houses on the ground, with eaves whose undersides are seen, as from a car and from the air. */
+static void test_houses_stand_on_ground(void **state)
+{
+    (void)state;
+    for (int air = 0; air < 2; air++) {
+        struct scene s = begin(2);
+        size_t wrong = 0, level = 0;
+        add_solid(&s, (double[3]){1, 1, 0}, (double[3]){4, 4, 3}, air ? 0 : all_faces - bottom - top);
+        add_solid(&s, (double[3]){6, 1, 0}, (double[3]){9, 4, 3}, air ? 0 : all_faces - bottom - top);
+        add_sheet(&s, (double[3]){0}, (double[3]){10, 6, 0});
+        for (int house = 0; house < 2; house++)
+            add_box(&s, (double[3]){5 * house + 0.5, 0.5, 3}, (double[3]){5 * house + 4.5, 4.5, 3.4},
+                    air ? top : all_faces);
+        struct spl_points p = finish(&s, 1);
+        for (size_t i = 0; i < p.count; i++) {
+            double z = p.axis[2][i];
+            bool under = z > 2.95 && z < 3.05;
+            level += fabsf(p.normal[i][2]) > 0.9f;
+            wrong += fabsf(p.normal[i][2]) > 0.9f && under == (p.normal[i][2] > 0);
+        }
+        assert_true(level > 20000);
+        if (wrong > level / 100)
+            fail_msg("%s: %zu of %zu level points show to the wrong side", air ? "air" : "car", wrong, level);
+        spl_points_finish(&p);
+    }
+}
+
 /* What was seen from all sides, and lies on nothing: a ball, or a brick; from below `below` times as densely. */
-static void add_thing(struct scene *s, bool ball, int below)
+static void add_thing(struct scene *s, bool ball, int below, double scale)
 {
     const int count = 20000;
     const double half[3] = {1, 0.7, 0.6};
@@ -262,21 +396,21 @@ static void add_thing(struct scene *s, bool ball, int below)
         if (ball)
             memcpy(at, (double[3]){r * cos(turn), r * sin(turn), z}, sizeof at);
         if (at[2] < 0 || uniform(&s->random) * below < 1)
-            add(s, at[0], at[1], at[2]);
+            add(s, scale * at[0], scale * at[1], scale * at[2]);
     }
 }
 
-/* Up says nothing of them: half of them showed in. */
+/* Up says nothing of them: half of them showed in. Balls are as large as a room, too, and bricks in millimetres. */
 static void test_things_show_out(void **state)
 {
     (void)state;
     for (int ball = 0; ball < 2; ball++)
         for (int below = 1; below < 4; below += 2)
-            for (uint64_t seed = 1; seed < 4; seed++) {
+            for (uint64_t seed = 1; seed < 7; seed++) {
                 struct scene s = begin(2);
                 size_t out = 0;
                 s.random = seed;
-                add_thing(&s, ball, below);
+                add_thing(&s, ball, below, seed < 4 ? 1 : ball ? 3 : 300);
                 struct spl_points p = finish(&s, 1);
                 for (size_t i = 0; i < p.count; i++) {
                     double sum = 0;
@@ -384,6 +518,10 @@ int main(void)
         cmocka_unit_test(test_strong_votes_outdo_up),
         cmocka_unit_test(test_a_bridge_shows_down_below),
         cmocka_unit_test(test_rooms_show_in),
+        cmocka_unit_test(test_rooms_are_no_things),
+        cmocka_unit_test(test_high_things_show_out),
+        cmocka_unit_test(test_a_girder_shows_out),
+        cmocka_unit_test(test_houses_stand_on_ground),
         cmocka_unit_test(test_things_show_out),
         cmocka_unit_test(test_a_ceiling_hears_all_its_walls),
         cmocka_unit_test(test_blocks_cut_no_roof),
