@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <xxhash.h>
 
+#include "dataset/dataset.h"
 #include "image/load.h"
 #include "render/frustum.h"
 
@@ -103,7 +104,10 @@ static int render_self(const struct spl_reference *r, const struct spl_named_vie
                               named->name, why.message);
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
-    if (!frame.stats.complete)
+    struct spl_faulty_tile faulty;
+    if (!frame.stats.complete && spl_dataset_list_faulty(dataset, &faulty, 1))
+        rc = spl_fail(err, SPL_E_INPUT, "the reference of view '%s' needs every tile: %.400s", named->name, faulty.reason);
+    else if (!frame.stats.complete)
         rc = spl_fail(err, SPL_E_LIMIT,
                       "the reference of view '%s' needs every page of the dataset on the device; raise "
                       "--memory-limit, or compare with images of your own",

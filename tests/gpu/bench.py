@@ -111,6 +111,9 @@ with tempfile.TemporaryDirectory() as folder:
     for way in ("--textures", "--left-out"):  # these go through every splat
         done = run("bench", way, folder / "yards.spld", "-o", folder / "none")
         assert done.returncode != 0 and done.stderr and not (folder / "none").exists(), (way, done)
+    (folder / "c.spld").unlink()
+    done = run("bench", folder / "yards.spld", *common, "--method", "splat", "--lod", 1, "--repeats", 1, "-o", folder / "less")
+    assert done.returncode != 0 and "needs every tile" in done.stderr and "c.spld" in done.stderr, done.stderr
 
     for wrong in (["--soft-model", "base"], ["--soft", "box:1"], ["--soft", "class:1", "-o", folder / "out", "--photographs"],
                   ["--soft", "class:1", "--soft-model", "base,base"], ["--soft", "class:1", "--soft-opacity", 2],
