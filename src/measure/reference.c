@@ -106,7 +106,8 @@ static int render_self(const struct spl_reference *r, const struct spl_named_vie
         return spl_fail_field(err, rc, why.field, "%s", why.message);
     struct spl_faulty_tile faulty;
     if (!frame.stats.complete && spl_dataset_list_faulty(dataset, &faulty, 1))
-        rc = spl_fail(err, SPL_E_INPUT, "the reference of view '%s' needs every tile: %.400s", named->name, faulty.reason);
+        rc = spl_fail(err, SPL_E_INPUT, "the reference of view '%s' needs every tile: %.400s", named->name,
+                      faulty.reason);
     else if (!frame.stats.complete)
         rc = spl_fail(err, SPL_E_LIMIT,
                       "the reference of view '%s' needs every page of the dataset on the device; raise "

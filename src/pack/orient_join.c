@@ -61,7 +61,14 @@ static int add(struct spl_orient_join *join, struct spl_orient_edges *edges, uin
         edges->list = more;
         edges->capacity = capacity;
     }
-    edges->count = spl_forest_add_edge(edges->list, edges->count, a, b, agreement);
+    uint32_t *place = &edges->recent[(a < b ? a * 31 + b : b * 31 + a) % SPL_ORIENT_RECENT];
+    const struct spl_forest_edge *recent = &edges->list[*place];
+    if (*place < edges->count && recent->a == (a < b ? a : b) && recent->b == (a < b ? b : a)) {
+        spl_forest_add_edge(edges->list, *place + 1, a, b, agreement);
+    } else {
+        edges->count = spl_forest_add_edge(edges->list, edges->count, a, b, agreement);
+        *place = (uint32_t)(edges->count - 1);
+    }
     return SPL_OK;
 }
 

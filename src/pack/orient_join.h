@@ -4,10 +4,13 @@
 
 #include "pack/orient.h"
 
-/* In the spill: as many as there are, which is far fewer than there can be. */
+/* In the spill: as many as there are, which is far fewer than there can be. Those of the same ends come one after the
+ * other mostly, so where the last one of each remainder lies is looked up: one edge has the votes of many. */
+enum { SPL_ORIENT_RECENT = 8191 };
 struct spl_orient_edges {
     struct spl_forest_edge *list;
     size_t count, capacity;
+    uint32_t recent[SPL_ORIENT_RECENT];
 };
 
 struct spl_orient_join {

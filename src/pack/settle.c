@@ -40,48 +40,82 @@ static void limit_runs(const struct spl_settle_block *block)
     }
 }
 
-static bool waits(const struct spl_settle_block *block, uint32_t point)
+enum wait { SETTLES, WAITS_WITHIN, WAITS_OUTSIDE };
+
+static enum wait find_wait(const struct spl_settle_block *block, uint32_t point)
 {
     const uint32_t begin = (uint32_t)block->begin, points = (uint32_t)(block->end - block->begin);
     const uint32_t *list = block->neighbours + (size_t)point * block->k;
-    unsigned outside = 0, other = 0;
-    for (unsigned a = 0; a < block->k; a++)
+    unsigned outside = 0, unused = 0, other = 0;
+    for (unsigned a = 0; a < block->k; a++) {
         outside |= (list[a] - begin >= points) & (list[a] != UINT32_MAX);
+        unused |= list[a] == UINT32_MAX;
+    }
     for (unsigned a = 0; block->label && !outside && a < block->k && list[a] != UINT32_MAX; a++)
         other |= block->label[list[a] - begin] != block->label[point];
-    return outside | other;
+    return outside || (other && unused) ? WAITS_OUTSIDE : other ? WAITS_WITHIN : SETTLES;
+}
+
+static void list_point(const struct spl_settle_block *block, uint32_t point, enum wait wait, size_t at,
+                       struct spl_unsettled *unsettled)
+{
+    const uint32_t *list = block->neighbours + (size_t)point * block->k;
+    unsettled->points[at].index = (uint32_t)block->begin + point;
+    unsettled->points[at].radius = block->limit[point];
+    if (wait == WAITS_OUTSIDE)
+        memcpy(unsettled->neighbours + at * block->k, list, block->k * sizeof *list);
+    for (unsigned a = 0; wait == WAITS_WITHIN && a < block->k; a++)
+        unsettled->inner[(at - unsettled->outer) * block->k + a] = (uint16_t)(list[a] - block->begin);
 }
 
 int spl_unsettled_init(struct spl_unsettled *unsettled, const struct spl_settle_block *block)
 {
-    size_t points = block->end - block->begin, k = block->k, count = 0;
-    unsettled->spill = block->points->spill;
+    const uint32_t points = (uint32_t)(block->end - block->begin);
+    size_t count[WAITS_OUTSIDE + 1] = {0}, k = block->k;
     limit_runs(block);
-    for (size_t i = 0; i < points; i++)
-        count += waits(block, (uint32_t)i);
-    unsettled->points = spl_spill_take(block->points->spill, count, sizeof *unsettled->points, NULL);
-    unsettled->neighbours = spl_spill_take(block->points->spill, count, k * sizeof *unsettled->neighbours, NULL);
-    if (!unsettled->points || !unsettled->neighbours)
+    for (uint32_t i = 0; i < points; i++)
+        count[find_wait(block, i)]++;
+    *unsettled = (struct spl_unsettled){.spill = block->points->spill,
+                                        .outer = count[WAITS_OUTSIDE],
+                                        .count = count[WAITS_OUTSIDE] + count[WAITS_WITHIN],
+                                        .begin = block->begin,
+                                        .k = block->k};
+    struct spl_spill *spill = unsettled->spill;
+    unsettled->points = spl_spill_take(spill, unsettled->count, sizeof *unsettled->points, NULL);
+    unsettled->neighbours = spl_spill_take(spill, count[WAITS_OUTSIDE], k * sizeof *unsettled->neighbours, NULL);
+    unsettled->inner = spl_spill_take(spill, count[WAITS_WITHIN], k * sizeof *unsettled->inner, NULL);
+    if (!unsettled->points || !unsettled->neighbours || !unsettled->inner)
         return SPL_E_NOMEM;
-    unsettled->neighbour_bytes = count * k * sizeof *unsettled->neighbours;
-    for (size_t i = 0; i < points; i++) {
-        const uint32_t *list = block->neighbours + i * k;
-        if (!waits(block, (uint32_t)i))
-            continue;
-        unsettled->points[unsettled->count].index = (uint32_t)(block->begin + i);
-        unsettled->points[unsettled->count].limit = block->limit[i];
-        memcpy(unsettled->neighbours + unsettled->count++ * k, list, k * sizeof *list);
+    size_t at[WAITS_OUTSIDE + 1] = {[WAITS_WITHIN] = unsettled->outer};
+    for (uint32_t i = 0; i < points; i++) {
+        enum wait wait = find_wait(block, i);
+        if (wait != SETTLES)
+            list_point(block, i, wait, at[wait]++, unsettled);
     }
     return SPL_OK;
 }
 
 void spl_unsettled_finish(struct spl_unsettled *unsettled)
 {
+    const size_t k = unsettled->k, inner = unsettled->count - unsettled->outer;
     spl_spill_discard(unsettled->spill, unsettled->points, unsettled->count * sizeof *unsettled->points);
-    spl_spill_discard(unsettled->spill, unsettled->neighbours, unsettled->neighbour_bytes);
+    spl_spill_discard(unsettled->spill, unsettled->neighbours, unsettled->outer * k * sizeof *unsettled->neighbours);
+    spl_spill_discard(unsettled->spill, unsettled->inner, inner * k * sizeof *unsettled->inner);
     spl_spill_give(unsettled->spill, unsettled->points);
     spl_spill_give(unsettled->spill, unsettled->neighbours);
+    spl_spill_give(unsettled->spill, unsettled->inner);
     *unsettled = (struct spl_unsettled){0};
+}
+
+const uint32_t *spl_unsettled_get_neighbours(const struct spl_unsettled *unsettled, size_t i,
+                                             uint32_t room[SPL_NEIGHBOURS_MAX])
+{
+    if (i < unsettled->outer)
+        return unsettled->neighbours + i * unsettled->k;
+    const uint16_t *inner = unsettled->inner + (i - unsettled->outer) * unsettled->k;
+    for (unsigned a = 0; a < unsettled->k; a++)
+        room[a] = (uint32_t)unsettled->begin + inner[a];
+    return room;
 }
 
 /* Radius and uncertainty of point i once the normals around it agree in sign. */
@@ -108,12 +142,15 @@ void spl_settle_block(const struct spl_settle_block *block, const struct spl_uns
 {
     struct spl_points *p = block->points;
     float *radius = block->limit; /* the settled one takes its limit's place */
-    size_t next = 0;
+    size_t outer = 0, inner = unsettled->outer; /* who waits next */
     for (size_t i = block->begin; i < block->end; i++) {
         size_t at = i - block->begin;
-        if (next < unsettled->count && unsettled->points[next].index == i) {
+        if (outer < unsettled->outer && unsettled->points[outer].index == i) {
             radius[at] = p->radius[i];
-            next++;
+            outer++;
+        } else if (inner < unsettled->count && unsettled->points[inner].index == i) {
+            radius[at] = p->radius[i];
+            inner++;
         } else {
             settle(p, i, block->neighbours + at * block->k, block->k, radius[at], &radius[at], &p->uncertainty[i]);
         }
@@ -121,14 +158,15 @@ void spl_settle_block(const struct spl_settle_block *block, const struct spl_uns
     memcpy(p->radius + block->begin, radius, (block->end - block->begin) * sizeof *radius);
 }
 
-void spl_settle_find(const struct spl_points *points, unsigned k, struct spl_unsettled *unsettled)
+void spl_settle_find(const struct spl_points *points, struct spl_unsettled *unsettled)
 {
     for (size_t i = 0; i < unsettled->count; i++) {
         if (i % 256 == 0)
             spl_spill_keep_bound(points->spill);
         struct spl_unsettled_point *point = &unsettled->points[i];
-        settle(points, point->index, unsettled->neighbours + i * k, k, point->limit, &point->radius,
-               &point->uncertainty);
+        uint32_t room[SPL_NEIGHBOURS_MAX];
+        const uint32_t *list = spl_unsettled_get_neighbours(unsettled, i, room);
+        settle(points, point->index, list, unsettled->k, point->radius, &point->radius, &point->uncertainty);
     }
 }
 

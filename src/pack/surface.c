@@ -181,7 +181,8 @@ static int add_edges(struct surface *s, size_t b, size_t unsettled, struct spl_o
 {
     const struct block *block = &s->blocks[b];
     const uint32_t i = block->unsettled.points[unsettled].index, own = block->first_component + s->label[i];
-    const uint32_t *list = block->unsettled.neighbours + unsettled * s->k;
+    uint32_t room[SPL_NEIGHBOURS_MAX];
+    const uint32_t *list = spl_unsettled_get_neighbours(&block->unsettled, unsettled, room);
     int rc = SPL_OK;
     for (unsigned a = 0; !rc && a < s->k && list[a] != UINT32_MAX; a++) {
         size_t in = list[a] / block_points;
@@ -279,7 +280,7 @@ static void settle_rest(void *context, size_t begin, size_t end, unsigned worker
     struct surface *s = context;
     (void)worker;
     for (size_t b = begin; b < end; b++)
-        spl_settle_find(s->points, s->k, &s->blocks[b].unsettled);
+        spl_settle_find(s->points, &s->blocks[b].unsettled);
 }
 
 /* How far the farthest neighbours of most points are, squared, from a sample of them. */
