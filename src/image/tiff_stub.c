@@ -7,8 +7,7 @@ int spl_encode_tiff(const struct spl_image *image, const struct spl_encode_optio
                     struct spl_error *err)
 {
     (void)image;
-    (void)ground;
-    (void)unit;
+    (void)options;
     (void)out;
     return spl_fail_field(err, SPL_E_UNSUPPORTED, "format",
                           "this build makes no GeoTIFF; ask for png and its world file");

@@ -23,7 +23,6 @@
 
 #define SPL_INLINE static inline __attribute__((always_inline))
 
-static const float certain = 0.8f;  /* agreement of an edge */
 static const double area_most = 64; /* of a point, over that of usual ones, however far it is from others */
 static const double level = 0.8;    /* how far a normal shows up or down; a roof's, too */
 
@@ -144,7 +143,7 @@ SPL_INLINE void agree_all(const struct graph *g, uint8_t *kind)
             memcpy(beside.normal, normal, sizeof beside.normal);
             memcpy(&beside.counts, counts + first, sizeof beside.counts);
             agree(g->points->normal[g->begin + i], &beside, &agreements);
-            spl_marks certainly = (agreements >= certain) | (agreements <= -certain);
+            spl_marks certainly = (agreements >= SPL_ORIENT_CERTAIN) | (agreements <= -SPL_ORIENT_CERTAIN);
             for (unsigned a = 0; a < eight && first + a < g->k; a++) {
                 agreement[first + a] = agreements[a];
                 agreed -= (unsigned)certainly[a];

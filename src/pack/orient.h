@@ -55,9 +55,10 @@ uint32_t spl_orient_block(struct spl_orient *orient, struct spl_points *points, 
 float spl_orient_agreement(const struct spl_points *points, size_t i, size_t j);
 
 /* Whether two of one surface may agree so: the edges that hold pieces together. */
+#define SPL_ORIENT_CERTAIN 0.8f
 static inline bool spl_orient_is_certain(float agreement)
 {
-    return fabsf(agreement) >= 0.8f;
+    return fabsf(agreement) >= SPL_ORIENT_CERTAIN;
 }
 
 /* Whether a level piece of so many points has a say for up. */

@@ -336,19 +336,26 @@ static void steps_may_end_before_the_frame(void **state)
     done(dataset);
 }
 
-/* Together they draw all of a view of which one has no room for all pages at once, and draws coarser nodes. */
-static void pages_of_its_pieces_are_enough(void **state)
+/* A dataset of many small pages, known to the renderer. */
+static struct spl_dataset *add_tree(void)
 {
-    (void)state;
     char path[256];
     struct spl_dataset *dataset;
-    struct spl_view view = view_from_above(50, 90);
     make_folder(path);
     strcat(path, "/tree.spld");
     make_tree_file(path, 60000, 1 << 14);
     assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
     remove_file(path);
     assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    return dataset;
+}
+
+/* Together they draw all of a view of which one has no room for all pages at once, and draws coarser nodes. */
+static void pages_of_its_pieces_are_enough(void **state)
+{
+    (void)state;
+    struct spl_view view = view_from_above(50, 90);
+    struct spl_dataset *dataset = add_tree();
     struct spl_frame whole = render_with(renderer, dataset, &view), alone;
     struct spl_renderer *both[2] = {open_renderer(0, 0), NULL};
     assert_int_equal(spl_renderer_add(both[0], dataset, NULL), SPL_OK);
@@ -384,15 +391,8 @@ static void pages_of_its_pieces_are_enough(void **state)
 static void what_is_left_out_is_not_counted(void **state)
 {
     (void)state;
-    char path[256];
-    struct spl_dataset *dataset;
     struct spl_view view = view_from_above(50, 90);
-    make_folder(path);
-    strcat(path, "/tree.spld");
-    make_tree_file(path, 60000, 1 << 14);
-    assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), SPL_OK);
-    remove_file(path);
-    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    struct spl_dataset *dataset = add_tree();
     struct spl_frame whole = render_with(renderer, dataset, &view);
     struct spl_renderer *both[2] = {open_renderer(0, 0), NULL};
     assert_int_equal(spl_renderer_add(both[0], dataset, NULL), SPL_OK);
