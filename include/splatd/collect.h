@@ -45,6 +45,28 @@ static inline void spl_collect_options_init(struct spl_collect_options *options)
  * "inputs". Any thread. */
 SPL_API int spl_collect(const struct spl_collect_options *options, struct spl_error *err);
 
+struct spl_merge_options {
+    size_t size;            /* spl_merge_options_init() */
+    const char *collection; /* a file, whose tiles lie beside it, or the URL of one */
+    const char *output;     /* NAME.spld, in any folder; none of the tiles */
+    unsigned threads;       /* 0 = all cores */
+    void (*progress)(void *context, const struct spl_progress *progress); /* may be NULL */
+    void *progress_context;
+    const struct spl_cancel *cancel; // may be NULL; the old file, or none, is left
+};
+
+static inline void spl_merge_options_init(struct spl_merge_options *options)
+{
+    spl_sized_init(options, sizeof *options);
+}
+
+/* Writes `options->output` (temporary file, sync, rename), one dataset of what a collection and all of its tiles hold,
+ * which needs neither of them any more: its splats are theirs bit for bit, at every level. What is written depends on
+ * these files alone. Blocks; takes about 72 bytes of memory a chunk (of up to 128 splats) and three pages, and as much
+ * room on disk as the tiles. SPL_E_USAGE of options; SPL_E_INPUT of a dataset that is no collection; of a tile that is
+ * missing, another one or damaged what opening and reading says, with its name. Any thread. */
+SPL_API int spl_merge(const struct spl_merge_options *options, struct spl_error *err);
+
 SPL_END_DECLARATIONS
 
 #endif

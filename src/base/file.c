@@ -14,6 +14,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 int spl_write_all(int fd, const void *bytes, size_t length)
@@ -37,10 +38,25 @@ static int folder_length(const char *path)
     return slash ? (int)(slash - path) + 1 : 0;
 }
 
+/* For the caller to free; NULL: no memory. */
+static char *copy_folder(const char *path)
+{
+    const int length = folder_length(path);
+    return length ? strndup(path, (size_t)length) : strdup(".");
+}
+
+uint64_t spl_file_get_free(const char *path)
+{
+    struct statvfs status;
+    char *folder = copy_folder(path);
+    const bool known = folder && !statvfs(folder, &status);
+    free(folder);
+    return known ? (uint64_t)status.f_bavail * status.f_frsize : UINT64_MAX;
+}
+
 int spl_file_sync_folder(const char *path)
 {
-    int length = folder_length(path);
-    char *folder = length ? strndup(path, (size_t)length) : strdup(".");
+    char *folder = copy_folder(path);
     if (!folder)
         return -1;
     int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC), rc = fd < 0 ? -1 : fsync(fd), why = errno;

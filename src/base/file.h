@@ -3,6 +3,7 @@
 #define SPL_BASE_FILE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "base/error.h"
 
@@ -19,6 +20,9 @@ int spl_file_replace(const char *path, const void *bytes, size_t length, struct 
 void spl_file_sweep(const char *begin, const char *end);
 /* The same of spl_file_replace() at `path`. Not part of it: it looks through the whole folder. */
 void spl_file_sweep_beside(const char *path);
+
+/* Bytes that are free in the folder of `path`; UINT64_MAX: nobody says so. Any thread. */
+uint64_t spl_file_get_free(const char *path);
 
 /* Brings the names in the folder of `path` to disk, which a rename alone does not. 0, or -1 with errno. */
 int spl_file_sync_folder(const char *path);

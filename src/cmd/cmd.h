@@ -12,8 +12,8 @@
 /* Prints the error to stderr and returns its exit code. */
 int spl_cmd_fail(const struct spl_error *err);
 
-/* Says on stderr what a collection that was written holds (collect.c). */
-struct spl_error;
+/* Say on stderr what a collection that was written holds, or the one file of it (collect.c). */
 int spl_cmd_print_collection(const char *output, struct spl_error *err);
+int spl_cmd_print_merged(const char *output, struct spl_error *err);
 
 #endif

@@ -1,5 +1,6 @@
-/* splatd collect: tiles in, a dataset of all of them out. On SIGINT and SIGTERM the temporary file is removed in a
- * handler; the target is never touched before the library's last rename. */
+/* splatd collect: tiles in, a dataset of all of them out; or a collection in, one file of all that its tiles hold out.
+ * On SIGINT and SIGTERM the temporary file is removed in a handler; the target is never touched before the library's
+ * last rename. */
 #include "cmd/cmd.h"
 
 #include <getopt.h>
@@ -23,18 +24,27 @@ static void clean_up_on_signals(const char *output)
         spl_cmd_remove_unfinished(path);
 }
 
+struct arguments {
+    struct spl_collect_options collect;
+    bool merge;
+};
+
 static const struct spl_cmd_option options[] = {
-    {"output", "NAME.spld", "in the folder of the tiles; replaced in one step when everything has been written",
-     .letter = 'o', SPL_CMD_TEXT(struct spl_collect_options, output)},
-    {"title", "TEXT", "what people call it, a line", SPL_CMD_TEXT(struct spl_collect_options, title)},
-    {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct spl_collect_options, description)},
-    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct spl_collect_options, threads, 1, 64)},
+    {"output", "NAME.spld",
+     "in the folder of the tiles, with --merge in any; replaced in one step when everything has been written",
+     .letter = 'o', SPL_CMD_TEXT(struct arguments, collect.output)},
+    {"merge", NULL, "of a collection: NAME.spld is one file of all that its tiles hold, and needs them no more",
+     SPL_CMD_FLAG(struct arguments, merge)},
+    {"title", "TEXT", "what people call it, a line", SPL_CMD_TEXT(struct arguments, collect.title)},
+    {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct arguments, collect.description)},
+    {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, collect.threads, 1, 64)},
 };
 
 static const struct spl_cmd_table table = {
     .command = "collect",
     .before =
-        "usage: splatd collect TILE.spld... -o NAME.spld [--title TEXT] [--description TEXT] [--threads N]\n\n"
+        "usage: splatd collect TILE.spld... -o NAME.spld [--title TEXT] [--description TEXT] [--threads N]\n"
+        "       splatd collect --merge COLLECTION.spld -o NAME.spld [--threads N]\n\n"
         "Puts datasets of neighbouring tiles together as one, to serve and to render as a whole. Nothing is packed\n"
         "again: NAME.spld holds what is seen from afar, a few MB, and names the tiles, which hold all that is finer\n"
         "and stay where they are, in the same folder. A tile that changes later needs the collection made anew.\n"
@@ -47,7 +57,9 @@ static const struct spl_cmd_table table = {
         "Some of the tiles, by name, and what the collection is:\n"
         "  splatd collect city/north.spld city/south.spld -o city/both.spld && splatd info city/both.spld\n"
         "From a list of their names:\n"
-        "  splatd collect @city/tiles.txt -o city/city.spld\n\n",
+        "  splatd collect @city/tiles.txt -o city/city.spld\n"
+        "All of it as one file, to be sent or served without its tiles (of one on a server: a copy to have here):\n"
+        "  splatd collect --merge city/city.spld -o city-whole.spld\n\n",
     .after =
         "\nTwo tiles agree in their attributes where pack was told what to keep: --keep intensity,scan keeps both\n"
         "where all points have the same value too. Progress and the summary go to stderr.\n",
@@ -70,30 +82,71 @@ int spl_cmd_print_collection(const char *output, struct spl_error *err)
     return SPL_OK;
 }
 
+int spl_cmd_print_merged(const char *output, struct spl_error *err)
+{
+    struct spl_dataset *dataset;
+    int rc = spl_dataset_open(output, false, &dataset, err);
+    if (rc)
+        return rc;
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    spl_cmd_put_text(stderr, output, 0);
+    fprintf(stderr, ": %llu points in one file, version %016llx, %.2f MB\n", (unsigned long long)info->points,
+            (unsigned long long)info->version, (double)info->file_bytes / 1e6);
+    spl_dataset_close(dataset);
+    return SPL_OK;
+}
+
+static int run_collect(const struct spl_collect_options *o, struct spl_cmd_progress *progress, struct spl_error *err)
+{
+    if (!o->input_count)
+        return spl_fail(err, SPL_E_USAGE,
+                        "collect takes at least one dataset: splatd collect city -o city/city.spld");
+    int rc = spl_cmd_check_dataset("collect", o->output, err);
+    if (rc)
+        return rc;
+    clean_up_on_signals(o->output);
+    rc = spl_collect(o, err);
+    spl_cmd_progress_finish(progress);
+    return rc ? rc : spl_cmd_print_collection(o->output, err);
+}
+
+static int run_merge(const struct spl_collect_options *o, struct spl_cmd_progress *progress, struct spl_error *err)
+{
+    if (o->input_count != 1)
+        return spl_fail(err, SPL_E_USAGE,
+                        "--merge takes one dataset, a collection: splatd collect --merge city.spld -o whole.spld");
+    if (o->title || o->description)
+        return spl_fail(err, SPL_E_USAGE, "--merge keeps title and description: leave out --title and --description, "
+                                          "or give them to the collection");
+    int rc = spl_cmd_check_dataset("collect --merge", o->output, err);
+    if (rc)
+        return rc;
+    const struct spl_merge_options how = {.size = sizeof how,
+                                          .collection = o->inputs[0],
+                                          .output = o->output,
+                                          .threads = o->threads,
+                                          .progress = o->progress,
+                                          .progress_context = o->progress_context};
+    clean_up_on_signals(o->output);
+    rc = spl_merge(&how, err);
+    spl_cmd_progress_finish(progress);
+    return rc ? rc : spl_cmd_print_merged(o->output, err);
+}
+
 int spl_cmd_collect(int argc, char **argv)
 {
     struct spl_cmd_progress progress = {0};
-    struct spl_collect_options o = {.size = sizeof o,
-                                    .progress = spl_cmd_progress,
-                                    .progress_context = &progress,
-                                    .left_out = spl_cmd_pack_name_refused};
+    struct arguments a = {.collect = {.size = sizeof a.collect,
+                                      .progress = spl_cmd_progress,
+                                      .progress_context = &progress,
+                                      .left_out = spl_cmd_pack_name_refused}};
     struct spl_error err = {0};
-    int rc = spl_cmd_table_parse(&table, argc, argv, &o, &err);
+    int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
     if (rc == SPL_CMD_DONE)
         return 0;
-    o.inputs = (const char *const *)&argv[optind];
-    o.input_count = (size_t)(argc - optind);
-    if (!rc && !o.input_count)
-        rc = spl_fail(&err, SPL_E_USAGE,
-                      "collect takes at least one dataset: splatd collect city -o city/city.spld");
+    a.collect.inputs = (const char *const *)&argv[optind];
+    a.collect.input_count = (size_t)(argc - optind);
     if (!rc)
-        rc = spl_cmd_check_dataset("collect", o.output, &err);
-    if (rc)
-        return spl_cmd_fail(&err);
-    clean_up_on_signals(o.output);
-    rc = spl_collect(&o, &err);
-    spl_cmd_progress_finish(&progress);
-    if (!rc)
-        rc = spl_cmd_print_collection(o.output, &err);
+        rc = a.merge ? run_merge(&a.collect, &progress, &err) : run_collect(&a.collect, &progress, &err);
     return rc ? spl_cmd_fail(&err) : 0;
 }

@@ -1,5 +1,5 @@
 /* What the files of 'splatd pack' share: pack_options.c reads the options, pack.c packs, pack_report.c says what came
- * of it; pack_job.c packs in parts. */
+ * of it; pack_job.c and pack_parts.c pack in parts. */
 #ifndef SPL_CMD_PACK_H
 #define SPL_CMD_PACK_H
 
@@ -19,7 +19,8 @@ struct spl_cmd_pack {
     bool keep_going, skip_broken;
     uint32_t plan; /* parts that are planned; 0 = none */
     uint64_t part; /* the one that is packed, or SPL_CMD_PACK_NO_PART */
-    bool join;
+    bool join, merge;
+    uint32_t parts; /* one after the other, into one file; 0 = in one piece */
     double halo; /* negative: as wide as need be */
     struct spl_saved_view default_view, views[SPL_SAVED_VIEWS_MAX];
 };

@@ -34,10 +34,12 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
 {
     static const char *const of_part[] = {"part", "memory", "threads", NULL};
     static const char *const of_join[] = {"join", "output",       "title", "description", "threads",
-                                          "view", "default-view", NULL};
+                                          "view", "default-view", "merge", NULL};
     const bool part = a->part != SPL_CMD_PACK_NO_PART;
     if ((a->plan > 0) + part + a->join > 1)
         return spl_fail(err, SPL_E_USAGE, "--plan, --part and --join are three steps: name one of them at a time");
+    if (a->parts)
+        return spl_fail(err, SPL_E_USAGE, "--parts N does what --plan, --part and --join do, in one go: name one way");
     if (a->plan && !a->pack.output)
         return spl_fail(err, SPL_E_USAGE, "--plan needs a folder for the job: splatd pack --plan %u scans -o job",
                         a->plan);
@@ -54,7 +56,11 @@ int spl_cmd_pack_check_job(const struct spl_cmd_pack *a, char *const *words, int
             return spl_fail(
                 err, SPL_E_USAGE, "%.40s is decided by the plan: %s takes %s alone beside the job; name it to --plan",
                 words[i], step, part ? "--memory and --threads"
-                     : "-o, --title, --description, --default-view, --view and --threads");
+                     : "-o, --merge, --title, --description, --default-view, --view and --threads");
+    if (a->join && a->merge && !a->pack.output)
+        return spl_fail(err, SPL_E_USAGE,
+                        "--merge needs a dataset to write: splatd pack --join %.200s --merge -o NAME.spld",
+                        a->pack.inputs[0]);
     if (part && a->pack.output)
         return spl_fail(err, SPL_E_USAGE, "--part writes part-%llu.spld in the job's folder: leave out -o",
                         (unsigned long long)a->part);
@@ -109,7 +115,8 @@ static void print_plan(const struct spl_job *job, bool unchanged)
            job->part_count);
     printf("  splatd pack --part K %s                                    each by itself, K from 0 to %u\n", job->folder,
            last);
-    printf("and then make one dataset of them: splatd pack --join %s\n", job->folder);
+    printf("and then make one dataset of them: splatd pack --join %s (one file: with --merge -o NAME.spld)\n",
+           job->folder);
 }
 
 static int plan(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, struct spl_error *err)
@@ -164,17 +171,11 @@ static int pack_part(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener 
     return rc;
 }
 
-static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, struct spl_error *err)
+int spl_cmd_pack_join(const struct spl_cmd_pack *a, const struct spl_job *job, const char *output,
+                      struct spl_error *err)
 {
-    struct spl_job job;
-    char *output = NULL;
-    int rc = spl_job_read(&job, a->pack.inputs[0], err);
-    if (rc)
-        return rc;
-    if (!a->pack.output && asprintf(&output, "%s/all.spld", job.folder) < 0)
-        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of the dataset");
     const struct spl_collect_options options = {.size = sizeof options,
-                                                .output = a->pack.output ? a->pack.output : output,
+                                                .output = output,
                                                 .title = a->pack.title,
                                                 .description = a->pack.description,
                                                 .default_view = a->pack.default_view,
@@ -183,14 +184,45 @@ static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
                                                 .threads = a->pack.threads,
                                                 .progress = a->pack.progress,
                                                 .progress_context = a->pack.progress_context};
+    return spl_job_join(job, &options, err);
+}
+
+int spl_cmd_pack_merge(const struct spl_cmd_pack *a, const struct spl_job *job, const char *collection,
+                       struct spl_error *err)
+{
+    const struct spl_merge_options options = {.size = sizeof options,
+                                              .collection = collection,
+                                              .output = a->pack.output,
+                                              .threads = a->pack.threads,
+                                              .progress = a->pack.progress,
+                                              .progress_context = a->pack.progress_context};
+    return spl_job_merge(job, &options, err);
+}
+
+static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, struct spl_error *err)
+{
+    struct spl_job job;
+    char *all = NULL;
+    int rc = a->merge ? spl_cmd_check_dataset("pack --join --merge", a->pack.output, err) : SPL_OK;
+    if (!rc)
+        rc = spl_job_read(&job, a->pack.inputs[0], err);
+    if (rc)
+        return rc;
+    if ((a->merge || !a->pack.output) && asprintf(&all, "%s/all.spld", job.folder) < 0)
+        rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of the dataset");
+    const char *collection = all ? all : a->pack.output;
     if (!rc) {
-        clean_up_on_signals(options.output);
-        rc = spl_job_join(&job, &options, err);
+        clean_up_on_signals(collection);
+        if (a->merge)
+            clean_up_on_signals(a->pack.output);
+        rc = spl_cmd_pack_join(a, &job, collection, err);
     }
+    if (!rc && a->merge)
+        rc = spl_cmd_pack_merge(a, &job, collection, err);
     spl_cmd_progress_finish(&listener->progress);
     if (!rc)
-        rc = spl_cmd_print_collection(options.output, err);
-    free(output);
+        rc = a->merge ? spl_cmd_print_merged(a->pack.output, err) : spl_cmd_print_collection(collection, err);
+    free(all);
     spl_job_finish(&job);
     return rc;
 }

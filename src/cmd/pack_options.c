@@ -241,13 +241,21 @@ static const struct spl_cmd_option options[] = {
      "without what is put onto a scan as a whole: photographs, maps, --prune",
      SPL_CMD_COUNT_32(struct spl_cmd_pack, plan, 1, SPL_JOB_PARTS_MAX)},
     {"halo", "LENGTH",
-     "with --plan: how far around its box a part reads points for the normals and radii of its own, in the scans' unit",
+     "with --plan and --parts: how far around its box a part reads points for the normals and radii of its own, in the "
+     "scans' unit",
      .otherwise = "by the points' spacing", SPL_CMD_REAL(struct spl_cmd_pack, halo, 0, 1e12)},
     {"part", "K", "packs part K of the job IN, JOB/part-K.spld, unless it is there",
      SPL_CMD_COUNT(struct spl_cmd_pack, part, 0, SPL_JOB_PARTS_MAX - 1)},
     {"join", NULL,
      "makes one dataset of the parts of the job IN, which stay beside it: JOB/all.spld, or -o JOB/NAME.spld",
      SPL_CMD_FLAG(struct spl_cmd_pack, join)},
+    {"merge", NULL, "with --join: -o NAME.spld is one file of all parts, in any folder, which needs them no more",
+     SPL_CMD_FLAG(struct spl_cmd_pack, merge)},
+    {"parts", "N",
+     "all of that in one go, N parts one after the other: no more memory than the largest takes, no scratch but for "
+     "them, in NAME.spld.parts until they are merged; after a kill the same command goes on with those that are there. "
+     "The file is the one that --plan N, --part and --join --merge make",
+     SPL_CMD_COUNT_32(struct spl_cmd_pack, parts, 1, SPL_JOB_PARTS_MAX)},
     {"threads", "N", "the file does not depend on it", .otherwise = "all cores",
      SPL_CMD_COUNT_32(struct spl_cmd_pack, pack.threads, 1, 64)},
 };
@@ -267,7 +275,9 @@ static const struct spl_cmd_table table = {
         "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n"
         "       splatd pack --plan N IN... -o JOB [--halo LENGTH] [--OPTION]...\n"
         "       splatd pack --part K JOB [--memory MIB] [--threads N]\n"
-        "       splatd pack --join JOB [-o JOB/NAME.spld] [--title TEXT] [--description TEXT]\n\n"
+        "       splatd pack --join JOB [-o JOB/NAME.spld] [--title TEXT] [--description TEXT]\n"
+        "       splatd pack --join JOB --merge -o NAME.spld\n"
+        "       splatd pack --parts N IN... -o NAME.spld [--halo LENGTH] [--OPTION]...\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ, other text) into one dataset to serve and\n"
         "render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates\n"
         "are kept once.\n"
@@ -307,6 +317,8 @@ static const struct spl_cmd_table table = {
         "dataset of them:\n"
         "  splatd pack --plan 8 street-*.las -o job\n"
         "  for k in 0 1 2 3 4 5 6 7; do splatd pack --part $k job; done && splatd pack --join job -o job/street.spld\n"
+        "The same on this machine, eight times as many points as its memory is for, as one file:\n"
+        "  splatd pack --parts 8 street-*.las -o street.spld\n"
         "Half the default errors, for a few bits more a splat:\n"
         "  splatd pack hall.ply --position-error 0.008 --normal-error 0.5 -o hall.spld\n\n",
     .after = "\nAbout 56 bytes of memory a point (80 of a text with many digits, 180 on a wire), or --memory.\n"
@@ -351,8 +363,12 @@ static int check(const struct spl_cmd_pack *a, struct spl_error *err)
         return spl_fail(err, SPL_E_USAGE,
                         "pack needs at least one scan: splatd pack scan.las -o scan.spld; "
                         "'splatd pack --help' shows more");
-    if (!a->plan && a->halo >= 0)
-        return spl_fail(err, SPL_E_USAGE, "--halo is of parts, which --plan N makes: name that too, or leave it out");
+    if (!a->plan && !a->parts && a->halo >= 0)
+        return spl_fail(err, SPL_E_USAGE,
+                        "--halo is of parts, which --plan N and --parts N make: name one of them too, or leave it out");
+    if (a->merge)
+        return spl_fail(err, SPL_E_USAGE, "--merge is of parts that are joined: splatd pack --join job --merge -o "
+                                          "NAME.spld; --parts N does it by itself");
     int rc = a->plan ? SPL_OK : spl_cmd_check_dataset("pack", o->output, err);
     if (!rc && !o->output)
         rc = spl_fail(err, SPL_E_USAGE, "--plan needs a folder for the job: -o FOLDER");

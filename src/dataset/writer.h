@@ -65,7 +65,7 @@ void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const str
 /* Writes `meta` (borrowed; "streams" follow from set_streams, "counts" from what is written), directory, heads, the
  * table and the header, syncs file and folder, renames over the target. Nodes come in the order in which they were
  * added, with the page that add_node gave them, breadth first: the children of each follow those of the one before it,
- * its chunks those of the one before it; first_child and first_chunk are not looked at. The writer stays to be
+ * its chunks those of the one before it, from first_chunk on; first_child is not looked at. The writer stays to be
  * destroyed. */
 int spl_dataset_writer_finish(struct spl_dataset_writer *writer, const struct spl_node *nodes, size_t node_count,
                               const struct spl_chunk *chunks, size_t chunk_count, const json_t *meta,

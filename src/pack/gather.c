@@ -30,7 +30,8 @@ static int grow(struct spl_spill *spill, void **array, size_t capacity, size_t s
 
 static int fail_count(struct spl_error *err)
 {
-    return spl_fail(err, SPL_E_LIMIT, "more than %u points; pack them as several datasets", SPL_POINTS_MAX);
+    return spl_fail(err, SPL_E_LIMIT, "more than %u points; pack them in parts of fewer, with --parts N",
+                    SPL_POINTS_MAX);
 }
 
 int spl_points_check_count(const struct spl_scans *scans, struct spl_error *err)

@@ -1,5 +1,5 @@
-/* Names in a message, which is a line for a person: three of them say what is meant, the rest is a number. The text
- * holds three of the longest and that number. Pure; any thread. */
+/* A message is a line for a person: three names say what is meant, the rest is a number. Its text holds three of the
+ * longest and that number. Pure; any thread. */
 #include "pack/names.h"
 
 #include <stdio.h>
@@ -20,4 +20,14 @@ const char *spl_names_list(struct spl_names *names)
     if (names->count > names_listed)
         snprintf(names->text + used, sizeof names->text - used, " and %zu more", names->count - names_listed);
     return names->text;
+}
+
+json_t *spl_names_describe(const char *(*get)(const void *context, size_t i), const void *context, size_t count)
+{
+    json_t *all = json_array();
+    for (size_t i = 0; all && i < count && i < SPL_NAMES_KEPT; i++)
+        json_array_append_new(all, json_string_nocheck(get(context, i)));
+    if (all && count > SPL_NAMES_KEPT)
+        json_array_append_new(all, json_sprintf("and %zu more", count - SPL_NAMES_KEPT));
+    return all;
 }

@@ -3,6 +3,7 @@
  * Intensities have no white of their own: the range that is made grey is a scan's own. Tiles of one flight must not
  * differ by that, so scans of like ranges share one. 8 bit numbers beside 16 bit ones would be black in it: then each
  * keeps its own. The caller's thread. */
+#include "pack/names.h"
 #include "pack/scans.h"
 
 #include <math.h>
@@ -14,7 +15,7 @@
 #include "cloud/crs.h"
 #include "pack/part.h"
 
-enum { bytes_a_line = 40, names_kept = 1000 };
+enum { bytes_a_line = 40 };
 static const double like_ranges = 8; /* times the smallest white less black: of one kind */
 
 static bool has_points(const struct spl_scan *scan)
@@ -153,29 +154,24 @@ void spl_scans_finish(struct spl_scans *scans)
     *scans = (struct spl_scans){0};
 }
 
-/* META has 8 MiB: of a hundred thousand tiles it names the first. */
-static void append_more(json_t *names, size_t count)
+static const char *name_of_scan(const void *context, size_t i)
 {
-    if (count > names_kept)
-        json_array_append_new(names, json_sprintf("and %zu more", count - names_kept));
+    return ((const struct spl_scans *)context)->list[i].name;
 }
 
 json_t *spl_scans_describe_names(const struct spl_scans *scans)
 {
-    json_t *all = json_array();
-    for (size_t i = 0; i < scans->count && i < names_kept; i++)
-        json_array_append_new(all, json_string_nocheck(scans->list[i].name));
-    append_more(all, scans->count);
-    return all;
+    return spl_names_describe(name_of_scan, scans, scans->count);
+}
+
+static const char *name_of_left_out(const void *context, size_t i)
+{
+    return spl_input_name(((const struct spl_inputs *)context)->left_out[i]);
 }
 
 json_t *spl_scans_describe_left_out(const struct spl_scans *scans)
 {
-    json_t *all = json_array();
-    for (size_t i = 0; i < scans->inputs->left_out_count && i < names_kept; i++)
-        json_array_append_new(all, json_string_nocheck(spl_input_name(scans->inputs->left_out[i])));
-    append_more(all, scans->inputs->left_out_count);
-    return all;
+    return spl_names_describe(name_of_left_out, scans->inputs, scans->inputs->left_out_count);
 }
 
 json_t *spl_scans_describe(const struct spl_scans *scans)
@@ -183,10 +179,10 @@ json_t *spl_scans_describe(const struct spl_scans *scans)
     static const char *const names[3] = {"constant", "rgb", "intensity"};
     json_t *all = json_array();
     uint64_t points_from[3] = {0};
-    for (size_t i = names_kept; i < scans->count; i++)
+    for (size_t i = SPL_NAMES_KEPT; i < scans->count; i++)
         for (int from = 0; from < 3; from++)
             points_from[from] += scans->list[i].points_from[from];
-    for (size_t i = 0; i < scans->count && i < names_kept; i++) {
+    for (size_t i = 0; i < scans->count && i < SPL_NAMES_KEPT; i++) {
         const struct spl_scan *scan = &scans->list[i];
         for (int from = 0; from < 3; from++)
             if (scan->points_from[from] || (from == (int)scan->colors.from && !has_points(scan)))

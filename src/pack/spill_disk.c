@@ -8,10 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/statvfs.h>
 #include <sys/vfs.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "pack/spill_parts.h"
 
 static atomic_long fail_countdown;
@@ -34,19 +34,16 @@ char *spl_spill_find_memory_folder(const char *beside)
 
 int spl_spill_check_disk(const char *beside, uint64_t meanwhile, uint64_t written, struct spl_error *err)
 {
-    struct statvfs status;
+    const uint64_t free_bytes = spl_file_get_free(beside);
     char *folder = spl_spill_find_folder(beside);
     int rc = SPL_OK;
-    if (folder && !statvfs(folder, &status)) {
-        uint64_t free_bytes = (uint64_t)status.f_bavail * status.f_frsize;
-        if (free_bytes < meanwhile + written)
-            rc = spl_fail_field(
-                err, SPL_E_IO, "memory",
-                "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
-                "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
-                "or write the dataset to another disk",
-                (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
-    }
+    if (folder && free_bytes < meanwhile + written)
+        rc = spl_fail_field(
+            err, SPL_E_IO, "memory",
+            "within this memory the pack keeps up to %.1f GB in '%.200s' meanwhile, and writes a "
+            "dataset of up to %.1f GB there, where %.1f GB are free: make room, give it more memory, "
+            "pack it in parts (--parts N), or write the dataset to another disk",
+            (double)meanwhile / 1e9, folder, (double)written / 1e9, (double)free_bytes / 1e9);
     free(folder);
     return rc;
 }

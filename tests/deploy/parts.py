@@ -2,7 +2,8 @@
 a slurmctld and a slurmd of this test's own; the fields of the Kubernetes job, and what it asks of splatd.
 
 Parts are the bytes that they are when packed one after the other in a job of the same scans elsewhere, whatever failed, was
-killed or ran twice on the way, and so is what they are joined to."""
+killed or ran twice on the way, and so is what they are joined to. One process that makes all parts writes the file that they are
+merged to."""
 import contextlib
 import json
 import os
@@ -144,6 +145,43 @@ def check_headers(survey, top):
     for field in "points", "leaf_splats", "bounds", "unit":
         assert whole[field] == joined[field], (field, whole[field], joined[field])
     assert {s["name"] for s in whole["streams"]} <= {s["name"] for s in joined["streams"]}, joined["streams"]
+
+
+def check_one_file(survey, top):
+    """Parts merged, from any folder, and the same file by one process, which is killed in each of its parts and goes on."""
+    merged, whole, parts = top / "merged.spld", top / "whole.spld", top / "whole.spld.parts"
+    said = survey.run("--join", survey.truth, "--merge", "-o", merged, "--title", "Parts")
+    assert said.returncode == 0 and "points in one file" in said.stdout, said.stdout
+    assert survey.run("--join", survey.truth).returncode == 0  # without the title again, for all others
+    command = [SPLATD, "pack", "--parts", str(PARTS), survey.scans, "-o", whole, "--title", "Parts"]
+    for part in range(PARTS):
+        running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        for line in running.stderr:
+            if line.startswith(f"part {part + 1} of {PARTS}"):
+                break
+        running.kill()
+        running.communicate()
+        assert not whole.exists() and parts.is_dir(), part
+        assert (parts / f"part-{part - 1}.spld").exists() or not part, part
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 0 and done.stderr.count("it is there already") >= PARTS - 1, done.stderr
+    assert whole.read_bytes() == merged.read_bytes()
+    assert not parts.exists(), list(parts.iterdir())
+    info = json.loads(subprocess.run([SPLATD, "info", "--json", whole], check=True, stdout=subprocess.PIPE).stdout)
+    assert info["sources"] == [f"scan {i}.ply" for i in range(SCANS)] and not info.get("tiles"), info
+    joined = json.loads(subprocess.run([SPLATD, "info", "--json", survey.truth / "all.spld"], check=True,
+                                       stdout=subprocess.PIPE).stdout)
+    for field in "points", "leaf_splats", "bounds", "unit", "levels":
+        assert info[field] == joined[field], (field, info[field], joined[field])
+    for words, says in ((("--merge", survey.scans, "-o", whole), "--merge is of parts that are joined"),
+                        (("--join", survey.truth, "--merge"), "--merge needs a dataset to write"),
+                        (("--join", survey.truth, "--merge", "-o", survey.truth / "part-0.spld"), "is a tile of"),
+                        (("--parts", 3, "--part", 1, survey.truth), "name one way"),
+                        (("--parts", 3, "--prune", 9, survey.scans, "-o", merged), "cannot be split into parts"),
+                        (("--parts", 3, survey.scans, "-o", survey.truth), "writes a dataset")):
+        said = survey.run(*words)
+        assert said.returncode == 2 and says in said.stdout, (words, said.stdout)
+    assert not (top / "merged.spld.parts").exists()
 
 
 def check_refusals(survey):
@@ -288,6 +326,7 @@ with tempfile.TemporaryDirectory() as folder:
     else:
         check_at_once(survey)
         check_failures(survey)
+        check_one_file(survey, pathlib.Path(folder))
         check_refusals(survey)
         check_headers(survey, pathlib.Path(folder))
         check_task(survey)

@@ -3,8 +3,14 @@
 
 #include <dirent.h>
 #include <ftw.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
 
 #include "base/error.h"
 #include "support/make_dataset.h"
@@ -49,6 +55,28 @@ size_t folder_count(const char *path)
         count += entry->d_name[0] != '.';
     closedir(dir);
     return count;
+}
+
+char *folder_get(const char *name, size_t *length)
+{
+    FILE *file = fopen(in_folder(name), "rb");
+    spl_assert(file && !fseek(file, 0, SEEK_END));
+    *length = (size_t)ftell(file);
+    rewind(file);
+    char *bytes = malloc(*length + 1);
+    spl_assert(bytes && fread(bytes, 1, *length, file) == *length && !fclose(file));
+    return bytes;
+}
+
+void folder_assert_same(const char *name, const char *other)
+{
+    size_t a, b;
+    char *one = folder_get(name, &a), *second = folder_get(other, &b);
+    const bool same = a == b && !memcmp(one, second, a);
+    free(one);
+    free(second);
+    if (!same)
+        fail_msg("%s and %s are not the same", name, other);
 }
 
 void folder_put(const char *name, const void *bytes, size_t length)

@@ -17,6 +17,12 @@ const char *in_folder(const char *name);
 /* How many are in a folder, but for those that begin with a dot; 0 where it is none. */
 size_t folder_count(const char *path);
 
+/* What file `name` holds, for the caller to free. */
+char *folder_get(const char *name, size_t *length);
+
+/* Fails the test unless both hold the same bytes. */
+void folder_assert_same(const char *name, const char *other);
+
 void folder_put(const char *name, const void *bytes, size_t length);
 void folder_put_text(const char *name, const char *text);
 

@@ -1,14 +1,14 @@
 /* META of a collection: what its own splats are, and the tiles. The caller's thread; nothing is kept. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "pack/collect/collect.h"
 #include "pack/median.h"
+#include "pack/names.h"
 #include "pack/view.h"
 
-enum { radii_most = 65536, sources_most = 1000 };
+enum { radii_most = 65536 };
 
 static json_t *vector(const double v[3])
 {
@@ -36,20 +36,19 @@ static int by_text(const void *a, const void *b)
     return strcmp((*one)->name, (*other)->name);
 }
 
+static const char *name_of(const void *sorted, size_t i)
+{
+    return ((const struct spl_collect_tile *const *)sorted)[i]->name;
+}
+
 static json_t *list_sources(const struct spl_collect *c)
 {
     const struct spl_collect_tile **sorted = spl_alloc_raw(c->count, sizeof *sorted, NULL);
-    json_t *sources = sorted ? json_array() : NULL;
-    char more[48];
-    for (size_t i = 0; sources && i < c->count; i++)
+    for (size_t i = 0; sorted && i < c->count; i++)
         sorted[i] = &c->tiles[i];
-    if (sources)
+    if (sorted)
         qsort(sorted, c->count, sizeof *sorted, by_text);
-    for (size_t i = 0; sources && i < c->count && i < sources_most; i++)
-        json_array_append_new(sources, json_string(sorted[i]->name));
-    snprintf(more, sizeof more, "and %zu more", c->count > sources_most ? c->count - sources_most : 0);
-    if (sources && c->count > sources_most)
-        json_array_append_new(sources, json_string(more));
+    json_t *sources = sorted ? spl_names_describe(name_of, sorted, c->count) : NULL;
     free(sorted);
     return sources;
 }

@@ -98,4 +98,10 @@ int spl_job_pack(const struct spl_job *job, uint32_t part, const struct spl_pack
  * where they are given. SPL_E_INPUT names what is missing or of another job. */
 int spl_job_join(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err);
 
+/* spl_merge() of the collection that the job was joined to; its sources are the scans. */
+int spl_job_merge(const struct spl_job *job, const struct spl_merge_options *options, struct spl_error *err);
+
+/* Removes parts, marks, plan, and the folder where nothing else is in it; what cannot be removed is left. */
+void spl_job_remove(const struct spl_job *job);
+
 #endif

@@ -1,4 +1,4 @@
-/* The parts of a job as a collection, once all are there. The caller's thread. */
+/* The parts of a job as a collection, once all are there, and as one file. The caller's thread. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,7 +6,10 @@
 
 #include "base/memory.h"
 #include "dataset/dataset.h"
+#include "pack/collect/merge.h"
+#include "pack/inputs.h"
 #include "pack/job/part.h"
+#include "pack/names.h"
 
 /* "3, 7-9 and 12" of what is missing, cut where it is long. */
 struct missing {
@@ -130,5 +133,19 @@ int spl_job_join(const struct spl_job *job, const struct spl_collect_options *op
     for (size_t i = 0; i < count; i++)
         free(paths[i]);
     free(paths);
+    return rc;
+}
+
+static const char *name_of_input(const void *job, size_t i)
+{
+    return spl_input_name(((const struct spl_job *)job)->inputs[i].path);
+}
+
+int spl_job_merge(const struct spl_job *job, const struct spl_merge_options *options, struct spl_error *err)
+{
+    json_t *sources = spl_names_describe(name_of_input, job, job->input_count);
+    int rc = sources ? spl_merge_of(options, sources, err)
+                     : spl_fail(err, SPL_E_NOMEM, "out of memory for the names of the scans");
+    json_decref(sources);
     return rc;
 }

@@ -289,29 +289,6 @@ static void test_a_tree_above_the_tiles(void **state)
     spl_dataset_close(city);
 }
 
-static char *read_file(const char *name, size_t *length)
-{
-    FILE *f = fopen(in_folder(name), "rb");
-    assert_non_null(f);
-    fseek(f, 0, SEEK_END);
-    *length = (size_t)ftell(f);
-    rewind(f);
-    char *bytes = malloc(*length);
-    assert_int_equal(fread(bytes, 1, *length, f), *length);
-    fclose(f);
-    return bytes;
-}
-
-static void assert_same(const char *name, const char *other)
-{
-    size_t lengths[2];
-    char *a = read_file(name, &lengths[0]), *b = read_file(other, &lengths[1]);
-    assert_int_equal(lengths[0], lengths[1]);
-    assert_memory_equal(a, b, lengths[0]);
-    free(a);
-    free(b);
-}
-
 static void test_order_and_threads_change_nothing(void **state)
 {
     (void)state;
@@ -324,19 +301,19 @@ static void test_order_and_threads_change_nothing(void **state)
     }
     for (int t = 1; t <= 4; t += 3) {
         assert_int_equal(collect(names, tiles, "other.spld", (unsigned)t, NULL), SPL_OK);
-        assert_same("city.spld", "other.spld");
+        folder_assert_same("city.spld", "other.spld");
     }
     unlink(in_folder("other.spld"));
     folder_put_text("tiles.txt", list);
     assert_int_equal(collect((const char *[]){"@tiles.txt"}, 1, "other.spld", 2, NULL), SPL_OK);
-    assert_same("city.spld", "other.spld");
+    folder_assert_same("city.spld", "other.spld");
     unlink(in_folder("other.spld"));
     /* A folder's own collection is no tile of it. */
     struct spl_error err = {0};
     if (collect((const char *[]){""}, 1, "city.spld", 2, &err))
         fail_msg("%s", err.message);
     assert_int_equal(collect((const char *[]){"@tiles.txt"}, 1, "other.spld", 2, NULL), SPL_OK);
-    assert_same("city.spld", "other.spld");
+    folder_assert_same("city.spld", "other.spld");
     unlink(in_folder("other.spld"));
 }
 
@@ -510,7 +487,7 @@ static void test_collections_in_a_folder_are_no_tiles(void **state)
         if (spl_collect(&options, &err))
             fail_msg("%s", err.message);
         assert_string_equal(left_out, "/city.spld/former.spld/older.spld");
-        assert_same("city.spld", "anew.spld");
+        folder_assert_same("city.spld", "anew.spld");
     }
     refuse(SPL_E_INPUT, "former.spld", tile_name(1),
            "former.spld: it is a collection itself (\"tiles\"); name its tiles");

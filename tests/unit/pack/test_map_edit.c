@@ -131,13 +131,6 @@ static int pack(const char *output, const struct spl_map_options *maps, struct s
     return spl_pack(&options, report, err);
 }
 
-static void assert_same(const char *a, const char *b)
-{
-    char command[600];
-    snprintf(command, sizeof command, "cmp %s %s", in_folder(a), in_folder(b));
-    assert_int_equal(system(command), 0);
-}
-
 static void assert_colored(const char *name, const int color[3])
 {
     struct spl_dataset *dataset;
@@ -185,7 +178,7 @@ static void what_a_scan_brings_along_is_found(void **state)
     assert_int_equal(pack("none.spld", NULL, &report, NULL), 0);
     assert_int_equal(pack("nothing-there.spld", &found, &report, NULL), 0);
     assert_int_equal(report.maps.stations, 0);
-    assert_same("none.spld", "nothing-there.spld");
+    folder_assert_same("none.spld", "nothing-there.spld");
 
     assert_int_equal(mkdir(in_folder("panoramas"), 0777), 0);
     folder_put_text("panoramas/panoramas.json",
@@ -194,7 +187,7 @@ static void what_a_scan_brings_along_is_found(void **state)
     assert_int_equal(pack("broken.spld", &found, &report, &err), 0); /* the image is missing */
     assert_int_equal(report.maps.stations, 0);
     assert_non_null(strstr(warning, "panoramas"));
-    assert_same("none.spld", "broken.spld");
+    folder_assert_same("none.spld", "broken.spld");
     write_panorama("panoramas/a.png", (uint8_t[4]){40, 80, 200, 255});
     if (pack("found.spld", &found, &report, &err))
         fail_msg("%s", err.message);
@@ -323,7 +316,7 @@ static void edits_survive_packing(void **state)
     maps.export_to = exported;
     if (pack("exported.spld", &maps, &report, &err))
         fail_msg("%s", err.message);
-    assert_same("exported.spld", "found.spld");
+    folder_assert_same("exported.spld", "found.spld");
     assert_int_equal(pack("again.spld", &maps, &report, &err), SPL_E_USAGE); /* the folder is not empty now */
     assert_string_equal(err.field, "export-maps");
     assert_int_equal(access(in_folder("again.spld"), F_OK), -1);
@@ -333,7 +326,7 @@ static void edits_survive_packing(void **state)
     maps.edits = exported;
     if (pack("unchanged.spld", &maps, &report, &err))
         fail_msg("%s", err.message);
-    assert_same("unchanged.spld", "found.spld");
+    folder_assert_same("unchanged.spld", "found.spld");
     assert_int_equal(spl_image_load(in_folder("exported/station-1.color.png"), SPL_LAYER_COLOR, &picture, NULL), 0);
     for (size_t t = 0; t < (size_t)picture.width * picture.height; t++)
         memcpy((uint8_t *)picture.pixels + 4 * t, (uint8_t[4]){20, 160, 60, 255}, 4);
