@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/memory.h"
+#include "geom/json.h"
 #include "geom/station.h"
 #include "pack/inputs.h"
 #include "pack/job/names.h"
@@ -306,16 +307,9 @@ static int read_poses(struct reader *r, const json_t *root, struct spl_job *job)
         return fail(r, "poses", "must be an array of at most %d matrices", SPL_NO_STATION - 1);
     if (count && !(job->poses = spl_alloc_raw(count, sizeof *job->poses, r->err)))
         return SPL_E_NOMEM;
-    for (size_t i = 0; i < count; i++) {
-        const json_t *pose = json_array_get(list, i);
-        bool good = json_array_size(pose) == 16;
-        for (size_t k = 0; good && k < 16; k++) {
-            good = json_is_number(json_array_get(pose, k));
-            job->poses[i][k] = json_number_value(json_array_get(pose, k));
-        }
-        if (!good || spl_station_judge(job->poses[i]))
+    for (size_t i = 0; i < count; i++)
+        if (!spl_json_get_numbers(json_array_get(list, i), 16, job->poses[i]) || spl_station_judge(job->poses[i]))
             return fail(r, "poses", "must be 4 x 4 matrices of finite numbers, whose last row is 0, 0, 0, 1");
-    }
     job->rules.poses = (const double(*)[16])job->poses;
     job->rules.pose_count = (uint32_t)count;
     return SPL_OK;
