@@ -144,13 +144,6 @@ static void print_suggestions(const struct spl_dataset_info *info)
     }
 }
 
-static void print_line(const char *label, const char *text)
-{
-    printf("%-16s", label);
-    spl_cmd_put_text(stdout, text, 0);
-    printf("\n");
-}
-
 /* Those that render takes by number: the first, and how many more. */
 static void print_stations(const struct spl_dataset_info *info)
 {
@@ -181,7 +174,7 @@ static void print_lost(const struct spl_info_report *report)
                "lines:\n",
                spl_cmd_group(report->lost_count, text));
     for (uint32_t i = 0; i < report->lost_count && i < SPL_INFO_LOST_MAX; i++)
-        print_line("", report->lost[i].reason);
+        spl_cmd_put_row("", report->lost[i].reason);
     if (report->lost_count > SPL_INFO_LOST_MAX)
         printf("                and %s more\n", spl_cmd_group(report->lost_count - SPL_INFO_LOST_MAX, text));
 }
@@ -273,13 +266,13 @@ void spl_info_print_table(const struct spl_info_report *report)
     spl_cmd_put_text(stdout, info->id, 0);
     printf("  version %016" PRIx64 ", %.1f MB\n", info->version, (double)info->file_bytes / 1e6);
     if (info->title)
-        print_line("  title", info->title);
+        spl_cmd_put_row("title", info->title);
     if (info->tiles)
         printf("  tiles         %s, which take %.1f MB more\n", spl_cmd_group(info->tiles, a),
                (double)info->tile_bytes / 1e6);
     print_lost(report);
     json_array_foreach(json_object_get(meta, "sources"), i, source)
-        print_line(i ? "" : "  source", json_string_value(source));
+        spl_cmd_put_row(i ? "" : "source", json_string_value(source));
     print_splats(report, meta);
     printf("  attributes    %s", info->has_color ? "color" : "no color");
     for (uint32_t s = 0; s < streams; s++)
@@ -302,7 +295,7 @@ void spl_info_print_table(const struct spl_info_report *report)
            info->bounds_min[1], info->bounds_min[2], info->bounds_max[0], info->bounds_max[1], info->bounds_max[2]);
     printf("  unit          %s\n", info->unit);
     if (json_is_string(crs))
-        print_line("  crs", json_string_value(crs));
+        spl_cmd_put_row("crs", json_string_value(crs));
     printf("  default view  --eye %.10g,%.10g,%.10g --target %.10g,%.10g,%.10g --up %g,%g,%g --fov %g\n",
            info->default_eye[0], info->default_eye[1], info->default_eye[2], info->default_target[0],
            info->default_target[1], info->default_target[2], info->default_up[0], info->default_up[1],
