@@ -1,6 +1,6 @@
-/* What the files of 'splatd bench' share: bench_options.c reads the options, bench_table.c prints frame times,
- * bench_sweep.c runs the comparison with a reference, bench_textures.c that of texture coders, bench_left_out.c that
- * with photographs left out of packing. */
+/* What the files of 'splatd bench' share: bench_options.c reads the options and bench_lists.c those that are lists,
+ * bench_table.c prints frame times, bench_sweep.c runs the comparison with a reference, bench_textures.c that of
+ * texture coders, bench_left_out.c that with photographs left out of packing. */
 #ifndef SPL_CMD_BENCH_H
 #define SPL_CMD_BENCH_H
 
@@ -47,7 +47,7 @@ struct spl_cmd_bench_arguments {
     struct spl_path path;
     const char *views, *set;
     uint32_t size[2];     /* of --size; a side that was left out is 0 */
-    bool json, listed[4]; /* listed: --method, --lod, --supersample, --atoms were given */
+    bool json;
     struct spl_bench_options bench;
     struct spl_cmd_bench_sweep sweep;
 };
@@ -55,6 +55,13 @@ struct spl_cmd_bench_arguments {
 /* Fills zeroed `arguments` from the command line and opens the datasets, which the caller closes on failure too; lists
  * point into `argv`. SPL_CMD_DONE after --help, SPL_E_USAGE, and what opening fails with. */
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *arguments, int argc, char **argv, struct spl_error *err);
+
+/* Takes --device, --method, --lod, --supersample, --atoms and --soft-model of struct spl_cmd_bench_arguments: a list,
+ * instead of what was given before. SPL_E_USAGE. */
+int spl_cmd_bench_take_list(void *arguments, const char *option, char *text, struct spl_error *err);
+
+/* What lists have that were not given: one entry each, with -o (whose all of these are) many. */
+void spl_cmd_bench_fill_lists(struct spl_cmd_bench_arguments *arguments);
 
 /* Measures, writes OUT/{bench.json, bench.csv, chart.svg, index.html} and the profile, prints a table to stdout. */
 int spl_cmd_bench_sweep(struct spl_cmd_bench_sweep *options, const struct spl_dataset *dataset, struct spl_error *err);

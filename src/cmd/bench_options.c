@@ -1,5 +1,5 @@
-/* The options of 'splatd bench' for frame times and, with -o, for the comparison with a reference; lists are split at
- * commas. What does not go together is refused here, before anything is measured. */
+/* The options of 'splatd bench' for frame times and, with -o, for the comparison with a reference; lists are those of
+ * bench_lists.c. What does not go together is refused here, before anything is measured. */
 #include "cmd/bench.h"
 
 #include <getopt.h>
@@ -11,65 +11,6 @@
 #include "dataset/dataset.h"
 #include "dataset/remote_url.h"
 #include "geom/size.h"
-#include "render/view.h"
-#include "shared.h"
-
-enum { LIST_MAX = SPL_CMD_BENCH_LIST_MAX };
-_Static_assert((int)SPL_METHOD_COUNT <= (int)LIST_MAX, "all methods fit the list");
-
-/* Splits `text` at commas, in place, and hands each piece to `take`. */
-static int each(const char *option, char *text,
-                int (*take)(struct spl_cmd_bench_arguments *, const char *, struct spl_error *),
-                struct spl_cmd_bench_arguments *a, struct spl_error *err)
-{
-    char *rest = text, *piece;
-    int count = 0, status = 0;
-    while (!status && (piece = strsep(&rest, ","))) {
-        if (++count > LIST_MAX)
-            return spl_fail(err, SPL_E_USAGE, "%s takes at most %d entries", option, LIST_MAX);
-        status = take(a, piece, err);
-    }
-    return status;
-}
-
-static int take_device(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    (void)err;
-    a->devices[a->bench.device_count++] = text;
-    return 0;
-}
-
-static int take_method(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    int method = spl_method_from_name(text);
-    if (method < 0)
-        return spl_fail(err, SPL_E_USAGE, "--method takes %s, not '%s'", spl_method_names(), text);
-    a->methods[a->bench.method_count++] = (enum spl_method)method;
-    return 0;
-}
-
-static int take_lod(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    return spl_cmd_parse_real("--lod", text, 0, 1024, &a->lods[a->bench.lod_count++], err);
-}
-
-static int take_supersample(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    double side = 0;
-    int status = spl_cmd_parse_real("--supersample", text, 0.25, 4, &side, err);
-    if (!status && !spl_supersample_is_known(side))
-        status = spl_fail(err, SPL_E_USAGE, "--supersample takes " SPL_SUPERSAMPLES ", not '%s'", text);
-    a->supersamples[a->supersample_count++] = side;
-    return status;
-}
-
-static int take_atoms(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    uint64_t count = 0;
-    int status = spl_cmd_parse_count("--atoms", text, 0, SPL_TEXTURE_ATOMS, &count, err);
-    a->atoms[a->atom_count++] = (uint32_t)count;
-    return status;
-}
 
 static int take_maps(void *arguments, const char *option, char *text, struct spl_error *err)
 {
@@ -81,46 +22,6 @@ static int take_maps(void *arguments, const char *option, char *text, struct spl
             return SPL_OK;
         }
     return spl_fail(err, SPL_E_USAGE, "%s takes on, off or both, not '%s'", option, text);
-}
-
-/* What a list is given anew replaces what stood there before. */
-static int take_devices(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->bench.device_count = 0;
-    return each(option, text, take_device, a, err);
-}
-
-static int take_methods(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->bench.method_count = 0;
-    a->listed[0] = true;
-    return each(option, text, take_method, a, err);
-}
-
-static int take_lods(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->bench.lod_count = 0;
-    a->listed[1] = true;
-    return each(option, text, take_lod, a, err);
-}
-
-static int take_supersamples(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->supersample_count = 0;
-    a->listed[2] = true;
-    return each(option, text, take_supersample, a, err);
-}
-
-static int take_atom_counts(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->atom_count = 0;
-    a->listed[3] = true;
-    return each(option, text, take_atoms, a, err);
 }
 
 static int take_soft(void *arguments, const char *option, char *text, struct spl_error *err)
@@ -137,31 +38,6 @@ static int take_clip(void *arguments, const char *option, char *text, struct spl
     if (spl_terms_parse(text, "clip", &((struct spl_cmd_bench_arguments *)arguments)->bench.clip, &why))
         return spl_fail_field(err, SPL_E_USAGE, "clip", "%s '%.60s': %s", option, text, why.message);
     return SPL_OK;
-}
-
-static const char *name_of_model(int model)
-{
-    return spl_soft_model_name((enum spl_soft_model)model);
-}
-
-static int take_soft_model(struct spl_cmd_bench_arguments *a, const char *text, struct spl_error *err)
-{
-    int model = 0;
-    int status = spl_cmd_take_name("--soft-model", text, spl_soft_model_from_name, name_of_model, SPL_SOFT_MODEL_COUNT,
-                                   &model, err);
-    for (size_t i = 0; !status && i < a->soft_model_count; i++)
-        if (a->soft_models[i] == (enum spl_soft_model)model)
-            status = spl_fail(err, SPL_E_USAGE, "--soft-model has '%s' twice", text);
-    if (!status)
-        a->soft_models[a->soft_model_count++] = (enum spl_soft_model)model;
-    return status;
-}
-
-static int take_soft_models(void *arguments, const char *option, char *text, struct spl_error *err)
-{
-    struct spl_cmd_bench_arguments *a = arguments;
-    a->soft_model_count = 0;
-    return each(option, text, take_soft_model, a, err);
 }
 
 static int take_size(void *arguments, const char *option, char *text, struct spl_error *err)
@@ -198,10 +74,12 @@ static const struct spl_cmd_option options[] = {
     {"frames", "N", "places on the path", .otherwise = "20; 8 with -o",
      SPL_CMD_COUNT_32(struct spl_cmd_bench_arguments, bench.frames, 2, 100000)},
     {"size", "WxH", "W or xH alone: at 16:9", .otherwise = "1280x720", .take = take_size},
-    {"device", "LIST", "such as vulkan,egl; 'splatd devices' lists them", .otherwise = "auto", .take = take_devices},
+    {"device", "LIST", "such as vulkan,egl; 'splatd devices' lists them", .otherwise = "auto",
+     .take = spl_cmd_bench_take_list},
     {"method", "LIST", "of" SPL_METHODS(METHOD_NAME) ", joined by commas", .otherwise = "the first; all with -o",
-     .take = take_methods},
-    {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o", .take = take_lods},
+     .take = spl_cmd_bench_take_list},
+    {"lod", "LIST", "pixels a splat, such as 1,2", .otherwise = "1; 0.5,0.75,1,1.5,2,3 with -o",
+     .take = spl_cmd_bench_take_list},
     {"maps", "on|off|both", "colours from stations' maps, where the dataset has them", .otherwise = "on; both with -o",
      .take = take_maps},
     {"clip", "TERMS", "what is drawn, as of 'splatd render': of frame times alone, without -o", .take = take_clip},
@@ -209,7 +87,8 @@ static const struct spl_cmd_option options[] = {
      "what is drawn as soft spheres, as of 'splatd render': a row for each of --soft-model, and one where all is "
      "solid; with -o the first model is the reference of all of them",
      .take = take_soft},
-    {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express", .take = take_soft_models},
+    {"soft-model", "LIST", "of express, concentric, base, layer", .otherwise = "express",
+     .take = spl_cmd_bench_take_list},
     {"soft-opacity", "X", "of a soft sphere at its centre", .fallback = "0.3",
      SPL_CMD_REAL(struct spl_cmd_bench_arguments, soft.opacity, 0, 1)},
     {"soft-cover", "X", "share of what soft spheres hide together", .fallback = "1",
@@ -227,9 +106,9 @@ static const struct spl_cmd_option options[] = {
      .otherwise = "the dataset's own render with every splat and 4x4 samples a pixel", .take = take_reference},
     {"photographs", NULL, "the views' photographs are the reference", .take = take_reference},
     {"supersample", "LIST", "samples a pixel side, of 0.25,0.5,1,1.25,1.5,2,4", .otherwise = "0.25,0.5,1,1.25,2",
-     .take = take_supersamples},
+     .take = spl_cmd_bench_take_list},
     {"atoms", "LIST", "of a splat's texture at most, where the dataset has textures", .otherwise = "0,2,8",
-     .take = take_atom_counts},
+     .take = spl_cmd_bench_take_list},
     {"repeats", "N", "times each view and setting is timed", .fallback = "5",
      SPL_CMD_COUNT_32(struct spl_cmd_bench_arguments, sweep.sweep.repeats, 1, SPL_SWEEP_REPEATS_MAX)},
     {"peers", "FILE.csv", "rows name,ms,psnr of other programs, for the same chart",
@@ -265,10 +144,9 @@ const struct spl_cmd_table spl_cmd_bench_table = {
     .count = sizeof options / sizeof *options,
 };
 
-/* With -o some defaults are others, and one dataset on one device is compared. */
+/* With -o one dataset on one device is compared. */
 static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err)
 {
-    static const double lods[] = {0.5, 0.75, 1, 1.5, 2, 3};
     struct spl_cmd_bench_sweep *s = &a->sweep;
     if (a->bench.device_count != 1)
         return spl_fail(err, SPL_E_USAGE, "with -o one device is measured, not %zu", a->bench.device_count);
@@ -276,28 +154,6 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
         return spl_fail(err, SPL_E_USAGE, "--json is for the table of frame times; with -o there is OUT/bench.json");
     if (a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF && (!a->views || a->set))
         return spl_fail(err, SPL_E_USAGE, "a reference is of views that have names: give them with --views");
-    for (int i = 0; i < SPL_METHOD_COUNT && !a->listed[0]; i++) {
-        a->methods[i] = (enum spl_method)i;
-        a->bench.method_count = SPL_METHOD_COUNT;
-    }
-    if (!a->listed[1]) {
-        memcpy(a->lods, lods, sizeof lods);
-        a->bench.lod_count = sizeof lods / sizeof *lods;
-    }
-    if (!a->listed[2]) {
-        a->supersamples[0] = 0.25;
-        a->supersamples[1] = 0.5;
-        a->supersamples[2] = 1;
-        a->supersamples[3] = 1.25;
-        a->supersamples[4] = 2;
-        a->supersample_count = 5;
-    }
-    if (!a->listed[3]) {
-        a->atoms[0] = 0;
-        a->atoms[1] = 2;
-        a->atoms[2] = SPL_TEXTURE_ATOMS;
-        a->atom_count = 3;
-    }
     s->views = a->set ? NULL : a->views;
     s->path = a->bench.path;
     s->places = a->bench.frames ? a->bench.frames : 8;
@@ -311,7 +167,6 @@ static int finish_sweep(struct spl_cmd_bench_arguments *a, struct spl_error *err
     s->supersample_count = a->supersample_count;
     s->atoms = a->atoms;
     s->atom_count = a->atom_count;
-    s->atoms_listed = a->listed[3];
     s->sweep.renderer = SPL_SIZED(spl_renderer_options, .device = a->devices[0], .memory_limit = a->bench.memory_limit);
     return 0;
 }
@@ -366,21 +221,13 @@ static int open_dataset(const char *path, struct spl_dataset **dataset, struct s
 
 int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv, struct spl_error *err)
 {
-    a->devices[0] = "auto";
-    a->methods[0] = SPL_METHOD_DEFAULT;
-    a->lods[0] = 1;
     a->bench = (struct spl_bench_options){
-        .datasets = a->datasets,
-        .devices = a->devices,
-        .device_count = 1,
-        .methods = a->methods,
-        .method_count = 1,
-        .lods = a->lods,
-        .lod_count = 1,
-    };
+        .datasets = a->datasets, .devices = a->devices, .methods = a->methods, .lods = a->lods};
     int status = spl_cmd_table_parse(&spl_cmd_bench_table, argc, argv, a, err);
     if (!status)
         status = finish_soft(a, err);
+    const bool of_sweep = a->supersample_count || a->atom_count;
+    spl_cmd_bench_fill_lists(a);
     double size[2] = {a->size[0], a->size[1]};
     spl_size_follow(size, (const double[]){SPL_WIDTH_DEFAULT, SPL_HEIGHT_DEFAULT});
     a->bench.width = (uint32_t)fmin(size[0], UINT32_MAX);
@@ -388,8 +235,8 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     if (!status && optind == argc)
         status = spl_fail(err, SPL_E_USAGE,
                           "bench needs at least one dataset: splatd bench hall.spld; 'splatd bench --help' shows more");
-    if (!status && argc - optind > LIST_MAX)
-        status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", LIST_MAX);
+    if (!status && argc - optind > SPL_CMD_BENCH_LIST_MAX)
+        status = spl_fail(err, SPL_E_USAGE, "bench takes at most %d datasets", SPL_CMD_BENCH_LIST_MAX);
     if (!status && a->set && !a->views)
         status = spl_fail(err, SPL_E_USAGE, "--set names an entry of --views FILE, which is missing");
     if (!status && a->views && (!a->sweep.output || a->set)) {
@@ -401,8 +248,7 @@ int spl_cmd_bench_parse(struct spl_cmd_bench_arguments *a, int argc, char **argv
     if (!status && a->sweep.output)
         status = finish_sweep(a, err);
     if (!status && !a->sweep.output &&
-        (a->listed[2] || a->listed[3] || a->sweep.peers || a->sweep.profile ||
-         a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
+        (of_sweep || a->sweep.peers || a->sweep.profile || a->sweep.sweep.reference.kind != SPL_REFERENCE_SELF))
         status = spl_fail(err, SPL_E_USAGE,
                           "--supersample, --atoms, --reference, --photographs, --peers and --profile go with -o OUT");
     if (!status && !a->sweep.output && a->sweep.maps_asked && !a->sweep.maps)

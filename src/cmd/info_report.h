@@ -39,7 +39,7 @@ struct spl_info_report {
     double error_most[SPL_CHUNK_KINDS];
     struct spl_faulty_tile lost[SPL_INFO_LOST_MAX]; /* the first of a collection's tiles that cannot be read */
     uint32_t lost_count;                            /* of which nothing is counted that cannot be read */
-    uint64_t clips;                                                          /* splats that end at a clip line */
+    uint64_t clips;                                 /* splats that end at a clip line */
 };
 
 /* Fills *report, which borrows the dataset. Blocks on disk. */
@@ -59,18 +59,15 @@ static inline bool spl_info_has_primitives(const struct spl_dataset_info *info)
     return info->panels || info->meshes;
 }
 
-/* Of a dataset that has, of a point that was kept, as spl_info_splats_a_point() says. */
+/* Of a dataset that has, of a point that was kept. */
 double spl_info_bytes_per_splat(const struct spl_dataset_info *info, int attribute);
 double spl_info_total_bytes_per_splat(const struct spl_dataset_info *info);
 
-/* Times this, bytes a splat are bytes a point that was kept: coarser levels have splats besides. */
-static inline double spl_info_splats_a_point(const struct spl_dataset_info *info)
-{
-    return spl_info_has_primitives(info) ? 1 : (double)info->splats / (double)info->leaf_splats;
-}
-
 /* The root of the mean squared distance of panels' points to their planes, or of meshes' to them. */
 double spl_info_error_mean(const struct spl_info_report *report, enum spl_chunk_kind kind);
+
+/* Prints it to stdout for people. */
+void spl_info_print_table(const struct spl_info_report *report);
 
 /* As printed with --json; NULL when memory is refused. */
 json_t *spl_info_to_json(const struct spl_info_report *report);

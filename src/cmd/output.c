@@ -41,6 +41,13 @@ void spl_cmd_put_text(FILE *out, const char *text, int width)
         fputc(' ', out);
 }
 
+void spl_cmd_put_row(const char *label, const char *text)
+{
+    printf("  %-14s", label);
+    spl_cmd_put_text(stdout, text, 0);
+    putchar('\n');
+}
+
 const char *spl_cmd_group(uint64_t value, char text[32])
 {
     char digits[24];

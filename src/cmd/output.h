@@ -15,6 +15,9 @@ int spl_cmd_write_output(const char *path, const void *bytes, size_t length, str
 /* A text of a file's, as spl_text_show() has it, in at least `width` characters. */
 void spl_cmd_put_text(FILE *out, const char *text, int width);
 
+/* A line of a table on stdout: the label, 14 columns wide, and the text likewise. */
+void spl_cmd_put_row(const char *label, const char *text);
+
 /* 1234567 as "1,234,567" in `text`, which is returned. */
 const char *spl_cmd_group(uint64_t value, char text[32]);
 

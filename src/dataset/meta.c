@@ -11,21 +11,9 @@
 #include "dataset/open.h"
 #include "dataset/saved_views.h"
 #include "geom/ground.h"
+#include "geom/json.h"
 #include "geom/station.h"
 #include "geom/unit.h"
-
-/* Of what is no number and no text the shape alone. */
-static const char *show_shape(const json_t *value, char text[40])
-{
-    if (json_is_array(value))
-        snprintf(text, 40, "an array of %zu", json_array_size(value));
-    else
-        strcpy(text, !value                   ? "missing"
-                     : json_is_object(value)  ? "an object"
-                     : json_is_boolean(value) ? json_is_true(value) ? "true" : "false"
-                                              : "null");
-    return text;
-}
 
 /* `what` is what is allowed: "FILE: section META: "KEY" is VALUE, and must be WHAT". `path` is the key's, from the top.
  */
@@ -33,7 +21,7 @@ static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const
                  const char *what)
 {
     char shape[40], *text = NULL;
-    const char *shown = show_shape(value, shape);
+    const char *shown = spl_json_show_shape(value, shape);
     if (json_is_string(value) || json_is_number(value))
         shown = text = json_dumps(value, JSON_ENCODE_ANY | JSON_REAL_PRECISION(17));
     int rc = spl_fail_field(err, SPL_E_CORRUPT, path,
@@ -124,14 +112,12 @@ static int get_fit(struct spl_dataset *dataset, struct spl_error *err)
 {
     const char *path = "default_view.fit";
     const json_t *fit = json_object_get(json_object_get(dataset->meta, "default_view"), "fit");
+    double *angles = dataset->info.default_fit;
     if (!fit)
         return SPL_OK;
-    bool good = json_is_array(fit) && json_array_size(fit) == 2;
-    for (size_t i = 0; good && i < 2; i++) {
-        double angle = json_number_value(json_array_get(fit, i));
-        good = json_is_number(json_array_get(fit, i)) && angle > 0 && angle <= 179;
-        dataset->info.default_fit[i] = angle;
-    }
+    bool good = spl_json_get_numbers(fit, 2, angles);
+    for (int i = 0; good && i < 2; i++)
+        good = angles[i] > 0 && angles[i] <= 179;
     return good ? SPL_OK : wrong(dataset, err, path, fit, "two numbers of degrees above 0, up to 179");
 }
 
@@ -180,13 +166,8 @@ static int get_stations(struct spl_dataset *dataset, struct spl_error *err)
     if (count && !(dataset->stations = spl_alloc_raw(count, sizeof *dataset->stations, err)))
         return SPL_E_NOMEM;
     for (size_t i = 0; i < count; i++) {
-        const json_t *matrix = json_array_get(stations, i), *number = matrix;
-        bool good = json_is_array(matrix) && json_array_size(matrix) == 16;
-        for (size_t j = 0; good && j < 16; j++) {
-            good = json_is_number(number = json_array_get(matrix, j));
-            dataset->stations[i][j] = json_number_value(number);
-        }
-        if (!good)
+        const json_t *matrix = json_array_get(stations, i);
+        if (!spl_json_get_numbers(matrix, 16, dataset->stations[i]))
             return wrong_entry(dataset, err, key, i, NULL, matrix, "a matrix of 16 numbers");
         const char *needed = spl_station_judge(dataset->stations[i]);
         if (needed)
@@ -294,6 +275,11 @@ static int get_counts(struct spl_dataset *dataset, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Behind the numbers of points and levels, in this order. */
+static int (*const checks[])(struct spl_dataset *dataset, struct spl_error *err) = {
+    check_pruned,  get_bounds,   get_view,    get_fit,  get_said,                get_attributes,
+    check_sources, get_stations, check_color, get_unit, spl_dataset_read_streams};
+
 int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
 {
     struct spl_dataset_info *info = &dataset->info;
@@ -325,28 +311,8 @@ int spl_dataset_check_meta(struct spl_dataset *dataset, struct spl_error *err)
         rc = wrong(dataset, err, "leaf_splats", json_object_get(dataset->meta, "leaf_splats"), "at most \"points\"");
     if (!rc)
         rc = get_count(dataset, "levels", UINT8_MAX + 1, "a whole number from 1 to 256", &levels, err);
-    if (!rc)
-        rc = check_pruned(dataset, err);
-    if (!rc)
-        rc = get_bounds(dataset, err);
-    if (!rc)
-        rc = get_view(dataset, err);
-    if (!rc)
-        rc = get_fit(dataset, err);
-    if (!rc)
-        rc = get_said(dataset, err);
-    if (!rc)
-        rc = get_attributes(dataset, err);
-    if (!rc)
-        rc = check_sources(dataset, err);
-    if (!rc)
-        rc = get_stations(dataset, err);
-    if (!rc)
-        rc = check_color(dataset, err);
-    if (!rc)
-        rc = get_unit(dataset, err);
-    if (!rc)
-        rc = spl_dataset_read_streams(dataset, err);
+    for (size_t i = 0; !rc && i < sizeof checks / sizeof *checks; i++)
+        rc = checks[i](dataset, err);
     if (!rc && (!json_is_number(radius) || !(json_number_value(radius) > 0)))
         rc = wrong(dataset, err, "splat_radius", radius, "a number above 0");
     if (rc)

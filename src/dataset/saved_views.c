@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geom/json.h"
 #include "geom/size.h"
 
 bool spl_view_name_is_valid(const char *name)
@@ -48,14 +49,12 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
 static int get_vector(const json_t *json, const char *name, double out[3], struct spl_error *err)
 {
     const json_t *array = json_object_get(json, name);
-    bool good = json_is_array(array) && json_array_size(array) == 3;
-    for (size_t c = 0; good && c < 3; c++) {
-        good = json_is_number(json_array_get(array, c));
-        out[c] = json_number_value(json_array_get(array, c)) + 0.0; /* no -0 */
-    }
-    return good ? SPL_OK
-                : spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array of three numbers%s", name,
-                                 array ? "" : ", and is missing");
+    if (!spl_json_get_numbers(array, 3, out))
+        return spl_fail_field(err, SPL_E_INPUT, name, "%s must be an array of three numbers%s", name,
+                              array ? "" : ", and is missing");
+    for (int c = 0; c < 3; c++)
+        out[c] += 0.0; /* no -0 */
+    return SPL_OK;
 }
 
 /* As short as JSON is, keys in one order: equal settings are equal texts. */

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "geom/distortion.h"
+#include "geom/json.h"
 
 enum spl_value_kind {
     SPL_KIND_NUMBER,
@@ -130,15 +131,6 @@ int spl_camera_from_open3d(const json_t *json, struct spl_camera *camera, struct
 
 /* A number of an object. What stands before the last dot of `path` is for messages only. */
 int spl_json_get_number(const json_t *object, const char *path, double *out, struct spl_error *err);
-
-/* Why jansson has refused a text, for messages; where.text, but for what that tells in names of its own. */
-const char *spl_json_fault(const json_error_t *where);
-
-/* "an object", "text", …: for messages. */
-const char *spl_json_type_name(const json_t *json);
-
-/* The same with the length of what is an array: "an array of 3". Returns `text`. */
-const char *spl_json_show_shape(const json_t *json, char text[40]);
 
 /* Defaults, conflicts, ranges, the pose and the intrinsics in any of their forms, near and far. `values` is indexed by
  * enum spl_camera_param. `defaults` may be NULL where no dataset is at hand: pose and intrinsics must then be given; up

@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/json.h"
+
 static int read_number(const json_t *view, const char *where, const char *key, double *out, struct spl_error *err)
 {
     const json_t *value = json_object_get(view, key);
@@ -17,13 +19,8 @@ static int read_number(const json_t *view, const char *where, const char *key, d
 
 static int read_vector(const json_t *view, const char *where, const char *key, double out[3], struct spl_error *err)
 {
-    const json_t *value = json_object_get(view, key);
-    for (size_t i = 0; i < 3; i++) {
-        const json_t *number = json_array_get(value, i);
-        if (json_array_size(value) != 3 || !json_is_number(number))
-            return spl_fail_field(err, SPL_E_INPUT, key, "%s needs three numbers '%s'", where, key);
-        out[i] = json_number_value(number);
-    }
+    if (!spl_json_get_numbers(json_object_get(view, key), 3, out))
+        return spl_fail_field(err, SPL_E_INPUT, key, "%s needs three numbers '%s'", where, key);
     return 0;
 }
 

@@ -11,6 +11,7 @@
 #include "pack/scans.h"
 #include "pack/system.h"
 #include "pack/view.h"
+#include "pack/warn.h"
 
 struct spl_build {
     const struct spl_pack_options *options;
@@ -33,6 +34,18 @@ struct spl_build {
     struct spl_emitted emitted;
     struct spl_dataset_writer *writer;
 };
+
+#define spl_build_warn(build, ...)                                                                                     \
+    spl_pack_warn((build)->options->warn, (build)->options->progress_context, __VA_ARGS__)
+
+/* Says how long the stages will take (build_plan.c). */
+void spl_build_plan(const struct spl_build *build, const struct spl_passes *later);
+
+/* Whether the end is done once more, without panels, for the maps of stations. The beginning and the end of what lies
+ * on disk; the end explains what failed with `rc` for want of room there, and returns it (build_spill.c). */
+bool spl_build_writes_twice(const struct spl_build *build, const struct spl_passes *later);
+int spl_build_begin_spill(struct spl_build *build, const struct spl_passes *later, struct spl_error *err);
+int spl_build_end_spill(struct spl_build *build, int rc, struct spl_error *err);
 
 /* META of the dataset, once it is encoded; NULL: no memory (describe.c). */
 json_t *spl_build_describe(const struct spl_build *build, double radius, const struct spl_default_view *view);

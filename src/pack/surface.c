@@ -8,8 +8,8 @@
  * Points whose wide neighbours are asked for anyway get their clip line at once, of either sign of their normal.
  *
  * What a point's own neighbours give (radius.c) is held against the radii around it (settle.c), more strictly where
- * there is no surface. */
-#include "pack/points.h"
+ * there is no surface. Which way normals point is surface_sides.c's. */
+#include "pack/surface_parts.h"
 
 #include <malloc.h>
 #include <math.h>
@@ -18,52 +18,12 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "pack/clip.h"
 #include "pack/median.h"
-#include "pack/orient_join.h"
-#include "pack/radius.h"
-#include "pack/settle.h"
-#include "pack/shell.h"
 
-enum { block_points = 1 << 16 };
-_Static_assert((int)block_points <= UINT16_MAX + 1, "components of a block are told apart by 16 bits");
 static const float lone_radius = 0.01f;             /* of a point without any other, metres */
 static const float smallest_radius = 1e-9f;         /* keeps squares and quotients of floats in range */
 static const float flat_limit = 4, round_limit = 2; /* times what is usual in the run of points around */
 enum { wide_factor = 3 };
-
-struct block {
-    struct spl_unsettled unsettled;
-    struct spl_clip_foreseen *lines;
-    size_t line_count;
-    struct spl_component *components;
-    uint32_t component_count, first_component;
-};
-
-struct scratch {                 /* of one worker */
-    struct spl_moments *moments; /* of each point of the block */
-    uint32_t *neighbours;        /* k a point, unused ones UINT32_MAX */
-    float *limit; /* of each point, in turn: its farthest neighbour's distance, the factor of its run's median
-                     radius, that times the median, its settled radius */
-    struct spl_clip_foreseen *lines; /* of the block */
-    struct spl_orient orient;
-};
-
-struct surface {
-    struct spl_points *points;
-    struct spl_neighbours *neighbours;
-    struct spl_stage *stage;
-    struct scratch *scratch;
-    struct block *blocks;
-    size_t block_count;
-    uint8_t *edge; /* a bit of each point: its surface may end there, and nobody has looked; NULL: no clip lines */
-    struct spl_clip_turns turns;
-    uint16_t *label;  /* component of each point within its block; NULL when every side is known */
-    uint8_t *goes_on; /* a bit of each point, where there are labels: it is one of a level piece that goes on */
-    struct spl_component *components;
-    unsigned k, wide;
-    atomic_bool failed;
-};
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
 static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
@@ -89,22 +49,8 @@ static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, 
     return known;
 }
 
-static bool orient_inner(struct surface *s, struct block *block, struct scratch *w, size_t begin, size_t end)
-{
-    struct spl_orient *o = &w->orient;
-    block->component_count = spl_orient_block(o, s->points, begin, end, w->neighbours, s->k);
-    block->components = spl_alloc_raw(block->component_count, sizeof *block->components, NULL);
-    if (!block->components)
-        return false;
-    memcpy(block->components, o->components, block->component_count * sizeof *block->components);
-    for (size_t i = begin; i < end; i++) {
-        s->label[i] = (uint16_t)o->label[i - begin];
-        s->goes_on[i / 8] |= (uint8_t)((o->kind[i - begin] != 0) << i % 8); /* blocks share no byte */
-    }
-    return true;
-}
-
-static bool keep_lines(const struct surface *s, struct block *block, const struct scratch *w, size_t count)
+static bool keep_lines(const struct spl_surfaces *s, struct spl_surface_block *block,
+                       const struct spl_surface_scratch *w, size_t count)
 {
     block->lines = spl_spill_take(s->points->spill, count, sizeof *block->lines, NULL);
     if (!block->lines)
@@ -117,11 +63,11 @@ static bool keep_lines(const struct surface *s, struct block *block, const struc
 
 static void surface_block(void *context, size_t begin_block, size_t end_block, unsigned worker)
 {
-    struct surface *s = context;
-    struct scratch *w = &s->scratch[worker];
+    struct spl_surfaces *s = context;
+    struct spl_surface_scratch *w = &s->scratch[worker];
     for (size_t b = begin_block; b < end_block; b++) {
-        size_t begin = b * block_points;
-        size_t end = begin + block_points < s->points->count ? begin + block_points : s->points->count;
+        size_t begin = b * SPL_SURFACE_BLOCK;
+        size_t end = begin + SPL_SURFACE_BLOCK < s->points->count ? begin + SPL_SURFACE_BLOCK : s->points->count;
         struct spl_nearest near;
         if (spl_stage_is_cancelled(s->stage))
             return;
@@ -162,7 +108,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         const struct spl_settle_block settle = {
             s->points, begin, end, w->neighbours, s->label ? w->orient.label : NULL, s->k, &vicinity, w->limit};
         if (!keep_lines(s, &s->blocks[b], w, line_count) ||
-            (s->label && !orient_inner(s, &s->blocks[b], w, begin, end)) ||
+            (s->label && !spl_surface_orient_block(s, &s->blocks[b], w, begin, end)) ||
             spl_unsettled_init(&s->blocks[b].unsettled, &settle)) {
             atomic_store(&s->failed, true);
             return;
@@ -171,105 +117,9 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     }
 }
 
-static bool goes_on(const struct surface *s, size_t i)
-{
-    return s->goes_on[i / 8] >> i % 8 & 1;
-}
-
-/* What a point that waits says of its component and those of its neighbours. */
-static int add_edges(struct surface *s, size_t b, size_t unsettled, struct spl_orient_join *join, struct spl_error *err)
-{
-    const struct block *block = &s->blocks[b];
-    const uint32_t i = block->unsettled.points[unsettled].index, own = block->first_component + s->label[i];
-    uint32_t room[SPL_NEIGHBOURS_MAX];
-    const uint32_t *list = spl_unsettled_get_neighbours(&block->unsettled, unsettled, room);
-    int rc = SPL_OK;
-    for (unsigned a = 0; !rc && a < s->k && list[a] != UINT32_MAX; a++) {
-        size_t in = list[a] / block_points;
-        uint32_t other = s->blocks[in].first_component + s->label[list[a]];
-        if (other != own)
-            rc = spl_orient_join_add(join, own, other, spl_orient_agreement(s->points, i, list[a]),
-                                     in != b && goes_on(s, i) && goes_on(s, list[a]), err);
-    }
-    return rc;
-}
-
-static struct spl_component *component_of(const struct surface *s, size_t i)
-{
-    return &s->components[s->blocks[i / block_points].first_component + s->label[i]];
-}
-
-/* What is closed all around has as much above as below, so up says little of it: a room shows in, a thing out. Of large
- * components some points stand for all. */
-static int turn_shells(struct surface *s, size_t count, struct spl_error *err)
-{
-    enum { many = 4096, some = 8 };
-    const struct spl_points *p = s->points;
-    bool any = false;
-    for (size_t c = 0; c < count; c++)
-        any |= s->components[c].unsure;
-    if (!any || p->eye_count)
-        return SPL_OK;
-    struct spl_shell *shells = spl_alloc(count, sizeof *shells, err); /* of each tree */
-    if (!shells)
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->count; i++) {
-        const struct spl_component *c = component_of(s, i);
-        const bool sampled = c->count > many;
-        double place[3], area = (double)p->radius[i] * p->radius[i] * (sampled ? some : 1);
-        if (i % 4096 == 0)
-            spl_spill_keep_bound(p->spill);
-        if (!c->unsure || (sampled && i % some))
-            continue;
-        for (int x = 0; x < 3; x++)
-            place[x] = spl_points_at(p, x, i) - spl_points_at(p, x, 0);
-        spl_shell_add(&shells[c->tree], place, p->normal[i], p->up, area, c->flip);
-    }
-    for (size_t c = 0; c < count; c++)
-        s->components[c].flip ^= spl_shell_is_inside_out(&shells[s->components[c].tree], s->components[c].doubtful);
-    free(shells);
-    return SPL_OK;
-}
-
-static int join_blocks(struct surface *s, struct spl_error *err)
-{
-    size_t components = 0;
-    struct spl_orient_join join;
-    for (size_t b = 0; b < s->block_count; b++) {
-        s->blocks[b].first_component = (uint32_t)components;
-        components += s->blocks[b].component_count;
-    }
-    s->components = spl_alloc_raw(components, sizeof *s->components, err);
-    if (!s->components)
-        return SPL_E_NOMEM;
-    for (size_t b = 0; b < s->block_count; b++)
-        memcpy(s->components + s->blocks[b].first_component, s->blocks[b].components,
-               s->blocks[b].component_count * sizeof *s->components);
-    int rc = spl_orient_join_init(&join, s->components, components, s->points->spill, err);
-    for (size_t b = 0; !rc && b < s->block_count; b++)
-        for (size_t d = 0; !rc && d < s->blocks[b].unsettled.count; d++) {
-            if (d % 256 == 0)
-                spl_spill_keep_bound(s->points->spill);
-            rc = add_edges(s, b, d, &join, err);
-        }
-    rc = rc ? rc : spl_orient_join_decide(&join, err);
-    spl_orient_join_finish(&join);
-    return rc ? rc : turn_shells(s, components, err);
-}
-
-static void flip_block(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct surface *s = context;
-    (void)worker;
-    for (size_t i = begin; i < end; i++)
-        if (component_of(s, i)->flip)
-            for (int c = 0; c < 3; c++)
-                s->points->normal[i][c] = -s->points->normal[i][c];
-}
-
 static void set_lines(void *context, size_t begin, size_t end, unsigned worker)
 {
-    struct surface *s = context;
+    struct spl_surfaces *s = context;
     (void)worker;
     for (size_t b = begin; b < end; b++)
         spl_clip_set_foreseen(s->points, &s->turns, s->blocks[b].lines, s->blocks[b].line_count);
@@ -277,7 +127,7 @@ static void set_lines(void *context, size_t begin, size_t end, unsigned worker)
 
 static void settle_rest(void *context, size_t begin, size_t end, unsigned worker)
 {
-    struct surface *s = context;
+    struct spl_surfaces *s = context;
     (void)worker;
     for (size_t b = begin; b < end; b++)
         spl_settle_find(s->points, &s->blocks[b].unsettled);
@@ -298,17 +148,7 @@ static float find_usual_reach(const struct spl_points *p, const struct spl_neigh
     return fmaxf(spl_median(reach, n), smallest_radius * smallest_radius);
 }
 
-static bool all_sides_known(const struct spl_points *p)
-{
-    for (size_t i = 0; i < p->count; i++) {
-        bool given = p->normal[i][0] != 0 || p->normal[i][1] != 0 || p->normal[i][2] != 0;
-        if (!given && !(p->station && p->station[i] != SPL_NO_STATION))
-            return false;
-    }
-    return true;
-}
-
-static int allocate(struct surface *s, struct spl_error *err)
+static int allocate(struct spl_surfaces *s, struct spl_error *err)
 {
     struct spl_points *p = s->points;
     p->radius = spl_spill_alloc_raw(p->spill, p->count, sizeof *p->radius, err);
@@ -317,12 +157,12 @@ static int allocate(struct surface *s, struct spl_error *err)
         p->normal = spl_spill_alloc(p->spill, p->count + SPL_POINTS_PAD, sizeof *p->normal, err);
     if (!p->radius || !p->uncertainty || !p->normal)
         return SPL_E_NOMEM;
-    s->block_count = (p->count + block_points - 1) / block_points;
+    s->block_count = (p->count + SPL_SURFACE_BLOCK - 1) / SPL_SURFACE_BLOCK;
     s->blocks = spl_alloc(s->block_count, sizeof *s->blocks, err);
     s->scratch = spl_alloc(s->stage->threads, sizeof *s->scratch, err);
     if (!s->blocks || !s->scratch)
         return SPL_E_NOMEM;
-    size_t capacity = p->count < block_points ? p->count : block_points;
+    size_t capacity = p->count < SPL_SURFACE_BLOCK ? p->count : SPL_SURFACE_BLOCK;
     for (unsigned t = 0; t < s->stage->threads; t++) {
         s->scratch[t].neighbours = spl_alloc_raw(capacity, s->k * sizeof(uint32_t), err);
         s->scratch[t].limit = spl_alloc_raw(capacity, sizeof(float), err);
@@ -332,7 +172,7 @@ static int allocate(struct surface *s, struct spl_error *err)
             spl_orient_init(&s->scratch[t].orient, capacity, s->k, err))
             return SPL_E_NOMEM;
     }
-    if (!all_sides_known(p)) {
+    if (!spl_surface_knows_sides(p)) {
         s->label = spl_spill_alloc_raw(p->spill, p->count, sizeof *s->label, err);
         s->goes_on = spl_spill_alloc(p->spill, p->count / 8 + 1, 1, err);
         if (!s->label || !s->goes_on)
@@ -350,7 +190,7 @@ static int allocate(struct surface *s, struct spl_error *err)
 }
 
 /* What clip lines are not made of. */
-static void finish_scratch(struct surface *s)
+static void finish_scratch(struct spl_surfaces *s)
 {
     for (size_t b = 0; s->blocks && b < s->block_count; b++) {
         spl_unsettled_finish(&s->blocks[b].unsettled);
@@ -375,7 +215,7 @@ static void finish_scratch(struct surface *s)
     malloc_trim(0); /* a tenth of what there is, in pieces, which would stay until the end */
 }
 
-static void finish(struct surface *s)
+static void finish(struct spl_surfaces *s)
 {
     finish_scratch(s);
     for (size_t b = 0; s->blocks && b < s->block_count; b++)
@@ -397,7 +237,7 @@ static void lone_point(struct spl_points *p)
 int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines, struct spl_stage *stage,
                 struct spl_error *err)
 {
-    struct surface s = {.points = points, .stage = stage, .k = neighbours};
+    struct spl_surfaces s = {.points = points, .stage = stage, .k = neighbours};
     s.wide = wide_factor * neighbours < SPL_NEIGHBOURS_MAX ? wide_factor * neighbours : SPL_NEIGHBOURS_MAX;
     spl_clip_turns_init(&s.turns);
     spl_stage_begin(stage, "normals and radii", "points", points->count);
@@ -418,12 +258,8 @@ int spl_surface(struct spl_points *points, unsigned neighbours, bool clip_lines,
     }
     if ((rc = spl_stage_check(stage, err)))
         goto done;
-    if (s.label) {
-        rc = join_blocks(&s, err);
-        if (rc)
-            goto done;
-        spl_parallel_for(stage->threads, points->count, block_points, flip_block, &s);
-    }
+    if (s.label && (rc = spl_surface_join_blocks(&s, err)))
+        goto done;
     spl_parallel_for(stage->threads, s.block_count, 1, settle_rest, &s);
     for (size_t b = 0; b < s.block_count; b++)
         spl_settle_store(points, &s.blocks[b].unsettled);

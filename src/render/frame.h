@@ -1,4 +1,4 @@
-/* A frame in the making, shared by steps.c (the whole) and frame.c (one tile). Everything belongs to the renderer's
+/* A frame in the making, shared by steps.h (the whole) and frame.c (one tile). Everything belongs to the renderer's
  * thread. */
 #ifndef SPL_RENDER_FRAME_H
 #define SPL_RENDER_FRAME_H

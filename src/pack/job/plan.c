@@ -1,6 +1,4 @@
-/* A plan: the scans looked at, all that parts do alike decided, space cut. Where scans are many and their headers say
- * where their points are, headers alone are read; then every attribute that a scan may have is kept, since whether all
- * points have the same is not known. Else all points are read once. The caller's thread. */
+/* A plan: the scans looked at, all that parts do alike decided, space cut. The caller's thread. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,35 +9,21 @@
 #include "base/parallel.h"
 #include "pack/bound.h"
 #include "pack/check.h"
-#include "pack/job/paths.h"
 #include "pack/job/part.h"
+#include "pack/job/paths.h"
+#include "pack/job/plan_parts.h"
 #include "pack/job/stamp.h"
-#include "pack/job/survey.h"
 #include "pack/kept.h"
 #include "pack/maps/pictures.h"
 #include "pack/points.h"
 #include "pack/said.h"
 #include "pack/warn.h"
 
-enum { cells_least = 1 << 15, cells_most = 1 << 18, cells_a_part = 1 << 12, scans_a_part = 4, cell_points = 16 };
 static const double linear_points = 10, cells_finest = 0x1p-30; /* wires are looked for in cells of so many points */
 
 /* Spacings that a halo is wide: of what half of the points have, and of what nearly all have. A point's radius is held
  * against those of its neighbours, of which the 36th is 3.4 spacings away. */
 static const double halo_usual = 5, halo_wide = 3;
-
-struct planning {
-    const struct spl_plan_options *options;
-    struct spl_stage stage;
-    struct spl_keep keep;
-    struct spl_inputs inputs;
-    struct spl_scans scans;
-    struct spl_system system;
-    struct spl_job_cell *cells; // owned
-    size_t cell_count;
-    struct spl_job_spacing spacing;
-    struct spl_job *job;
-};
 
 /* What is put onto a packed scan, or found in all of it at once. */
 static int check_options(const struct spl_plan_options *options, struct spl_error *err)
@@ -81,77 +65,6 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
     return rc ? rc : spl_said_check(o, err);
 }
 
-/* Whether headers say all that there is to be known: LAS is the format whose values are whole numbers, but for fields
- * that are kept by name. How unevenly a scan's points lie in its box they do not say, which in many small boxes evens
- * out. */
-static bool headers_tell(const struct planning *p)
-{
-    bool tell = p->scans.count / scans_a_part >= p->options->parts && !p->keep.count;
-    uint64_t points = 0;
-    for (size_t i = 0; tell && i < p->scans.count; i++)
-        points += p->scans.list[i].counted ? p->scans.list[i].points_expected : 0;
-    for (size_t i = 0; tell && i < p->scans.count; i++) {
-        const struct spl_scan *scan = &p->scans.list[i];
-        tell = scan->has_box && !(scan->attributes & SPL_CLOUD_STATION) &&
-               (!scan->counted || scan->points_expected <= points / p->options->parts / 2);
-        for (int c = 0; c < 3 && tell; c++)
-            tell = fabs(scan->box[0][c]) <= SPL_COORDINATE_MAX && fabs(scan->box[1][c]) <= SPL_COORDINATE_MAX;
-    }
-    return tell;
-}
-
-static int take_headers(struct planning *p, struct spl_error *err)
-{
-    struct spl_part_rules *rules = &p->job->rules;
-    uint32_t all = ~0u;
-    if (!(p->cells = spl_alloc(p->scans.count, sizeof *p->cells, err)))
-        return SPL_E_NOMEM;
-    for (size_t i = 0; i < p->scans.count; i++) {
-        struct spl_scan *scan = &p->scans.list[i];
-        scan->points_inside = scan->counted ? scan->points_expected : 0;
-        if (!scan->points_inside)
-            continue;
-        struct spl_job_cell *cell = &p->cells[p->cell_count++];
-        cell->points = (double)scan->points_inside;
-        scan->points_from[scan->colors.from] = scan->points_inside;
-        for (int c = 0; c < 3; c++) {
-            cell->min[c] = scan->min[c] = scan->box[0][c];
-            cell->max[c] = scan->max[c] = scan->box[1][c];
-        }
-        rules->scalars |= scan->scalars;
-        all &= scan->scalars;
-    }
-    for (int s = 0; s < SPL_SCALAR_COUNT; s++) /* one that some scans lack has points without it */
-        rules->steps[s] = (struct spl_scalar_steps){all >> s & 1, 0, 1};
-    spl_job_find_spacing(p->cells, p->cell_count, &p->spacing);
-    return SPL_OK;
-}
-
-static int count_points(struct planning *p, struct spl_error *err)
-{
-    size_t cells = (size_t)p->options->parts * cells_a_part;
-    cells = cells < cells_least ? cells_least : cells > cells_most ? cells_most : cells;
-    struct spl_job_grid *grid = spl_job_grid_create(cells, err);
-    struct spl_job_cell *coarse = NULL;
-    size_t count = 0, before = 0;
-    int rc = grid ? spl_survey(&p->scans, grid, &p->job->rules, &p->stage, err) : SPL_E_NOMEM;
-    if (!rc && !(p->cells = spl_job_grid_get_cells(grid, &p->cell_count, err)))
-        rc = SPL_E_NOMEM;
-    /* cells with a few points say little of how far these are apart */
-    for (count = p->cell_count; !rc && count > 8 && count != before && spl_job_grid_get_usual(grid) < cell_points;) {
-        before = count;
-        spl_job_grid_coarsen(grid);
-        free(coarse);
-        if (!(coarse = spl_job_grid_get_cells(grid, &count, err)))
-            rc = SPL_E_NOMEM;
-    }
-    if (!rc)
-        spl_job_find_spacing(coarse ? coarse : p->cells, coarse ? count : p->cell_count, &p->spacing);
-    free(coarse);
-    spl_job_grid_destroy(grid);
-    return rc;
-}
-
 /* Whose points say which of them saw each: of others nothing is numbered. */
 static bool has_stations(const struct spl_scan *scan)
 {
@@ -159,7 +72,7 @@ static bool has_stations(const struct spl_scan *scan)
 }
 
 /* Where they stand, by their numbers: a part reads some of the scans, and knows all stations. */
-static int take_stations(struct planning *p, struct spl_error *err)
+static int take_stations(struct spl_planning *p, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     uint32_t count = 0;
@@ -184,7 +97,7 @@ static int take_stations(struct planning *p, struct spl_error *err)
 }
 
 /* Which scan a point is of is kept as in a pack of all. */
-static void number_scans(struct planning *p)
+static void number_scans(struct spl_planning *p)
 {
     struct spl_part_rules *rules = &p->job->rules;
     bool stations, missing = false;
@@ -205,7 +118,7 @@ static void number_scans(struct planning *p)
     rules->steps[SPL_SCALAR_SCAN] = (struct spl_scalar_steps){!missing, 0, 1};
 }
 
-static int take_input(struct planning *p, struct spl_scan *scan, struct spl_error *err)
+static int take_input(struct spl_planning *p, struct spl_scan *scan, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     struct spl_job_input *input = &job->inputs[job->input_count];
@@ -229,7 +142,7 @@ static int take_input(struct planning *p, struct spl_scan *scan, struct spl_erro
     return rc;
 }
 
-static int take_inputs(struct planning *p, struct spl_error *err)
+static int take_inputs(struct spl_planning *p, struct spl_error *err)
 {
     int rc = SPL_OK;
     if (!(p->job->inputs = spl_alloc(p->scans.count, sizeof *p->job->inputs, err)))
@@ -246,7 +159,7 @@ static int take_inputs(struct planning *p, struct spl_error *err)
 }
 
 /* A part may be small beside what primitives may be off, where the whole is not. */
-static int check_error(const struct planning *p, struct spl_error *err)
+static int check_error(const struct spl_planning *p, struct spl_error *err)
 {
     const double unit = p->system.unit_m > 0 ? p->system.unit_m : 1;
     const struct spl_bound bound = {.error = p->options->pack.error / unit, .unit_m = unit};
@@ -260,7 +173,7 @@ static int check_error(const struct planning *p, struct spl_error *err)
     return spl_bound_check_size(&bound, &all, err);
 }
 
-static int cut(struct planning *p, struct spl_error *err)
+static int cut(struct spl_planning *p, struct spl_error *err)
 {
     struct spl_job *job = p->job;
     const double asked = p->options->halo;
@@ -280,7 +193,7 @@ static int cut(struct planning *p, struct spl_error *err)
 }
 
 /* Parts do what the plan's options say. */
-static int take_options(struct planning *p, struct spl_error *err)
+static int take_options(struct spl_planning *p, struct spl_error *err)
 {
     const struct spl_pack_options *from = &p->options->pack;
     struct spl_job *job = p->job;
@@ -308,7 +221,7 @@ static int take_options(struct planning *p, struct spl_error *err)
 }
 
 /* Nobody asked for what scans bring along, so it is no reason to refuse them. */
-static int mention_panoramas(const struct planning *p, struct spl_error *err)
+static int mention_panoramas(const struct spl_planning *p, struct spl_error *err)
 {
     const struct spl_pack_options *o = &p->options->pack;
     struct spl_map_sources found = {0};
@@ -324,7 +237,7 @@ static int mention_panoramas(const struct planning *p, struct spl_error *err)
     return rc;
 }
 
-static int plan(struct planning *p, struct spl_error *err)
+static int plan(struct spl_planning *p, struct spl_error *err)
 {
     const struct spl_pack_options *o = &p->options->pack;
     const struct spl_inputs_listener listener = {o->warn, o->left_out, o->progress_context};
@@ -344,7 +257,7 @@ static int plan(struct planning *p, struct spl_error *err)
     if (!rc && o->note)
         spl_scans_tell(&p->scans, o->note, o->progress_context);
     if (!rc)
-        rc = headers_tell(p) ? take_headers(p, err) : count_points(p, err);
+        rc = spl_plan_find_points(p, err);
     if (!rc)
         rc = spl_system_find(&p->system, &p->scans, &said, err);
     if (!rc && o->warn)
@@ -377,7 +290,7 @@ static int write_plan(const struct spl_job *job, bool *unchanged, struct spl_err
 int spl_job_plan(const struct spl_plan_options *options, struct spl_job *job, bool *unchanged, struct spl_error *err)
 {
     const struct spl_pack_options *o = &options->pack;
-    struct planning p = {.options = options,
+    struct spl_planning p = {.options = options,
                          .job = job,
                          .stage = {.callback = o->progress,
                                    .context = o->progress_context,

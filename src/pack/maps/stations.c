@@ -61,26 +61,18 @@ static int add(struct spl_stations *stations, size_t *capacity, const double pos
     return SPL_OK;
 }
 
-/* META's stations, 4 x 4 by rows. One that is mirrored or bent keeps its place and stands upright. */
-static int take_scanned(struct spl_stations *stations, const json_t *list, struct spl_error *err)
+/* Those of the scan. One that is mirrored or bent keeps its place and stands upright. */
+static int take_scanned(struct spl_stations *stations, const double (*poses)[16], uint32_t count,
+                        struct spl_error *err)
 {
     size_t capacity = 0;
     int rc = SPL_OK;
-    for (size_t i = 0; !rc && i < json_array_size(list); i++) {
-        double m[16], rotation[9], position[3];
-        bool finite = true;
-        for (size_t k = 0; k < 16; k++) {
-            m[k] = json_number_value(json_array_get(json_array_get(list, i), k));
-            finite &= isfinite(m[k]) != 0;
-        }
+    for (uint32_t i = 0; !rc && i < count; i++) {
+        const double *m = poses[i], position[3] = {m[3], m[7], m[11]};
+        double rotation[9];
         for (int k = 0; k < 9; k++)
             rotation[k] = m[k / 3 * 4 + k % 3];
-        for (int k = 0; k < 3; k++)
-            position[k] = m[4 * k + 3];
-        if (!finite)
-            rc = spl_fail(err, SPL_E_INPUT, "station %zu has a pose that is no number", i + 1);
-        else
-            rc = add(stations, &capacity, position, spl_rotation_straighten(rotation) ? rotation : NULL, err);
+        rc = add(stations, &capacity, position, spl_rotation_straighten(rotation) ? rotation : NULL, err);
     }
     return rc;
 }
@@ -276,11 +268,11 @@ int spl_stations_init(struct spl_stations *stations, const struct spl_splats *sp
                       struct spl_error *err)
 {
     const struct spl_dataset_info *info = spl_dataset_get_info(splats->dataset);
-    const json_t *known = json_object_get(spl_dataset_get_meta(splats->dataset), "stations");
+    const uint32_t known = info->stations_of_maps ? 0 : info->station_count;
     int scan = spl_dataset_find_stream(splats->dataset, "scan"), rc;
     double unit_m, metre = spl_unit_parse(info->unit, &unit_m) && unit_m > 0 ? 1 / unit_m : 1;
-    *stations = (struct spl_stations){.scanned = json_array_size(known) == 1 || (json_array_size(known) && scan >= 0)};
-    rc = json_array_size(known) ? take_scanned(stations, known, err) : take_eyes(stations, views, metre, err);
+    *stations = (struct spl_stations){.scanned = known == 1 || (known && scan >= 0)};
+    rc = known ? take_scanned(stations, info->stations, known, err) : take_eyes(stations, views, metre, err);
     if (!rc && !stations->count)
         rc =
             spl_fail_field(err, SPL_E_INPUT, "panoramas",

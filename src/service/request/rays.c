@@ -47,16 +47,9 @@ int spl_rays_from_json(const json_t *list, struct spl_rays **out, struct spl_err
                               (int)SPL_RAYS_JSON_MAX, (int)SPL_RAYS_MAX);
     double *directions = spl_alloc_raw(3 * count, sizeof *directions, err);
     int rc = directions ? 0 : SPL_E_NOMEM;
-    for (size_t i = 0; i < count && !rc; i++) {
-        const json_t *one = json_array_get(list, i);
-        for (size_t k = 0; k < 3 && !rc; k++) {
-            const json_t *number = json_array_get(one, k);
-            directions[3 * i + k] = json_number_value(number);
-            if (!json_is_number(number) || json_array_size(one) != 3)
-                rc = spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] must be three numbers, [x, y, z]",
-                                    i);
-        }
-    }
+    for (size_t i = 0; i < count && !rc; i++)
+        if (!spl_json_get_numbers(json_array_get(list, i), 3, directions + 3 * i))
+            rc = spl_fail_field(err, SPL_E_INPUT, "directions", "directions[%zu] must be three numbers, [x, y, z]", i);
     rc = rc ? rc : spl_rays_create(directions, count, out, err);
     free(directions);
     return rc;

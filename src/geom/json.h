@@ -1,0 +1,21 @@
+/* What readers of JSON share: values, and words about them for messages. Pure functions, any thread. */
+#ifndef SPL_GEOM_JSON_H
+#define SPL_GEOM_JSON_H
+
+#include <stdbool.h>
+
+#include <jansson.h>
+
+/* An array of `count` numbers. False where it is none; `out` is of no use then. */
+bool spl_json_get_numbers(const json_t *array, size_t count, double *out);
+
+/* Why jansson has refused a text, for messages; where.text, but for what that tells in names of its own. */
+const char *spl_json_fault(const json_error_t *where);
+
+/* "an object", "text", …: for messages. */
+const char *spl_json_type_name(const json_t *json);
+
+/* The same with the length of what is an array: "an array of 3". Returns `text`. */
+const char *spl_json_show_shape(const json_t *json, char text[40]);
+
+#endif
