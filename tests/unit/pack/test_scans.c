@@ -220,9 +220,9 @@ static void test_guesses_are_noted(void **state)
         {"x[m] y[m] z[m]\n", "%d.5 %d 3\n", ""},
         {"x y z[m]\n", "%d.5 %d 3\n",
          "a.txt: its headings name z in m, which is no unit of all three and not used: --unit says which one it is\n"},
-        {"x[m] y[ft] z[m]\n", "%d.5 %d 3\n",
-         "a.txt: its headings name x in m, y in ft, z in m, which is no unit of all three and not used: --unit says "
-         "which one it is\n"},
+        {"x[m] y z[m]\n", "%d.5 %d 3\n",
+         "a.txt: its headings name x in m, z in m, which is no unit of all three and not used: --unit says which one "
+         "it is\n"},
         {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
         {"Nr Y X H\n", "P%d %d 4 3\n",
          "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
@@ -548,6 +548,32 @@ static void test_coordinate_systems(void **state)
     }
 }
 
+/* Headings of a text that contradict each other, and what users may say of them. */
+static void test_units_of_headings(void **state)
+{
+    (void)state;
+    char *path = path_of("units.csv");
+    const char *units[] = {NULL, "m"};
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fputs("x_m,y_ft,z_m\n1,2,3\n4,5,6\n", f);
+    assert_int_equal(fclose(f), 0);
+    for (int i = 0; i < 2; i++) {
+        struct spl_pack_options options = {.size = sizeof options,
+                                           .inputs = (const char **)&path,
+                                           .input_count = 1,
+                                           .output = path_of("out.spld"),
+                                           .threads = 1,
+                                           .unit = units[i]};
+        struct spl_error err = {0};
+        assert_int_equal(spl_pack(&options, NULL, &err), i ? 0 : SPL_E_INPUT);
+        if (i == 0) {
+            assert_string_equal(err.field, "unit");
+            assert_non_null(strstr(err.message, "units.csv: its headings say x in m, y in ft, z in m: bring"));
+        }
+    }
+}
+
 /* What lies far from 0 has lost its millimetres; what is only large has not. */
 static void test_coarse_floats(void **state)
 {
@@ -705,6 +731,7 @@ int main(void)
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
+        cmocka_unit_test(test_units_of_headings),
         cmocka_unit_test(test_coarse_floats),
         cmocka_unit_test(test_uncounted_points),
         cmocka_unit_test(test_strays),
