@@ -50,6 +50,7 @@ struct spl_cloud_coordinates {
     double step[3];       /* that they are multiples of; 0 = not said */
     double first[3];      /* from where on these are counted */
     bool floats;          /* of 32 bits, so that their steps grow with their size */
+    char apart[96];       /* of x and y, where headings name units that contradict each other, "x in m, y in ft"; "" */
     char lost[200];       /* what it says of its system and is not kept, as a sentence; "" = nothing */
 };
 
@@ -97,13 +98,13 @@ struct spl_cloud_info {
      * first numbers or names the points. */
     char guessed[192];
     /* Headings of a text whose columns fill nothing, as "Code, Dist"; of other files what is called as a colour, and
-     * gives none, "rgb (a list)"; "" = none */
+     * gives none, "rgb (a list)", or as another one, "x (again)"; "" = none */
     char unused[200];
     /* Of a text whose columns nothing names, or the letters X and Y: what is odd about them where x may be the north,
      * "x has seven digits and y six"; static, NULL = nothing */
     const char *north_first; // may be NULL
     char footer[192]; /* of a text that ends in words: which lines are left out; "" = none */
-    char units[96];   /* a text's headings, where they name units that do not fit each other: "x in m, y in ft"; "" */
+    char units[96];   /* a text's headings, where they name units of some axes alone: "z in m"; "" = none */
     bool surveyors;   /* a text's headings Y and X were taken for east and north, x and y here */
     const char *fields;                   /* borrowed: names of what the file has, as far as it names any; "" = none */
     uint32_t image_count;                 /* inside the file: spl_view_list_load_photographs() takes them */

@@ -95,13 +95,17 @@ bool spl_text_packed_judge(const struct spl_text_packed *packed, struct spl_layo
 /* The colour of that column's next field: as spl_layout_number(). */
 enum spl_field spl_layout_packed(const struct spl_layout *layout, struct spl_fields *fields, uint32_t *rgb);
 
-/* The units of x, y and z that headings name, "X [m]", "z (US ft)", "easting_ft", in metres; SPL_TEXT_DEGREES of
- * degrees, 0 of none. */
+/* The units of x, y and z that headings name, "X [m]", "z (US ft)", "easting_usft", "Z / m", in metres;
+ * SPL_TEXT_DEGREES of degrees, 0 of none. */
 #define SPL_TEXT_DEGREES (-1.0)
 void spl_layout_find_units(const struct spl_layout *layout, const char *line, size_t length, double units[3]);
 
 /* The same of one unit, "m", "US ft". */
 double spl_text_unit(const char *text, size_t length);
+
+/* The same of one heading, 0 where it names none, and how much of it is the name: in brackets, or as its last words
+ * where `words`. Any brackets are no part of a name, and no points at its end. */
+double spl_text_split_unit(const char *name, size_t length, bool words, size_t *bare);
 
 /* Does a header line name longitudes or latitudes? */
 bool spl_text_names_degrees(const char *line, size_t length);
@@ -169,8 +173,8 @@ struct spl_text_look {
     bool strewn[2]; /* the first two do not rise line by line, the first before the second, or the other way round */
     bool coarse;    /* they are no small whole numbers, or too few follow */
     bool inner[3];  /* of the three behind the first two, some are no whole numbers */
-    bool near;              /* the three behind it are not a place on a map: two of six digits, and a height */
-    bool fine[3];           /* of the three behind it, some are no whole numbers */
+    bool near;      /* the three behind it are not a place on a map: two of six digits, and a height */
+    bool fine[3];   /* of the three behind it, some are no whole numbers */
     uint64_t last, second;
     double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */

@@ -36,12 +36,17 @@ static bool next_name(struct spl_fields *fields, const char **name, size_t *leng
 /* "X [m]", "R(0-255)" and "Nr." without what is behind. */
 static size_t without_unit(const char *name, size_t length)
 {
-    size_t bare = 0;
-    while (bare < length && name[bare] != '[' && name[bare] != '(')
-        bare++;
-    while (bare > 1 && strchr(" \t.", name[bare - 1]))
-        bare--;
-    return bare ? bare : length;
+    size_t bare;
+    spl_text_split_unit(name, length, false, &bare);
+    return bare;
+}
+
+/* The same, and "x_usft" and "Z / m" too. */
+static size_t without_words(const char *name, size_t length)
+{
+    size_t bare;
+    spl_text_split_unit(name, length, true, &bare);
+    return bare;
 }
 
 /* What other languages, surveyors and programs call columns: small letters, without what only parts words. Letters
@@ -221,6 +226,8 @@ static int column_from_synonym(const char *name, size_t length, bool letters, en
     word[n] = 0;
     if (n == 0 || n + 1 == sizeof word)
         return SPL_COLUMN_SKIP;
+    if (pass == PASS_AXES && column_from_rest(word, true) >= 0) /* "X [m]" */
+        return column_from_word(word);
     return pass == PASS_WORDS ? column_from_word(word) : column_from_part(word, pass == PASS_AXES);
 }
 
@@ -231,7 +238,7 @@ bool spl_text_names_degrees(const char *line, size_t length)
     const char *name;
     size_t size;
     while (next_name(&fields, &name, &size))
-        if (IS_ONE_OF(degrees, name, without_unit(name, size)))
+        if (IS_ONE_OF(degrees, name, without_words(name, size)))
             return true;
     return false;
 }
@@ -243,7 +250,7 @@ static bool has_letters(struct spl_fields fields)
     size_t length;
     unsigned found = 0;
     while (next_name(&fields, &name, &length)) {
-        length = without_unit(name, length);
+        length = without_words(name, length);
         found |= is(name, length, "e") ? 1 : is(name, length, "n") ? 2 : 0;
     }
     return found == 3;
@@ -260,6 +267,10 @@ static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
         size_t length;
         for (unsigned i = 0; i < layout->fields && next_name(&again, &name, &length); i++) {
             int column = column_from_synonym(name, without_unit(name, length), letters, (enum pass)pass);
+            if (column < 0)
+                column = column_from_synonym(name, without_words(name, length), letters, (enum pass)pass);
+            if (column > SPL_COLUMN_Z && without_words(name, length) < without_unit(name, length))
+                column = SPL_COLUMN_SKIP; /* "r_m" is a range, and no red */
             if (column >= 0 && layout->column[i] < 0 && !spl_layout_has(layout, column))
                 layout->column[i] = (int8_t)column;
         }
@@ -278,7 +289,7 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
     size_t length;
     bool numbered = false;
     for (unsigned i = 0, stage = 0; next_name(&fields, &name, &length); i++) {
-        length = without_unit(name, length);
+        length = without_words(name, length);
         numbered |= !stage && IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && layout->column[i] == SPL_COLUMN_Z;
         const char *blank = memchr(name, ' ', length);

@@ -110,29 +110,30 @@ const char *spl_text_show_latin(const char *line, size_t *length, char out[SPL_T
     return latin ? out : line;
 }
 
-/* What headings, or a line below them, say of x, y and z. Units that do not fit each other are told and not taken; a
- * height's own is a height's own. */
+/* What headings, or a line below them, say of x, y and z. Units of some axes alone are told and not taken, those that
+ * contradict each other refused by who needs one; a height's own is a height's own. */
 static void take_units(struct spl_cloud *cloud, const double units[3])
 {
     struct spl_cloud_coordinates *c = &cloud->info.coordinates;
-    char text[3][SPL_UNIT_TEXT_MAX], *told = cloud->info.units;
-    size_t used = 0, size = sizeof cloud->info.units;
-    bool degrees = units[0] < 0 && units[1] < 0, fits = units[0] == units[1] && (units[0] != 0 || units[2] == 0);
+    const bool fits = units[0] == units[1] && (units[0] != 0 || units[2] == 0);
+    const bool apart = units[0] != 0 && units[1] != 0 && !(fits && units[2] >= 0);
+    char text[SPL_UNIT_TEXT_MAX], *told = apart ? c->apart : cloud->info.units;
+    size_t used = 0, size = apart ? sizeof c->apart : sizeof cloud->info.units;
     if (units[0] == 0 && units[1] == 0 && units[2] == 0)
         return;
     c->unit_m = c->height_unit_m = 0;
-    c->angles = fits && degrees;
-    told[0] = 0;
+    c->angles = false;
+    c->apart[0] = cloud->info.units[0] = 0;
     if (fits && units[2] >= 0) {
-        c->unit_m = degrees ? 0 : units[0];
+        c->angles = units[0] < 0;
+        c->unit_m = c->angles ? 0 : units[0];
         c->height_unit_m = units[2];
         return;
     }
-    c->angles = false;
     for (int k = 0; k < 3; k++)
         if (units[k] != 0)
             used += (size_t)snprintf(told + used, size - used, "%s%c in %s", used ? ", " : "", 'x' + k,
-                                     units[k] < 0 ? "degrees" : spl_unit_print(units[k], text[k]));
+                                     units[k] < 0 ? "degrees" : spl_unit_print(units[k], text));
 }
 
 /* The names that columns are found by. */
@@ -218,7 +219,7 @@ static bool is_units(const struct spl_layout *layout, const char *line, size_t l
         if (column < SPL_COLUMN_X || column > SPL_COLUMN_Z)
             continue;
         units[column - SPL_COLUMN_X] = spl_text_unit(unit, size);
-        found += units[column - SPL_COLUMN_X] > 0;
+        found += units[column - SPL_COLUMN_X] != 0;
     }
     return found == 3;
 }

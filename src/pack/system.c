@@ -121,6 +121,11 @@ static int check_unit(const struct finding *f, const struct spl_scan *scan, bool
             "--filters.reprojection.out_srs=EPSG:…\"; where they are none, say it with --crs EPSG:N or "
             "--unit m",
             scan->path, name_system(c, system));
+    if (c->apart[0])
+        return spl_fail_field(err, SPL_E_INPUT, "unit",
+                              "%.120s: its headings say %s: bring them into one unit first; where they are in one, "
+                              "say in which with --unit",
+                              scan->path, c->apart);
     if (c->unit_m == 0 || c->height_unit_m == 0 || spl_unit_is_same(c->unit_m, c->height_unit_m))
         return SPL_OK;
     spl_unit_print(c->unit_m, a);

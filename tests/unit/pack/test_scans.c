@@ -220,9 +220,9 @@ static void test_guesses_are_noted(void **state)
         {"x[m] y[m] z[m]\n", "%d.5 %d 3\n", ""},
         {"x y z[m]\n", "%d.5 %d 3\n",
          "a.txt: its headings name z in m, which is no unit of all three and not used: --unit says which one it is\n"},
-        {"x[m] y[ft] z[m]\n", "%d.5 %d 3\n",
-         "a.txt: its headings name x in m, y in ft, z in m, which is no unit of all three and not used: --unit says "
-         "which one it is\n"},
+        {"x[m] y z[m]\n", "%d.5 %d 3\n",
+         "a.txt: its headings name x in m, z in m, which is no unit of all three and not used: --unit says which one "
+         "it is\n"},
         {"x y z Rot foo g\n", "%d.5 %d 3 9 9 9\n", "a.txt: columns not used: Rot, foo, g\n"},
         {"Nr Y X H\n", "P%d %d 4 3\n",
          "a.txt: Y is the east and X the north, as surveyors have it: x and y here; columns not used: Nr\n"},
@@ -407,6 +407,7 @@ static void test_coordinate_systems(void **state)
                       *degrees = "GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174],AUTHORITY[\"EPSG\",\"4326\"]]",
                       *here = "PROJCS[\"Here\",UNIT[\"metre\",1]]", *there = "PROJCS[\"There\",UNIT[\"metre\",1]]",
                       *nameless = "PROJCS[\"unnamed\",UNIT[\"metre\",1]]",
+                      *other = "PROJCS[\"O\",UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25833\"]]",
                       *mixed = "COMPD_CS[\"C\",PROJCS[\"P\","
                                "UNIT[\"metre\",1]],VERT_CS[\"V\",UNIT[\"foot\",0.3048]]]",
                       *alike = "COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"foot\",0.3048]],VERT_CS[\"V\","
@@ -510,6 +511,21 @@ static void test_coordinate_systems(void **state)
          "a.las (and 1 more): the WKT of its coordinate system cannot be read (WKT, byte 7: "},
         {{GRID, 0, 0, "PROJCS[\"no end", REST}, {0}, NULL, "EPSG:25832", "m | EPSG:25832", NULL},
         {{GRID, 25832, 0, "PROJCS[\"no end", REST}, {0}, NULL, NULL, "m | EPSG:25832", NULL},
+        /* what contradicts itself */
+        {{GRID, 25832, 0, other, REST},
+         {0},
+         NULL,
+         NULL,
+         "m | EPSG:25832",
+         "a.las: its GeoTIFF keys say EPSG:25832 in m and its WKT EPSG:25833 in m: the keys are taken; --crs"},
+        {{GRID, 0, 9003, other, REST},
+         {0},
+         NULL,
+         NULL,
+         "us-ft | null",
+         "a.las: its GeoTIFF keys say us-ft and its WKT EPSG:25833 in m: the keys are taken; --crs"},
+        {{GRID, 25833, 0, other, REST}, {0}, NULL, NULL, "m | EPSG:25833", NULL},
+        {{GRID, 0, 9001, here, REST}, {0}, NULL, NULL, "m | PROJCS[\"Here\",UNIT[\"metre\",1]]", NULL},
         {{GRID, 25832, 9002, NULL, REST},
          {0},
          NULL,
@@ -545,6 +561,32 @@ static void test_coordinate_systems(void **state)
         if (strcmp(meta, rows[i].meta) != 0 || (rows[i].said ? !strstr(text, rows[i].said) : *text))
             fail_msg("row %zu: %s: %s", i, meta, text);
         assert_true(!code || code == SPL_E_INPUT || code == SPL_E_USAGE);
+    }
+}
+
+/* Headings of a text that contradict each other, and what users may say of them. */
+static void test_units_of_headings(void **state)
+{
+    (void)state;
+    char *path = path_of("units.csv");
+    const char *units[] = {NULL, "m"};
+    FILE *f = fopen(path, "wb");
+    assert_non_null(f);
+    fputs("x_m,y_ft,z_m\n1,2,3\n4,5,6\n", f);
+    assert_int_equal(fclose(f), 0);
+    for (int i = 0; i < 2; i++) {
+        struct spl_pack_options options = {.size = sizeof options,
+                                           .inputs = (const char **)&path,
+                                           .input_count = 1,
+                                           .output = path_of("out.spld"),
+                                           .threads = 1,
+                                           .unit = units[i]};
+        struct spl_error err = {0};
+        assert_int_equal(spl_pack(&options, NULL, &err), i ? 0 : SPL_E_INPUT);
+        if (i == 0) {
+            assert_string_equal(err.field, "unit");
+            assert_non_null(strstr(err.message, "units.csv: its headings say x in m, y in ft, z in m: bring"));
+        }
     }
 }
 
@@ -589,6 +631,13 @@ static void test_uncounted_points(void **state)
         pack_two(write_las("padded.las", &(struct las){.scale = 0.001, .red = 1, .count = 201, .uncounted = 1}), NULL,
                  false, NULL),
         "");
+    const char *none[] = {write_las("none.las", &(struct las){.scale = 0.001, .red = 1, .count = 50, .uncounted = 50})};
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = none, .input_count = 1, .output = path_of("out.spld"), .threads = 1};
+    struct spl_error err = {0};
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "none.las: no usable point (0 skipped as empty or not finite; "
+                                        "50 more than its header counts could lie there: mend the header's number)"));
 }
 
 enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */
@@ -705,6 +754,7 @@ int main(void)
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
         cmocka_unit_test(test_coordinate_systems),
+        cmocka_unit_test(test_units_of_headings),
         cmocka_unit_test(test_coarse_floats),
         cmocka_unit_test(test_uncounted_points),
         cmocka_unit_test(test_strays),
