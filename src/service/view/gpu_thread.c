@@ -249,7 +249,7 @@ static bool is_near_deadline(const struct spl_job *job)
 static void look_after(struct spl_job *job)
 {
     if (job->waits && is_near_deadline(job))
-        spl_frame_stop_waiting(job->steps);
+        atomic_store(&spl_job_get_whole(job)->awaited, spl_frame_stop_waiting(job->steps));
     if (!job->waits || spl_frame_is_waiting(job->steps))
         return;
     uint64_t now = spl_now_ns();
