@@ -90,6 +90,8 @@ struct spl_frame_stats {
     uint64_t panels_drawn, meshes_drawn, lines_drawn; /* as whole ones or cell by cell; straight pieces of lines */
     uint64_t soft_drawn;        /* soft spheres, in every window that they are drawn in */
     double soft_ms;             /* of their stage, as the others */
+    double kernels_ms;          /* making kernels that were not there yet, host time, which is in total_ms and may be in
+                                   any stage; of views that several devices draw 0 */
 };
 
 struct spl_frame {

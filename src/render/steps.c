@@ -454,11 +454,13 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    const double *making_ms = &steps->job.renderer->kernels.making_ms, made_ms = *making_ms;
     steps->view.deadline_ns = deadline_ns;
     steps->paused = false;
     spl_soft_pause_begin(&steps->job.pause);
     int rc = go_on(steps, deadline_ns, err);
     steps->frame.stats.total_ms += spl_since_ms(&clock);
+    steps->frame.stats.kernels_ms += *making_ms - made_ms;
     *more = rc >= 0 && spl_frame_get_samples_left(steps);
     return rc < 0 ? rc : SPL_OK;
 }

@@ -317,6 +317,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     if (!renderer->hung) {
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
+        usleep((useconds_t)setting("FAKE_KERNELS_MS", 0) * 1000);
+        steps->frame.stats.kernels_ms = (double)setting("FAKE_KERNELS_MS", 0);
         if (setting("FAKE_LOSE_FRAME", 0))
             return lose(renderer, err);
     }
