@@ -90,6 +90,8 @@ struct spl_frame_stats {
     uint64_t panels_drawn, meshes_drawn, lines_drawn; /* as whole ones or cell by cell; straight pieces of lines */
     uint64_t soft_drawn;        /* soft spheres, in every window that they are drawn in */
     double soft_ms;             /* of their stage, as the others */
+    double kernels_ms;          /* making kernels that were not there yet, host time, which is in total_ms and may be in
+                                   any stage; of views that several devices draw 0 */
 };
 
 struct spl_frame {
@@ -262,8 +264,9 @@ SPL_API int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, 
 SPL_API bool spl_frame_is_waiting(struct spl_frame_steps *steps);
 
 /* Its deadline is near: tiles that it waits for are drawn as they are from afar where the view is without_late_tiles;
- * other pages are waited for. Idempotent. */
-SPL_API void spl_frame_stop_waiting(struct spl_frame_steps *steps);
+ * other pages are waited for. Returns which tile it waits for still, counted from 1 in the order of the collection's
+ * file, the one that says nothing before others; 0: none. Idempotent. */
+SPL_API uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps);
 
 /* Of spl_view_get_samples(), what is still to be made: a guess for whoever shares out turns. */
 SPL_API uint64_t spl_frame_get_samples_left(const struct spl_frame_steps *steps);

@@ -96,8 +96,9 @@ bool spl_dataset_is_without(const struct spl_dataset *dataset, uint32_t part);
  * without need not wait for it. Any thread. */
 bool spl_dataset_is_late(const struct spl_dataset *dataset, uint32_t part);
 
-/* Why one of its tiles is late, the first in the order of the file; false: none is. Any thread. */
-bool spl_dataset_tell_late(const struct spl_dataset *dataset, char *out, size_t size);
+/* Why a view is late that waits for this part: what its tile's fault is, or else that it is being read still. 0: why
+ * any of its tiles is late, the first in the order of the file; false: none is. Any thread. */
+bool spl_dataset_tell_late(const struct spl_dataset *dataset, uint32_t part, char *out, size_t size);
 
 /* Finds it to be so: nothing of it came for as long as somebody could wait, and its read goes on. */
 void spl_dataset_find_late(const struct spl_dataset *dataset, uint32_t part);

@@ -93,13 +93,18 @@ bool spl_dataset_is_late(const struct spl_dataset *dataset, uint32_t part)
     return part && atomic_load(&dataset->tiles->fault_count) && atomic_load(&dataset->tiles->list[part - 1].late);
 }
 
-bool spl_dataset_tell_late(const struct spl_dataset *dataset, char *out, size_t size)
+bool spl_dataset_tell_late(const struct spl_dataset *dataset, uint32_t part, char *out, size_t size)
 {
     struct spl_tiles *tiles = dataset->tiles;
-    bool found = false;
-    if (!tiles || !atomic_load(&tiles->fault_count))
+    bool found = part != 0;
+    if (!tiles || (!part && !atomic_load(&tiles->fault_count)))
         return false;
     pthread_mutex_lock(&tiles->mutex);
+    if (part && tiles->list[part - 1].fault)
+        snprintf(out, size, "%s", tiles->list[part - 1].fault);
+    else if (part) // a few bytes a second come of it
+        snprintf(out, size, "%s: its tile %s was still being read", spl_dataset_get_name(dataset),
+                 tiles->list[part - 1].file);
     for (uint32_t i = 0; i < tiles->count && !found; i++)
         if ((found = tiles->list[i].fault && atomic_load(&tiles->list[i].late)))
             snprintf(out, size, "%s", tiles->list[i].fault);

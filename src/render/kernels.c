@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/array.h"
+#include "base/clock.h"
 
 struct spl_kernel_made {
     struct spl_kernel_key key;
@@ -81,7 +82,9 @@ int spl_kernels_get(struct spl_kernels *kernels, struct spl_gpu *gpu, const stru
     }
     if (spl_array_reserve(kernels->made, kernels->capacity, kernels->count + 1, err))
         return SPL_E_NOMEM;
+    const uint64_t clock = spl_now_ns();
     int rc = make(gpu, key, out, err);
+    kernels->making_ms += (double)(spl_now_ns() - clock) / SPL_NS_PER_MS;
     if (!rc)
         kernels->made[kernels->count++] = (struct spl_kernel_made){*key, *out, kernels->turn, false};
     return rc;

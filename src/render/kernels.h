@@ -30,6 +30,7 @@ struct spl_kernels {
     uint64_t turn; /* the tile's that is recorded: when a kernel was used */
     bool parallel; /* the frame's rays are: what is got is made so */
     uint32_t random; /* which goes */
+    double making_ms; /* of all that were made, of those that failed too */
     size_t more;   /* than SPL_KERNELS_MOST may be kept, for whoever goes round in more */
 };
 

@@ -87,24 +87,32 @@ static bool may_do_without_tiles(const struct spl_frame_steps *steps)
     return steps->wanted.without_late_tiles && spl_dataset_get_info(steps->dataset)->tiles && !steps->job.hurries;
 }
 
-/* For whoever asks why the view did not come. */
-static void note_late_tiles(struct spl_frame_steps *steps)
+/* For whoever asks why the view did not come: returns the part that it waits for, one that hangs before one of which
+ * something comes; 0: none. */
+static uint32_t note_late_tiles(struct spl_frame_steps *steps)
 {
     const struct spl_hold *hold = &steps->job.hold;
+    uint32_t awaited = 0, hanging = 0;
     for (size_t i = hold->come; hold->waits && i < hold->count; i++) {
         const uint32_t part = spl_slot_get_part(steps->dataset, hold->slots[i]);
-        if (part && !hold->pages[hold->slots[i]].filled &&
-            spl_io_part_hangs(steps->job.renderer->residency.io, steps->dataset, part))
-            spl_dataset_find_late(steps->dataset, part);
+        if (!part || hold->pages[hold->slots[i]].filled)
+            continue;
+        awaited = awaited ? awaited : part;
+        if (!spl_io_part_hangs(steps->job.renderer->residency.io, steps->dataset, part))
+            continue;
+        spl_dataset_find_late(steps->dataset, part);
+        hanging = hanging ? hanging : part;
     }
+    return hanging ? hanging : awaited;
 }
 
-void spl_frame_stop_waiting(struct spl_frame_steps *steps)
+uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps)
 {
     if (may_do_without_tiles(steps))
         do_without_tiles(&steps->job);
     else if (!steps->wanted.without_late_tiles)
-        note_late_tiles(steps);
+        return note_late_tiles(steps);
+    return 0;
 }
 
 /* SPL_SLOT_PENDING: it waits. */
@@ -122,8 +130,8 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
         rc = SPL_OK;
     } else if (why.code) {
         char late[sizeof why.message] = "";
-        note_late_tiles(steps);
-        bool told = rc == SPL_E_TIMEOUT && spl_dataset_tell_late(steps->dataset, late, sizeof late);
+        const uint32_t part = note_late_tiles(steps);
+        bool told = rc == SPL_E_TIMEOUT && spl_dataset_tell_late(steps->dataset, part, late, sizeof late);
         spl_fail(err, rc, "%s%s%s", why.message, told ? ": " : "", late);
     }
     if (rc >= 0 && clock >= deadline_ns)
@@ -149,11 +157,13 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
     uint64_t clock = spl_now_ns();
+    const double *making_ms = &steps->job.renderer->kernels.making_ms, made_ms = *making_ms;
     steps->view.deadline_ns = deadline_ns;
     steps->paused = false;
     spl_soft_pause_begin(&steps->job.pause);
     int rc = go_on(steps, deadline_ns, err);
     steps->frame.stats.total_ms += spl_since_ms(&clock);
+    steps->frame.stats.kernels_ms += *making_ms - made_ms;
     *more = rc >= 0 && spl_frame_get_samples_left(steps);
     return rc < 0 ? rc : SPL_OK;
 }

@@ -278,6 +278,27 @@ static void other_sizes_are_resampled(void **state)
     spl_dataset_close(dataset);
 }
 
+static void what_kernels_take_is_told_of_the_frame_that_needs_them_first(void **state)
+{
+    (void)state;
+    struct spl_renderer *renderer = open_renderer(0);
+    struct spl_dataset *dataset = cube();
+    struct spl_view view = looking(3, 83, 61);
+    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
+    for (int i = 0; i < 4; i++) { /* each method's first frame, and the same again */
+        struct spl_frame frame;
+        view.method = i < 2 ? SPL_METHOD_SPLAT : SPL_METHOD_NEAREST;
+        assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
+        if (i % 2)
+            assert_true(frame.stats.kernels_ms == 0);
+        else
+            assert_true(frame.stats.kernels_ms > 0 && frame.stats.kernels_ms < frame.stats.total_ms);
+        spl_frame_finish(&frame);
+    }
+    spl_renderer_destroy(renderer);
+    spl_dataset_close(dataset);
+}
+
 int main(int argc, char **argv)
 {
     device = argc > 1 ? argv[1] : getenv("SPLATD_TEST_DEVICE");
@@ -291,6 +312,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_frame_may_be_given_up_between_tiles),
         cmocka_unit_test(a_tile_that_fails_leaves_the_device_usable),
         cmocka_unit_test(other_sizes_are_resampled),
+        cmocka_unit_test(what_kernels_take_is_told_of_the_frame_that_needs_them_first),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -15,7 +15,7 @@ import urllib.parse
 class File:
     """What lies at a path. `faults`: what the next requests meet, each once: a status, (status, Retry-After), "reset",
     "cut" (two thirds of the body), "flip" (a byte of it is wrong), "stall" (no more of it comes). `always`: the same of every
-    request."""
+    request; there "drip", too (four bytes a second of it come)."""
 
     def __init__(self, data, etag='"1"', faults=(), always=None, ranges=True, conditions=True, delay_s=0, gzip=False,
                  account=None):
@@ -112,6 +112,15 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if file.gzip:
             self.send_header("Content-Encoding", "gzip")
         self.end_headers()
+        if fault == "drip":
+            for at in range(len(body)):
+                if file.always != fault:
+                    break
+                self.wfile.write(body[at:at + 1])
+                self.wfile.flush()
+                time.sleep(0.25)
+            self.close_connection = True
+            return None
         if fault in ("cut", "stall"):
             self.wfile.write(body[:len(body) * 2 // 3])
             self.wfile.flush()

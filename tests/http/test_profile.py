@@ -286,6 +286,15 @@ def test_a_slower_machine_is_learned():
         assert 0.7 < promised / took < 1.4, (promised, took)
 
 
+def test_what_the_first_view_makes_is_not_learned():
+    """A driver makes kernels for whoever needs them first; a view of 300 ms more taught that the machine is four times as slow."""
+    with serving(profile(VERSION), FAKE_KERNELS_MS=300) as (d, _):
+        replies = [ask(d, budget="40ms") for _ in range(2)]
+        promised, took = ([float(fields(reply.headers[f"Splatd-{name}"])["ms"]) for _, reply in replies] for name in ("Promised", "Took"))
+        assert replies[0][1].headers["Splatd-Demand"] == "missed" and took[0] > 300, took
+        assert replies[0][0] == replies[1][0] == ("splat", 1, 1) and promised[1] < 1.4 * promised[0], (replies[1][0], promised)
+
+
 def test_the_deadline_caps_a_budget():
     with serving(profile(VERSION)) as (d, _):
         assert ask(d, budget="9s")[0] == ("splat", 1, 2)

@@ -422,6 +422,48 @@ def test_a_server_that_says_nothing_costs_a_view_no_more_than_its_tile():
             assert done.returncode == 1 and "tile-1.spld" in done.stderr, done.stderr
 
 
+def test_a_tile_that_drips_is_named():
+    """Four bytes a second are not nothing, so nobody finds the tile to be late; who waited for it is told all the same."""
+    drips = File(DATA["tile-1"], always="drip")
+    deadline_s = 6 + 20 * SANITIZED
+    with Server(files(tile_1=drips)) as server:
+        with Daemon(REAL, "--watch", "0", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            for where in (IN[1], ALL):
+                whole = view(d, where + "&wait=1")
+                assert whole.status == 503 and "its tile tile-1.spld was still being read" in whole.json()["detail"], whole.body
+            assert good(d, IN[0] + "&wait=1") == TRUTH[0] and not reason(d)
+            coarse = view(d, IN[1])
+            assert coarse.status == 200 and coarse.headers["Splatd-Complete"] == "false", (coarse.status, coarse.body)
+            drips.always = None
+            eventually(lambda: view(d, IN[1]).headers.get("Splatd-Complete") == "true", 60)
+            assert good(d, IN[1] + "&wait=1") == TRUTH[1]
+
+
+def test_a_tour_goes_on_without_a_tile_that_does_not_come():
+    """It waits, longer than a view, and then counts the frames that are not complete."""
+    silent = File(DATA["tile-1"], delay_s=40 + 40 * SANITIZED)
+    eyes = [IN[0], IN[1], IN[1], IN[2]]
+    cameras = [dict(word.split("=") for word in where.split("&")) for where in eyes]
+    path = {"frames": [{"camera": {name: [float(x) for x in camera[name].split(",")] for name in ("eye", "target")}} for camera in cameras]}
+    body = json.dumps({"path": path, "settings": {"width": 64, "height": 48, "format": "png"}})
+    with Server(files(tile_1=silent)) as server, tempfile.TemporaryDirectory() as folder:
+        with Daemon(REAL, "--watch", "0", "--tours", folder, "--remote-deadline", "3000", datasets=[server.url("city.spld")]) as d:
+            opened(d)
+            tour = d.ask("/v1/datasets/city/tours", "POST", body).json()
+            eventually(lambda: d.ask(tour["uri"]).json()["state"] in ("done", "failed"), 90)
+            tour = d.ask(tour["uri"]).json()
+            assert tour["state"] == "done" and tour["incomplete_frames"] == {"count": 2, "first": [1, 2]}, tour
+            silent.delay_s = 0
+            eventually(lambda: view(d, IN[1]).headers.get("Splatd-Complete") == "true", 60)
+            again = d.ask("/v1/datasets/city/tours", "POST", body).json()
+            eventually(lambda: d.ask(again["uri"]).json()["state"] in ("done", "failed"), 90)
+            again = d.ask(again["uri"]).json()
+            assert again["state"] == "done" and not again["incomplete_frames"]["count"], again
+            frames = [[d.ask(t["frame"].replace("{n}", str(n))).body for n in range(len(eyes))] for t in (tour, again)]
+            assert [a == b for a, b in zip(*frames)] == [True, False, False, True]
+
+
 def test_a_collection_of_one_tile_is_drawn_without_it():
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)

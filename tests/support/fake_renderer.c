@@ -290,9 +290,10 @@ bool spl_frame_is_waiting(struct spl_frame_steps *steps)
            (spl_remaining_ns(steps->there_ns) || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
-void spl_frame_stop_waiting(struct spl_frame_steps *steps)
+uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps)
 {
-    (void)steps; // its datasets have no tiles
+    (void)steps;
+    return 0; // its datasets have no tiles
 }
 
 static int lose(struct spl_renderer *renderer, struct spl_error *err)
@@ -316,6 +317,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     if (!renderer->hung) {
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
+        usleep((useconds_t)setting("FAKE_KERNELS_MS", 0) * 1000);
+        steps->frame.stats.kernels_ms = (double)setting("FAKE_KERNELS_MS", 0);
         if (setting("FAKE_LOSE_FRAME", 0))
             return lose(renderer, err);
     }

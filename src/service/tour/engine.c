@@ -129,12 +129,26 @@ static bool is_over_quota(struct spl_tour *tour, uint64_t more)
     return true;
 }
 
+/* A collection's tile whose server has not answered a frame so many times need not end the tour: from then on its
+ * frames do without such tiles, as views do. False: they did already, or it was something else. */
+static bool try_without_late_tiles(struct spl_tour *tour, const struct spl_error *err)
+{
+    const struct spl_catalog_entry *entry = spl_catalog_find(&tour->tours->service->library->catalog, tour->dataset);
+    if (tour->without_late_tiles || err->code != SPL_E_TIMEOUT || !entry || !entry->info->tiles)
+        return false;
+    spl_log_warn("tour %s: %s; from frame %zu on it goes on without tiles that do not come", tour->name, err->message,
+                 tour->first_open);
+    tour->failures = 0;
+    return tour->without_late_tiles = true;
+}
+
 static void reopen(struct spl_tour *tour, size_t frame, const struct spl_error *err)
 {
     tour->frames[frame] = SPL_FRAME_OPEN;
     if (frame < tour->first_open)
         tour->first_open = frame;
-    if (!spl_code_get_info(err->code)->retry || ++tour->failures > failures_max)
+    if (!spl_code_get_info(err->code)->retry ||
+        (++tour->failures > failures_max && !try_without_late_tiles(tour, err)))
         spl_tour_fail(tour, err);
 }
 
@@ -250,6 +264,7 @@ static bool submit(struct spl_tour *tour, size_t frame)
     job->plan = entry->plan;
     job->request = tour->spec.view;
     job->request.view.camera = tour->spec.cameras[frame];
+    job->request.view.without_late_tiles = tour->without_late_tiles;
     if (tour->spec.fades)
         spl_fade_apply(tour->spec.fades[frame], &job->request.view);
     spl_view_set_unit(&job->request, entry->info);

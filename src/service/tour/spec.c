@@ -130,7 +130,7 @@ static int parse_settings(const json_t *settings, const struct spl_camera_defaul
     if (view->view.partial)
         return spl_fail_field(err, SPL_E_INPUT, "settings.wait",
                               "frames of a tour wait for what they show; leave it out");
-    view->view.without_late_tiles = false; // nor do they do without a tile whose server may answer yet
+    view->view.without_late_tiles = false; // nor without a tile whose server may answer yet, until engine.c says so
     if (view->planned)
         return spl_fail_field(err, SPL_E_INPUT, isnan(view->demand.budget_ms) ? "settings.psnr" : "settings.budget",
                               "frames of a tour look alike only with one setting: give method, lod and supersample");

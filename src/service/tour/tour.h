@@ -54,6 +54,7 @@ struct spl_tour {
     uint64_t changes;                /* of anything a client sees */
     size_t works, readers;           /* file works and replies that hold it */
     bool state_writing, state_again; /* tour.json is being written; has changed since */
+    bool without_late_tiles;         /* frames do without tiles whose server has not answered for long enough */
     bool waits;                      /* for its dataset, which is being opened: nothing is made yet */
     bool removed;                    /* off the list; freed when nothing holds it */
     atomic_bool cancelled;           /* read by file works */

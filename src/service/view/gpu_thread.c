@@ -134,8 +134,10 @@ static void complete(struct gpu *gpu, struct spl_job *job)
     snprintf(job->device, sizeof job->device, "%s: %s", device->backend, device->name);
     bool usual = !job->request.picks && !job->request.container;
     bool cut_short = job->request.view.partial && !job->stats.complete;
-    if (job->plan && usual && !job->stats.pages_loaded && !cut_short) // loading is no property of the setting
-        spl_plan_learn(job->plan, &job->request, (double)job->frame_ns / SPL_NS_PER_MS, job->stats.soft_ms);
+    // loading is no property of the setting, nor is what a view is the first to need
+    const double drawn_ms = (double)job->frame_ns / SPL_NS_PER_MS - job->stats.kernels_ms;
+    if (job->plan && usual && !job->stats.pages_loaded && !cut_short)
+        spl_plan_learn(job->plan, &job->request, drawn_ms, job->stats.soft_ms);
 }
 
 /* Whose samples take much longer than others' counts for as many as have the time: what is forged to be slow goes
@@ -249,7 +251,7 @@ static bool is_near_deadline(const struct spl_job *job)
 static void look_after(struct spl_job *job)
 {
     if (job->waits && is_near_deadline(job))
-        spl_frame_stop_waiting(job->steps);
+        atomic_store(&spl_job_get_whole(job)->awaited, spl_frame_stop_waiting(job->steps));
     if (!job->waits || spl_frame_is_waiting(job->steps))
         return;
     uint64_t now = spl_now_ns();

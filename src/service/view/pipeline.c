@@ -34,12 +34,12 @@ void spl_job_destroy(struct spl_job *job)
         spl_job_destroy(whole);
 }
 
-void spl_view_fail_late(const struct spl_view *view, const struct spl_dataset *dataset, double deadline_ms,
-                        struct spl_error *err)
+void spl_view_fail_late(const struct spl_view *view, const struct spl_dataset *dataset, uint32_t awaited,
+                        double deadline_ms, struct spl_error *err)
 {
     char why[sizeof err->message] = "";
     const bool whole = view && dataset && !view->partial && !view->without_late_tiles;
-    const bool told = whole && spl_dataset_tell_late(dataset, why, sizeof why);
+    const bool told = whole && spl_dataset_tell_late(dataset, awaited, why, sizeof why);
     spl_fail(err, SPL_E_TIMEOUT, "the deadline of %.0f ms passed before the view was ready%s%s", deadline_ms,
              told ? ": " : "", why);
 }
@@ -50,7 +50,7 @@ bool spl_job_is_over(struct spl_job *job)
     if (spl_cancel_is_set(&whole->dropped))
         spl_fail(&job->err, SPL_E_CANCELLED, "the client has left");
     else if (!spl_remaining_ns(whole->deadline_ns))
-        spl_view_fail_late(&job->request.view, job->dataset,
+        spl_view_fail_late(&job->request.view, job->dataset, atomic_load(&whole->awaited),
                            (double)(whole->deadline_ns - job->accepted_ns) / SPL_NS_PER_MS, &job->err);
     return job->err.code != SPL_OK;
 }

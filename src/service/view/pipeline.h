@@ -62,6 +62,7 @@ struct spl_job {
     bool waits; /* for pages */
     struct spl_frame_steps *steps; // may be NULL: not begun, or done
     uint64_t samples_left;         /* of the frame, for its turns; more where they take long */
+    _Atomic uint32_t awaited;      /* near its deadline: which tile of a collection it waits for; of a whole; 0: none */
     uint64_t paused_ns;            /* when its last tile was done, or its pages had come */
     struct spl_frame frame;        /* between gpu and encode */
     struct spl_frame_stats stats;
@@ -86,10 +87,10 @@ struct spl_job {
 /* Releases everything and the job itself, of a whole once its last part is destroyed; NULL-safe. The loop's thread. */
 void spl_job_destroy(struct spl_job *job);
 
-/* Why a view of the dataset is not there though its deadline of so many ms has passed: with the name of a tile that is
- * late, where it does not do without. Both may be NULL. */
-void spl_view_fail_late(const struct spl_view *view, const struct spl_dataset *dataset, double deadline_ms,
-                        struct spl_error *err);
+/* Why a view of the dataset is not there though its deadline of so many ms has passed: with the name of the tile that
+ * it waited for, 0: of one that is late, where it does not do without. Both may be NULL. */
+void spl_view_fail_late(const struct spl_view *view, const struct spl_dataset *dataset, uint32_t awaited,
+                        double deadline_ms, struct spl_error *err);
 
 /* Who says whether it is dropped, and how long it has: the job, or what it is part of. */
 static inline struct spl_job *spl_job_get_whole(struct spl_job *job)
