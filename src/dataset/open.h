@@ -123,7 +123,18 @@ int spl_dataset_hash_section(const struct spl_dataset *dataset, const struct spl
 /* The first section of a kind in memory, and its length; NULL and 0 where there is none. */
 const void *spl_dataset_get_copy(const struct spl_dataset *dataset, enum spl_section_kind kind, uint64_t *bytes);
 
-/* Header, section table, extents, number and sizes of sections, checksums but for those of heads, which are held
+/* SPL_E_CORRUPT of `what`, a part of the file as "section META", and why. */
+int spl_dataset_fail_in(const struct spl_dataset *dataset, const char *what, const char *why, struct spl_error *err);
+
+/* Bytes of the source, free(); NULL and `err` when they cannot be read. */
+void *spl_dataset_copy_bytes(const struct spl_dataset *dataset, uint64_t offset, uint64_t bytes,
+                             struct spl_error *err);
+
+/* Header and section table, against the source's length and their checksums; fills `sections`. */
+int spl_dataset_read_section_table(struct spl_dataset *dataset, struct spl_file_header *header,
+                                   struct spl_error *err);
+
+/* The same with extents, number and sizes of sections, checksums but for those of heads, which are held
  * against theirs whenever they are read; fills everything up to `textures` and the sizes in info. */
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err);
 

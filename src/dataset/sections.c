@@ -1,9 +1,9 @@
-/* Opening, first stage: header, section table, where sections lie, and their checksums; and the table that says of each
- * kind of section how many there may be, how large they are, whether they are kept in memory and what checks their
- * content. Every size and offset is compared with the source's real length before it is used; sums cannot wrap because
- * each term is bounded by it. Checksums of what is kept are always checked, the pages' when asked for, on all cores;
- * those of heads by who reads them (tables.c). What is checked is the copy in memory that is used afterwards; pages
- * are read in passing. The opener's thread. */
+/* Opening, first stage: where sections lie, and their checksums; and the table that says of each kind of section how
+ * many there may be, how large they are, whether they are kept in memory and what checks their content. Every size and
+ * offset is compared with the source's real length before it is used; sums cannot wrap because each term is bounded by
+ * it. Checksums of what is kept are always checked, the pages' when asked for, on all cores; those of heads by who
+ * reads them (tables.c). What is checked is the copy in memory that is used afterwards; pages are read in passing. The
+ * opener's thread. */
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,8 +15,6 @@
 #include "base/parallel.h"
 #include "dataset/dictionary.h"
 #include "dataset/open.h"
-
-enum { table_alignment = 8, other_sections_most = 64 /* of a tile: those beside pages and heads */ };
 
 /* A texel has 4 bytes when it is expanded, and of three coefficients of 37 bits at most. */
 #define ATOMS_BYTES_MAX (4ull * SPL_DICTIONARY_BYTES_MAX)
@@ -75,11 +73,6 @@ static const struct kind *kind_of(const struct spl_section *section)
     return NULL;
 }
 
-static int corrupt(const struct spl_dataset *dataset, struct spl_error *err, const char *what, const char *why)
-{
-    return spl_fail(err, SPL_E_CORRUPT, "%s: %s %s; copy or pack the dataset again", dataset->name, what, why);
-}
-
 static void letters_of(uint32_t type, char letters[5])
 {
     for (int i = 0; i < 4; i++) {
@@ -102,117 +95,6 @@ static const char *section_name(const struct spl_section *section, char text[40]
     return text;
 }
 
-/* Files of other others are common mistakes; name the kind where the first bytes tell it. */
-static int not_a_dataset(struct spl_dataset *dataset, const char first[8], struct spl_error *err)
-{
-    static const struct {
-        const char *start, *kind;
-    } others[] = {
-        {"ply\n", "a PLY scan"}, {"ply\r", "a PLY scan"}, {"LASF", "a LAS scan"}, {"ASTM-E57", "an E57 scan"}};
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
-        if (dataset->source.size > strlen(others[i].start) && !memcmp(first, others[i].start, strlen(others[i].start)))
-            return spl_fail(err, SPL_E_INPUT,
-                            "%s is %s, not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one", dataset->name,
-                            others[i].kind);
-    size_t letters = dataset->source.size < 4 ? (size_t)dataset->source.size : 4;
-    if (dataset->source.size >= 8 && !memcmp(first, SPL_FILE_MAGIC, letters)) {
-        dataset->kind = SPL_FILE_DATASET;
-        return corrupt(dataset, err, "header", "has lost its magic number, as in a transfer in text mode");
-    }
-    return spl_fail(err, SPL_E_INPUT,
-                    "%s is not a packed dataset; 'splatd pack SCAN -o NAME.spld' makes one from a scan", dataset->name);
-}
-
-/* A tile has a page and its head of each that the collection knows, and few others. */
-static int check_expected(const struct spl_dataset *dataset, const struct spl_file_header *header,
-                          struct spl_error *err)
-{
-    struct spl_expected *expected = dataset->how->expected;
-    if (!expected)
-        return SPL_OK;
-    if (header->table_hash != expected->version)
-        expected->differs = "is another one now";
-    else if (header->section_count > 2ull * expected->pages + other_sections_most)
-        expected->differs = "has another number of pages or levels";
-    return expected->differs ? spl_fail(err, SPL_E_CORRUPT, "%s %s", dataset->name, expected->differs) : SPL_OK;
-}
-
-static int read_header(struct spl_dataset *dataset, struct spl_file_header *header, struct spl_error *err)
-{
-    size_t bytes = dataset->source.size < sizeof *header ? (size_t)dataset->source.size : sizeof *header;
-    size_t shown = bytes < sizeof header->magic ? bytes : sizeof header->magic;
-    if (!bytes)
-        return spl_fail(err, SPL_E_INPUT, "%s is empty", dataset->name);
-    memset(header, 0, sizeof *header);
-    int rc = spl_dataset_read(dataset, 0, header, bytes, err);
-    if (rc)
-        return rc;
-    if (memcmp(header, SPL_FILE_MAGIC, shown))
-        return not_a_dataset(dataset, (const char *)header, err);
-    dataset->kind = SPL_FILE_DATASET;
-    if (dataset->source.size < sizeof *header)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %zu of the header's %zu bytes are missing", dataset->name,
-                        sizeof *header - bytes, sizeof *header);
-    if (header->version != SPL_FILE_VERSION)
-        return spl_fail(err, SPL_E_UNSUPPORTED,
-                        "%s: header says format version %u, this splatd reads version %u; pack it again", dataset->name,
-                        header->version, SPL_FILE_VERSION);
-    if (header->header_hash != XXH3_64bits(header, offsetof(struct spl_file_header, header_hash)))
-        return corrupt(dataset, err, "header", "fails its checksum");
-    if (header->header_bytes != sizeof *header || header->reserved)
-        return corrupt(dataset, err, "header", "has a size or a reserved field that version 2 does not have");
-    if (header->file_bytes > dataset->source.size)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: truncated: %llu of its %llu bytes are missing", dataset->name,
-                        (unsigned long long)(header->file_bytes - dataset->source.size),
-                        (unsigned long long)header->file_bytes);
-    if (header->file_bytes < dataset->source.size)
-        return spl_fail(err, SPL_E_CORRUPT, "%s: %llu bytes follow the end of the dataset", dataset->name,
-                        (unsigned long long)(dataset->source.size - header->file_bytes));
-    return check_expected(dataset, header, err);
-}
-
-/* Bytes of the source, malloc'd; NULL and `err` when they cannot be read. From a server memory is taken as they come:
- * how many there are is only said until then. */
-static void *copy_bytes(const struct spl_dataset *dataset, uint64_t offset, uint64_t bytes, struct spl_error *err)
-{
-    const uint64_t block = 16 << 20;
-    uint64_t room = dataset->source.far && bytes > block ? block : bytes;
-    char *copy = spl_alloc_raw(room, 1, err);
-    for (uint64_t done = 0, some; copy && done < bytes; done += some) {
-        some = bytes - done < block ? bytes - done : block;
-        char *larger = copy;
-        if (done + some > room) {
-            room = room < bytes / 2 ? 2 * room : bytes;
-            if ((larger = spl_realloc(copy, room, 1, err)))
-                copy = larger;
-        }
-        if (!larger || spl_dataset_check_cancelled(dataset, err) ||
-            spl_dataset_read(dataset, offset + done, copy + done, some, err)) {
-            free(copy);
-            return NULL;
-        }
-    }
-    return copy;
-}
-
-static int read_table(struct spl_dataset *dataset, const struct spl_file_header *header, struct spl_error *err)
-{
-    uint64_t offset = header->table_offset, bytes = (uint64_t)header->section_count * sizeof(struct spl_section);
-    if (offset < sizeof *header || offset % table_alignment || offset > dataset->source.size ||
-        bytes > dataset->source.size - offset)
-        return corrupt(dataset, err, "section table", "lies outside the file");
-    if (header->section_count > SPL_SECTIONS_MAX)
-        return corrupt(dataset, err, "section table", "has more than 4194304 rows");
-    struct spl_error why = {0};
-    if (!(dataset->sections = copy_bytes(dataset, offset, bytes, &why)))
-        return spl_fail(err, why.code, "%s", why.message);
-    if (header->table_hash != XXH3_64bits(dataset->sections, bytes))
-        return corrupt(dataset, err, "section table", "fails its checksum");
-    dataset->section_count = header->section_count;
-    dataset->info.version = header->table_hash;
-    return SPL_OK;
-}
-
 /* Sections are listed by offset, so that no two overlap when each begins behind the one before. */
 static int check_extents(struct spl_dataset *dataset, const struct spl_file_header *header, struct spl_error *err)
 {
@@ -225,9 +107,9 @@ static int check_extents(struct spl_dataset *dataset, const struct spl_file_head
         uint64_t alignment = kind ? kind->alignment : 64;
         if (s->offset < end || s->offset > dataset->source.size || s->bytes > dataset->source.size - s->offset ||
             (s->offset < table_end && s->offset + s->bytes > header->table_offset))
-            return corrupt(dataset, err, section_name(s, name), "overlaps its neighbour or the file's end");
+            return spl_dataset_fail_in(dataset, section_name(s, name), "overlaps its neighbour or the file's end", err);
         if (s->offset % alignment)
-            return corrupt(dataset, err, section_name(s, name), "is misaligned");
+            return spl_dataset_fail_in(dataset, section_name(s, name), "is misaligned", err);
         end = s->offset + s->bytes;
     }
     return SPL_OK;
@@ -257,9 +139,9 @@ static int check_numbers(const struct spl_dataset *dataset, struct spl_error *er
         letters_of(kinds[k].type, letters);
         snprintf(what, sizeof what, "lists no section %s%s", letters, count ? " of each page" : "");
         if (kinds[k].group == REQUIRED && (count != number || !count))
-            return corrupt(dataset, err, "section table", what);
+            return spl_dataset_fail_in(dataset, "section table", what, err);
         if (kinds[k].group != REQUIRED && count != (has[kinds[k].group] ? number : 0))
-            return corrupt(dataset, err, "section table", some[kinds[k].group]);
+            return spl_dataset_fail_in(dataset, "section table", some[kinds[k].group], err);
     }
     return SPL_OK;
 }
@@ -287,9 +169,10 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
         if (!kind)
             continue;
         if (kind->number ? s->index != list->count : s->index || list->count)
-            return corrupt(dataset, err, section_name(s, name), kind->number ? "is out of order" : "occurs twice");
+            return spl_dataset_fail_in(dataset, section_name(s, name),
+                                       kind->number ? "is out of order" : "occurs twice", err);
         if (s->bytes < kind->bytes_min || s->bytes > kind->bytes_max || s->bytes % kind->item_bytes)
-            return corrupt(dataset, err, section_name(s, name), kind->wrong_size);
+            return spl_dataset_fail_in(dataset, section_name(s, name), kind->wrong_size, err);
         list->at[list->count++] = s;
         dataset->info.page_bytes += kind->resident ? s->bytes : 0;
     }
@@ -299,7 +182,8 @@ static int find_sections(struct spl_dataset *dataset, struct spl_error *err)
         return rc;
     const struct spl_section *directory = dataset->found[SPL_KIND_DIRECTORY].at[0];
     if (directory->bytes != (dataset->info.pages + 1ull) * sizeof(struct spl_page_row))
-        return corrupt(dataset, err, "section PDIR", "has not a row for each page, and one that closes them");
+        return spl_dataset_fail_in(dataset, "section PDIR", "has not a row for each page, and one that closes them",
+                                   err);
     return SPL_OK;
 }
 
@@ -319,7 +203,8 @@ static int copy_small_sections(struct spl_dataset *dataset, struct spl_error *er
         const struct kind *kind = kind_of(&dataset->sections[i]);
         struct spl_error why = {0};
         if (kind && kind->kept &&
-            !(dataset->copies[i] = copy_bytes(dataset, dataset->sections[i].offset, dataset->sections[i].bytes, &why)))
+            !(dataset->copies[i] =
+                  spl_dataset_copy_bytes(dataset, dataset->sections[i].offset, dataset->sections[i].bytes, &why)))
             return spl_fail(err, why.code, "%s", why.message);
     }
     dataset->pages = dataset->found[SPL_KIND_PAGES].at;
@@ -369,9 +254,7 @@ static void hash_sections(void *context, size_t begin, size_t end, unsigned work
 int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct spl_error *err)
 {
     struct spl_file_header header;
-    int rc = read_header(dataset, &header, err);
-    if (!rc)
-        rc = read_table(dataset, &header, err);
+    int rc = spl_dataset_read_section_table(dataset, &header, err);
     if (!rc)
         rc = check_extents(dataset, &header, err);
     if (!rc)
@@ -393,7 +276,8 @@ int spl_dataset_read_sections(struct spl_dataset *dataset, bool verify, struct s
         return spl_fail(err, hashing.code, "%s cannot be read for its checksums: %s", dataset->name,
                         spl_code_get_info(hashing.code)->name);
     if (hashing.failed != UINT32_MAX)
-        return corrupt(dataset, err, section_name(&dataset->sections[hashing.failed], name), "fails its checksum");
+        return spl_dataset_fail_in(dataset, section_name(&dataset->sections[hashing.failed], name),
+                                   "fails its checksum", err);
     return SPL_OK;
 }
 

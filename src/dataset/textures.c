@@ -12,11 +12,6 @@
 #include "dataset/texture.h"
 #include "sparse/atom.h"
 
-static int wrong(const struct spl_dataset *dataset, struct spl_error *err, const char *what)
-{
-    return spl_fail(err, SPL_E_CORRUPT, "%s: section ATOM %s; copy or pack the dataset again", dataset->name, what);
-}
-
 int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *err)
 {
     uint64_t bytes;
@@ -24,19 +19,20 @@ int spl_dataset_check_dictionary(struct spl_dataset *dataset, struct spl_error *
     struct spl_dataset_info *info = &dataset->info;
     if ((header->size != 8 && header->size != 16 && header->size != SPL_TEXTURE_SIZE_MAX) || header->reserved[0] ||
         header->reserved[1])
-        return wrong(dataset, err, "has a size of textures or a reserved field that version 2 does not have");
+        return spl_dataset_fail_in(dataset, "section ATOM",
+                                   "has a size of textures or a reserved field that version 2 does not have", err);
     if (!header->count || header->count > SPL_DICTIONARY_MAX ||
         spl_dictionary_expanded_bytes(header->count, header->size) > SPL_DICTIONARY_BYTES_MAX)
-        return wrong(dataset, err, "has no atoms, or more than a device can bind");
+        return spl_dataset_fail_in(dataset, "section ATOM", "has no atoms, or more than a device can bind", err);
     if (8 * (bytes - sizeof *header) < 12 * (uint64_t)header->count)
-        return wrong(dataset, err, "ends before its atoms do");
+        return spl_dataset_fail_in(dataset, "section ATOM", "ends before its atoms do", err);
     int rc = spl_dictionary_init(&dataset->dictionary, header->count, header->size, err);
     if (rc)
         return rc;
     const char *what =
         spl_atoms_read((const uint8_t *)header + sizeof *header, bytes - sizeof *header, &dataset->dictionary);
     if (what)
-        return wrong(dataset, err, what);
+        return spl_dataset_fail_in(dataset, "section ATOM", what, err);
     info->atoms = header->count;
     info->texture_size = header->size;
     info->dictionary_bytes = spl_dictionary_expanded_bytes(header->count, header->size);

@@ -32,23 +32,4 @@ struct spl_metrics {
 int spl_metrics_compare(const struct spl_picture *image, const struct spl_picture *truth, unsigned threads,
                         struct spl_metrics *out, struct spl_error *err);
 
-/* Change from frame to frame along a path that the truth does not have. Zero-initialised. */
-struct spl_motion {
-    uint32_t width, height;
-    int16_t *previous; /* image - truth of the last frame, one plane a channel; NULL before the first */
-    double sum, worst; /* mean square of a step: over all steps, of the worst */
-    size_t steps;
-};
-
-void spl_motion_init(struct spl_motion *motion);
-
-/* Adds the next frame of the path: colour layers, all of one size and the same for all frames; SPL_E_INPUT otherwise,
- * field "color". SPL_E_NOMEM. The outcome is the same to the bit for any number of `threads`. */
-int spl_motion_add(struct spl_motion *motion, const struct spl_image *image, const struct spl_image *truth,
-                   unsigned threads, struct spl_error *err);
-
-/* The path's figures in 8 bit levels, root mean square over all steps and of the worst step; NAN below two frames.
- * Either pointer may be NULL. Releases what `motion` holds and zeroes it. */
-void spl_motion_finish(struct spl_motion *motion, double *flicker, double *popping);
-
 #endif

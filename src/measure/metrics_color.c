@@ -1,4 +1,4 @@
-/* PSNR and the planes of luma that SSIM reads, in one pass over both pictures; flicker and popping along a path.
+/* PSNR and the planes of luma that SSIM reads, in one pass over both pictures.
  *
  * Both pictures are laid over one grey first, in sRGB levels with one rounding, so that a pixel which only one of them
  * covers differs as a viewer would see it. Squares are summed as whole numbers: 64 Mi pixels of three channels fit 64
@@ -86,81 +86,4 @@ done:
     free(w.image_luma);
     free(w.truth_luma);
     return rc;
-}
-
-struct motion_work {
-    const uint32_t *image, *truth;
-    int16_t *previous; /* three planes of `count` */
-    size_t count;
-    bool first;
-    atomic_uint_fast64_t squares;
-};
-
-static void step_blocks(void *context, size_t begin, size_t end, unsigned worker)
-{
-    struct motion_work *w = context;
-    uint8_t image[3][SPL_METRICS_BLOCK], truth[3][SPL_METRICS_BLOCK];
-    uint64_t sum = 0;
-    (void)worker;
-    for (size_t at = begin; at < end; at += SPL_METRICS_BLOCK) {
-        size_t count = end - at < SPL_METRICS_BLOCK ? end - at : SPL_METRICS_BLOCK;
-        spl_metrics_flatten(w->image + at, count, image);
-        spl_metrics_flatten(w->truth + at, count, truth);
-        for (int c = 0; c < 3; c++) {
-            int16_t *previous = w->previous + (size_t)c * w->count + at;
-            uint32_t block = 0; /* 1024 * 510^2 < 2^29 */
-            for (size_t i = 0; i < count; i++) {
-                int16_t error = (int16_t)(image[c][i] - truth[c][i]), step = (int16_t)(error - previous[i]);
-                block += (uint32_t)(step * step);
-                previous[i] = error;
-            }
-            sum += block;
-        }
-    }
-    if (!w->first)
-        atomic_fetch_add_explicit(&w->squares, sum, memory_order_relaxed);
-}
-
-void spl_motion_init(struct spl_motion *motion)
-{
-    *motion = (struct spl_motion){0};
-}
-
-int spl_motion_add(struct spl_motion *motion, const struct spl_image *image, const struct spl_image *truth,
-                   unsigned threads, struct spl_error *err)
-{
-    bool first = !motion->previous;
-    uint32_t width = first ? image->width : motion->width, height = first ? image->height : motion->height;
-    if (!spl_metrics_is_color(image) || !spl_metrics_is_color(truth))
-        return spl_fail_field(err, SPL_E_INPUT, "color", "%s of the path has no colour",
-                              spl_metrics_is_color(image) ? "the truth" : "the image");
-    if (image->width != width || image->height != height || truth->width != width || truth->height != height)
-        return spl_fail_field(
-            err, SPL_E_INPUT, "color",
-            "frame %zu: the image has %u x %u pixels, the truth %u x %u; the path started with %u x %u",
-            motion->steps + 1 + !first, image->width, image->height, truth->width, truth->height, width, height);
-    struct motion_work w = {image->pixels, truth->pixels, motion->previous, (size_t)width * height, first, 0};
-    if (first && !(w.previous = spl_alloc(w.count, 3 * sizeof *w.previous, err)))
-        return SPL_E_NOMEM;
-    spl_parallel_for(threads, w.count, 16 * SPL_METRICS_BLOCK, step_blocks, &w);
-    motion->width = width;
-    motion->height = height;
-    motion->previous = w.previous;
-    if (first)
-        return SPL_OK;
-    double mean = (double)w.squares / (3.0 * (double)w.count);
-    motion->sum += mean;
-    motion->worst = fmax(motion->worst, mean);
-    motion->steps++;
-    return SPL_OK;
-}
-
-void spl_motion_finish(struct spl_motion *motion, double *flicker, double *popping)
-{
-    if (flicker)
-        *flicker = motion->steps ? sqrt(motion->sum / (double)motion->steps) : NAN;
-    if (popping)
-        *popping = motion->steps ? sqrt(motion->worst) : NAN;
-    free(motion->previous);
-    *motion = (struct spl_motion){0};
 }

@@ -10,6 +10,7 @@
 
 #include "measure.h"
 #include "shared.h"
+#include "support/motion.h"
 #include "themes.h"
 
 static const double step_px = 1.5;
@@ -128,10 +129,8 @@ static bool measure(struct conditions *c, const struct world *world, const struc
                     struct spl_image truths[2][SPL_LAYER_COUNT], bool first, struct row *row)
 {
     struct place place = {row->condition, row->value, row->method, NULL};
-    struct spl_motion motion;
-    struct spl_error err = {0};
+    struct motion motion = {0};
     bool rendered = true;
-    spl_motion_init(&motion);
     for (int i = 0; i < (first ? 2 : 1) && rendered; i++) {
         struct spl_frame frame;
         rendered = world_render(c->suite, world, &place, &views[i], &frame);
@@ -140,7 +139,7 @@ static bool measure(struct conditions *c, const struct world *world, const struc
         check_kinds(c->suite, world, &views[i], &frame, place);
         const struct spl_view crop = crop_view(&views[i]);
         crop_frame(&frame, &crop.camera);
-        must(spl_motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truths[i][SPL_LAYER_COLOR], 0, &err), &err);
+        motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truths[i][SPL_LAYER_COLOR]);
         if (i == 0) {
             struct spl_metrics m = measure_frame(world, &crop, &frame, truths[0]);
             const double figures[FIGURE_COUNT] = {
@@ -159,7 +158,7 @@ static bool measure(struct conditions *c, const struct world *world, const struc
         }
         spl_frame_finish(&frame);
     }
-    spl_motion_finish(&motion, first ? &row->figures[FIGURE_FLICKER] : NULL, NULL);
+    motion_finish(&motion, first ? &row->figures[FIGURE_FLICKER] : NULL, NULL);
     return rendered;
 }
 

@@ -9,6 +9,7 @@
 
 #include "measure.h"
 #include "surveyed.h"
+#include "support/motion.h"
 
 enum { WIDTH = 160, HEIGHT = 120, FRAMES = 12 };
 static const double shift_most = 0.15, halo_share = 0.5, halo_least = 1e-3;
@@ -90,15 +91,12 @@ static struct spl_view walk(const struct world *world, int i)
 
 static void check_walk(struct suite *suite, const struct world *world, int method)
 {
-    struct spl_motion motion, own; /* own: the truth's, against an image that never changes */
-    struct spl_error err = {0};
+    struct motion motion = {0}, own = {0}; /* own: the truth's, against an image that never changes */
     uint8_t *grey = calloc((size_t)WIDTH * HEIGHT, 4);
     struct spl_image still = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, WIDTH, HEIGHT, grey};
     struct place place = place_of(world, "walk", method);
     double flicker, popping, steps, step;
     bool rendered = grey;
-    spl_motion_init(&motion);
-    spl_motion_init(&own);
     for (int i = 0; i < FRAMES && rendered; i++) {
         struct spl_view view = walk(world, i);
         struct spl_image truth[SPL_LAYER_COUNT];
@@ -107,16 +105,16 @@ static void check_walk(struct suite *suite, const struct world *world, int metho
         view.supersample = 2;
         truth_render(world, &view.camera, truth);
         rendered = world_render(suite, world, &place, &view, &frame);
-        if (rendered && (spl_motion_add(&own, &truth[SPL_LAYER_COLOR], &still, 0, &err) ||
-                         spl_motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR], 0, &err)))
-            abort();
-        if (rendered)
+        if (rendered) {
+            motion_add(&own, &truth[SPL_LAYER_COLOR], &still);
+            motion_add(&motion, &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR]);
             spl_frame_finish(&frame);
+        }
         truth_finish(truth);
     }
     free(grey);
-    spl_motion_finish(&own, &steps, &step);
-    spl_motion_finish(&motion, &flicker, &popping);
+    motion_finish(&own, &steps, &step);
+    motion_finish(&motion, &flicker, &popping);
     if (!rendered)
         return;
     report_at_most(&suite->report, "no-pop", &place, popping, step, "levels; the truth's own largest step");

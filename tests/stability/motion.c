@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "measure.h"
+#include "support/motion.h"
 
 enum { WIDTH = 128, HEIGHT = 96, FRAMES = 12 };
 static const double jump = 1.5;      /* times the other steps */
@@ -54,28 +55,18 @@ static const struct {
              {"approach", "density", approach, 1, 1},
              {"walk", "courtyard", walk, 2, 1.5}};
 
-static void must(int rc)
-{
-    if (rc)
-        abort();
-}
-
 static void check_path(struct suite *suite, const struct world *world, size_t p)
 {
-    struct spl_motion motion[SPL_METHOD_COUNT], own; /* own: the truth's, against an image that never changes */
-    struct spl_error err = {0};
+    struct motion motion[SPL_METHOD_COUNT] = {0}, own = {0}; /* own: the truth's, against an image that never changes */
     uint8_t *grey = calloc((size_t)WIDTH * HEIGHT, 4);
     struct spl_image still = {SPL_LAYER_COLOR, SPL_PIXEL_RGBA8, WIDTH, HEIGHT, grey};
     double flicker, popping, steps, step, holes[SPL_METHOD_COUNT] = {0};
     bool rendered = grey;
-    for (int method = 0; method < SPL_METHOD_COUNT; method++)
-        spl_motion_init(&motion[method]);
-    spl_motion_init(&own);
     for (int i = 0; i < FRAMES && rendered; i++) {
         struct spl_view view = paths[p].view(world, i);
         struct spl_image truth[SPL_LAYER_COUNT];
         truth_render(world, &view.camera, truth);
-        must(spl_motion_add(&own, &truth[SPL_LAYER_COLOR], &still, 0, &err));
+        motion_add(&own, &truth[SPL_LAYER_COLOR], &still);
         for (int method = 0; method < SPL_METHOD_COUNT && rendered; method++) {
             struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
             struct spl_frame frame;
@@ -86,19 +77,19 @@ static void check_path(struct suite *suite, const struct world *world, size_t p)
             rendered = world_render(suite, world, &place, &view, &frame);
             if (!rendered)
                 break;
-            must(spl_motion_add(&motion[method], &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR], 0, &err));
+            motion_add(&motion[method], &frame.images[SPL_LAYER_COLOR], &truth[SPL_LAYER_COLOR]);
             if (method != SPL_METHOD_POINTS && paths[p].view != walk) /* where a scan has shadows, holes are right */
                 holes[method] = fmax(holes[method], measure_frame(world, &view, &frame, truth).holes);
             spl_frame_finish(&frame);
         }
         truth_finish(truth);
     }
-    spl_motion_finish(&own, &steps, &step);
+    motion_finish(&own, &steps, &step);
     steps *= paths[p].steps;
     step *= paths[p].steps;
     for (int method = 0; method < SPL_METHOD_COUNT; method++) {
         struct place place = {world->name, paths[p].name, spl_method_name((enum spl_method)method), "color"};
-        spl_motion_finish(&motion[method], &flicker, &popping);
+        motion_finish(&motion[method], &flicker, &popping);
         bool shimmers = method == SPL_METHOD_POINTS;
         report_at_most(&suite->report, "no-pop", &place, popping, shimmers ? fmax(step, jump * flicker) : step,
                        "levels; the truth's own largest step");
