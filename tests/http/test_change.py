@@ -79,6 +79,30 @@ def test_put_get_replace_delete():
         assert listed(d) == {}, "a look from before brought it back"
 
 
+def test_who_would_overwrite_nothing_does_not():
+    """If-None-Match and If-Match (RFC 9110, 13.1): a change that was meant for something else than what is there is none."""
+    with serving() as d:
+        first = put(d, "a", WALL_1, {**AUTH, "If-None-Match": "*"})
+        assert first.status == 201, first.body
+        old, wrong = f'"{first.json()["version"]}"', '"0123456789abcdef"'
+        for headers in ({"If-None-Match": "*"}, {"If-None-Match": f"{wrong}, {old}"}, {"If-Match": wrong}, {"If-Match": "W/" + old},
+                        {"If-Match": old, "If-None-Match": "*"}):
+            for reply in (put(d, "a", WALL_2, {**AUTH, **headers}), delete(d, "a", {**AUTH, **headers})):
+                assert reply.status == 412 and reply.json()["field"] in headers, (headers, reply.body)
+            assert (d.home / "a.spld").read_bytes() == WALL_1 and left_over(d) == [], headers
+        for headers in ({"If-Match": "*"}, {"If-Match": old}):
+            none = put(d, "b", WALL_1, {**AUTH, **headers})
+            assert none.status == 412 and none.json()["field"] == "If-Match", none.body
+        part = put(d, "a", WALL_2, {**AUTH, "Content-Range": f"bytes 0-{len(WALL_2) - 1}/{2 * len(WALL_2)}"})
+        assert part.status == 400 and part.json()["field"] == "Content-Range", part.body
+        assert listed(d).keys() == {"a"} and [p.name for p in d.home.iterdir()] == ["a.spld"]
+        second = put(d, "a", WALL_2, {**AUTH, "If-Match": f"{wrong},{old}", "If-None-Match": wrong})
+        assert second.status == 200 and listed(d)["a"]["version"] == second.json()["version"] != first.json()["version"]
+        assert delete(d, "a", {**AUTH, "If-Match": old}).status == 412  # it was that
+        assert delete(d, "a", {**AUTH, "If-Match": f'"{second.json()["version"]}"'}).status == 204
+        assert delete(d, "a", {**AUTH, "If-Match": "*"}).status == 404
+
+
 def test_what_curl_makes_of_a_file_and_a_slash():
     """`curl -T hall.spld URL/v1/datasets/` puts the file's name behind the slash, and people put scans."""
     with serving() as d:

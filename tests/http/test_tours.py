@@ -166,6 +166,8 @@ def check_files(d, tour, frames):
         assert part.status == 206 and part.body == whole.body[first:last], (text, part.status)
     assert d.ask(uri, headers={"Range": "bytes=0-9", "If-Range": '"another"'}).body == whole.body
     assert d.ask(uri, headers={"Range": "bytes=0-1,4-5"}).status == 200
+    head = d.ask(uri, "HEAD", headers={"Range": "bytes=0-1"})  # ranges are GET's alone
+    assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body), head.headers
     assert d.ask(uri, headers={"Range": f"bytes={len(whole.body)}-"}).status == 416
     assert d.ask(uri, headers={"If-None-Match": whole.headers["ETag"]}).status == 304
     head = d.ask(uri, "HEAD")

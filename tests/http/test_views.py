@@ -279,6 +279,19 @@ def test_a_saved_view_hides_one_of_the_pack():
             assert views(d, "site")["low"]["from"] == "dataset" and camera(get(d, "view=low", "site"))["eye"] == [10, -9, 2]
 
 
+def test_who_would_overwrite_no_view_does_not():
+    with serving() as (home, start), start() as d:
+        none = {**AUTH, "If-None-Match": "*"}
+        assert put(d, "door", DOOR, {**AUTH, "If-Match": "*"}).status == 412 and views(d) == {}
+        assert put(d, "door", DOOR, none).status == 201
+        again = put(d, "door", {**DOOR, "fov": 20}, none)
+        assert again.status == 412 and again.json()["field"] == "If-None-Match" and views(d)["door"]["fov"] == 50, again.body
+        assert put(d, "door", DOOR, {**AUTH, "If-Match": '"a"'}).status == delete(d, "door", {**AUTH, "If-Match": '"a"'}).status == 412
+        part = put(d, "door", DOOR, {**AUTH, "Content-Range": "bytes 0-9/10"})
+        assert part.status == 400 and part.json()["field"] == "Content-Range", part.body
+        assert put(d, "door", DOOR, {**AUTH, "If-Match": "*"}).status == 200 and delete(d, "door", {**AUTH, "If-Match": "*"}).status == 204
+
+
 def test_who_may_and_what():
     with serving() as (home, start), start() as d:
         for headers, status in (({}, 401), ({"Authorization": f"Bearer {VIEWER}"}, 403)):

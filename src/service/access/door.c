@@ -93,7 +93,7 @@ bool spl_door_check_preflight(struct request *request, const char *method)
         return false;
     MHD_add_response_header(request->response, "Access-Control-Allow-Methods", "GET, HEAD, POST, PUT, DELETE");
     MHD_add_response_header(request->response, "Access-Control-Allow-Headers",
-                            "Authorization, Content-Type, If-None-Match, Range");
+                            "Authorization, Content-Type, If-Match, If-None-Match, Range");
     MHD_add_response_header(request->response, "Access-Control-Max-Age", "600");
     return false;
 }

@@ -1,6 +1,7 @@
 /* PUT and DELETE of datasets over HTTP. A body of any size goes to disk a buffer at a time: while a thread of the pool
  * writes, the request waits, so the client is no faster than the disk and the loop never waits for it. What becomes of
  * it is change.c's. Owned by the loop's thread. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -27,6 +28,9 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
     struct change *change;
     struct spl_error err = {0};
     size_t changes = 0;
+    char tag[24] = "";
+    if (slot && slot->current)
+        snprintf(tag, sizeof tag, "\"%016llx\"", (unsigned long long)slot->current->info->version);
     LIST_FOREACH(change, &service->library->changes, link)
     changes++;
     if (service->draining || changes == changes_max || (slot && slot->busy)) {
@@ -41,6 +45,8 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
     } else if (!slot && !service->library->directory) {
         reply_conflict(request,
                        "the service was started without a directory of datasets, so there is no place for new ones");
+        return NULL;
+    } else if (!spl_check_conditions(request, slot ? tag : NULL)) {
         return NULL;
     } else if (!slot) {
         char *path = NULL;

@@ -118,9 +118,12 @@ static bool may_change(struct request *request, const struct spl_call *call)
     } else if (service->draining || slot->busy || call->entry->saving) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed; come back later", call->id);
     }
-    if (err.code)
+    if (err.code) {
         spl_reply_error(request, &err);
-    return !err.code;
+        return false;
+    }
+    bool own;
+    return spl_check_conditions(request, spl_saved_has(call->entry->saved, call->name, &own) ? "" : NULL);
 }
 
 static void begin(struct request *request, const struct spl_call *call, const struct spl_saved_view *view, bool removes,

@@ -48,6 +48,8 @@ static enum spl_range wanted(struct request *request, const char *tag, uint64_t 
 {
     const char *same = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_RANGE);
     const char *range = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_RANGE);
+    if (request->head) // of which no ranges are defined (RFC 9110, 14.2)
+        range = NULL;
     return spl_range_parse(same && strcmp(same, tag) ? NULL : range, size, first, length);
 }
 
