@@ -143,6 +143,13 @@ void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t leng
         snprintf(cloud->fields + used, room, "%s%.*s", used ? ", " : "", (int)length, name);
 }
 
+void spl_cloud_add_unused(struct spl_cloud *cloud, const char *name, size_t length, const char *why)
+{
+    char *unused = cloud->info.unused;
+    const size_t used = strlen(unused), size = sizeof cloud->info.unused - used;
+    snprintf(unused + used, size, why ? "%s%.*s (%s)" : "%s%.*s", used ? ", " : "", (int)length, name, why);
+}
+
 int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length)
 {
     int column = spl_keep_find_column(&cloud->keep, cloud->columns, name, length);

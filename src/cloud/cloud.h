@@ -98,7 +98,7 @@ struct spl_cloud_info {
      * first numbers or names the points. */
     char guessed[192];
     /* Headings of a text whose columns fill nothing, as "Code, Dist"; of other files what is called as a colour, and
-     * gives none, "rgb (a list)"; "" = none */
+     * gives none, "rgb (a list)", or as another one, "x (again)"; "" = none */
     char unused[200];
     /* Of a text whose columns nothing names, or the letters X and Y: what is odd about them where x may be the north,
      * "x has seven digits and y six"; static, NULL = nothing */

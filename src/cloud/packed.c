@@ -20,24 +20,15 @@ bool spl_packed_is_name(const char *name, size_t length)
     return false;
 }
 
-static void add_unused(struct spl_cloud *cloud, const char *text)
-{
-    char *unused = cloud->info.unused;
-    size_t used = strlen(unused);
-    snprintf(unused + used, sizeof cloud->info.unused - used, "%s%s", used ? ", " : "", text);
-}
-
 bool spl_packed_take(struct spl_cloud *cloud, const char *name, size_t length, unsigned bytes, bool list)
 {
-    char why[80];
+    char why[32];
     if (!spl_packed_is_name(name, length) || cloud->columns & rgb_columns ||
         spl_keep_find_column(&cloud->keep, cloud->columns, name, length) >= 0)
         return false;
     if (list || bytes < 4) {
-        char size[24];
-        snprintf(size, sizeof size, "of %u byte%s", bytes, bytes == 1 ? "" : "s");
-        snprintf(why, sizeof why, "%.*s (%s)", (int)length, name, list ? "a list" : size);
-        add_unused(cloud, why);
+        snprintf(why, sizeof why, "of %u byte%s", bytes, bytes == 1 ? "" : "s");
+        spl_cloud_add_unused(cloud, name, length, list ? "a list" : why);
         return false;
     }
     spl_cloud_name_field(cloud, name, length);
@@ -47,7 +38,7 @@ bool spl_packed_take(struct spl_cloud *cloud, const char *name, size_t length, u
 
 void spl_packed_tell_rest(struct spl_cloud *cloud)
 {
-    char text[80] = "";
+    char text[80] = "", why[32];
     int lacks = SPL_COLUMN_SKIP;
     size_t used = 0;
     if (!(cloud->columns & rgb_columns))
@@ -60,8 +51,8 @@ void spl_packed_tell_rest(struct spl_cloud *cloud)
                 (size_t)snprintf(text + used, sizeof text - used, "%s%s", used ? ", " : "", spl_column_name(column));
     if (lacks < 0)
         return;
-    snprintf(text + used, sizeof text - used, " (without %s)", spl_column_name(lacks));
-    add_unused(cloud, text);
+    snprintf(why, sizeof why, "without %s", spl_column_name(lacks));
+    spl_cloud_add_unused(cloud, text, used, why);
 }
 
 uint32_t spl_packed_from_number(double value)

@@ -260,13 +260,46 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
     for (int k = SPL_COLUMN_X; k <= SPL_COLUMN_Z; k++)
         if (!(cloud->columns >> k & 1))
             return spl_source_fail_line(&cloud->source, ply->header.vertex_line, spl_column_name(k), err,
-                                        "element vertex has no such property");
+                                        "element vertex has no such property; it has \"%.100s\"", cloud->fields);
     spl_packed_tell_rest(cloud);
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)
         cloud->info.attributes |= SPL_CLOUD_CLASS;
     return SPL_OK;
+}
+
+/* Rows that lie behind the last vertex, and behind what is declared to: where that can be told without reading it. */
+static uint64_t count_behind(const struct spl_cloud *cloud)
+{
+    const struct ply *ply = cloud->state;
+    uint64_t left = spl_source_left(&cloud->source), bytes;
+    for (unsigned i = ply->header.vertex; i < ply->header.element_count; i++) {
+        const struct spl_ply_element *element = &ply->header.elements[i];
+        if ((element->lists && element->count) ||
+            __builtin_mul_overflow(element->count, (uint64_t)element->row_bytes, &bytes) || bytes > left)
+            return 0;
+        left -= bytes;
+    }
+    return left / vertices(ply)->row_bytes;
+}
+
+/* The same of text, where nothing else is declared: lines of numbers, when all vertices were read. */
+static int count_lines_behind(struct spl_cloud *cloud, struct spl_error *err)
+{
+    const struct ply *ply = cloud->state;
+    const char *line;
+    size_t length;
+    double number;
+    int code = 0;
+    for (unsigned i = ply->header.vertex + 1; i < ply->header.element_count; i++)
+        if (ply->header.elements[i].count)
+            return 0;
+    while ((code = spl_source_line(&cloud->source, &line, &length, err)) > 0) {
+        struct spl_fields fields = spl_fields_begin(line, length, ' ');
+        cloud->info.points_behind += spl_fields_number(&fields, &number) == SPL_FIELD_OK;
+    }
+    return code;
 }
 
 static int ply_open(struct spl_cloud *cloud, struct spl_error *err)
@@ -292,6 +325,7 @@ static int ply_open(struct spl_cloud *cloud, struct spl_error *err)
     if (ply->header.format != SPL_PLY_ASCII && !vertices(ply)->lists) {
         cloud->sampling = SPL_SAMPLE_INTENSITY;
         cloud->info.rows = vertices(ply)->count;
+        cloud->info.points_behind = count_behind(cloud);
     }
     cloud->info.points_expected = vertices(ply)->count;
     return check_byte_order(cloud, err);
@@ -308,6 +342,8 @@ static int ply_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
     int code = SPL_OK;
 
     rows->count = 0;
+    if (left == 0 && ascii && !cloud->info.points_behind)
+        return count_lines_behind(cloud, err);
     if (ascii || element->lists) {
         for (; rows->count < count && code == SPL_OK; rows->count++)
             code = ascii ? take_ascii_row(cloud, element, rows, err) : take_row(cloud, element, rows, rows->count, err);

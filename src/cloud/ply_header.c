@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cloud/fields.h"
 #include "cloud/packed.h"
@@ -17,7 +18,7 @@ static const struct {
     {"ushort", SPL_NUMBER_UINT16},   {"uint16", SPL_NUMBER_UINT16},   {"int", SPL_NUMBER_INT32},
     {"int32", SPL_NUMBER_INT32},     {"uint", SPL_NUMBER_UINT32},     {"uint32", SPL_NUMBER_UINT32},
     {"float", SPL_NUMBER_FLOAT32},   {"float32", SPL_NUMBER_FLOAT32}, {"double", SPL_NUMBER_FLOAT64},
-    {"float64", SPL_NUMBER_FLOAT64},
+    {"float64", SPL_NUMBER_FLOAT64}, {"int64", SPL_NUMBER_INT64},     {"uint64", SPL_NUMBER_UINT64},
 };
 
 struct words {
@@ -97,6 +98,32 @@ static int parse_element(const struct spl_source *source, const struct words *wo
     return SPL_OK;
 }
 
+static bool has_vertex_property(const struct spl_ply_header *header, const char *name)
+{
+    const struct spl_ply_element *element = &header->elements[header->vertex];
+    for (unsigned i = 0; i < element->properties; i++)
+        if (!strcmp(header->properties[element->first + i].name, name))
+            return true;
+    return false;
+}
+
+/* Of "label" and "class", in whatever order, it is the second that the column is called by. What had it is kept under
+ * its own name, if anybody asks for that. */
+static void prefer_own_name(struct spl_cloud *cloud, struct spl_ply_header *header, struct spl_ply_property *p)
+{
+    const int column = spl_column_from_name(p->name, strlen(p->name));
+    if (p->column >= 0 || column < 0 || strcasecmp(p->name, spl_column_name(column)))
+        return;
+    for (unsigned i = header->elements[header->vertex].first; i < header->property_count; i++) {
+        struct spl_ply_property *q = &header->properties[i];
+        if (q->column != column || q->packed || !strcasecmp(q->name, p->name))
+            continue;
+        q->column = (int8_t)spl_keep_find_column(&cloud->keep, cloud->columns, q->name, strlen(q->name));
+        cloud->columns |= q->column >= 0 ? 1u << q->column : 0;
+        p->column = (int8_t)column;
+    }
+}
+
 static int parse_property(struct spl_cloud *cloud, const struct words *words, struct spl_ply_header *header,
                           struct spl_error *err)
 {
@@ -126,11 +153,15 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     copy_name(p.name, sizeof p.name, words, name);
     p.offset = (uint16_t)element->row_bytes;
     if (header->vertex_line && element == &header->elements[header->vertex]) {
+        if (has_vertex_property(header, p.name))
+            spl_cloud_add_unused(cloud, p.name, strlen(p.name), "again");
         p.packed = spl_packed_take(cloud, p.name, strlen(p.name), spl_number_bytes(p.type), list);
         if (p.packed)
             p.column = SPL_COLUMN_RED;
         else if (!list)
             p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
+        if (!list)
+            prefer_own_name(cloud, header, &p);
     }
     element->row_bytes += spl_number_bytes(list ? p.count_type : p.type);
     element->lists |= list;
@@ -139,23 +170,20 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     return SPL_OK;
 }
 
-static bool has_vertex_property(const struct spl_ply_header *header, const char *name)
+/* The centres of 3D Gaussians look like points, but what is seen lies between them, and their normals mean nothing.
+ * Returns the property that gives them away, whatever gives them colours; NULL: they are none. */
+static const char *find_gaussians(const struct spl_ply_header *header)
 {
-    const struct spl_ply_element *element = &header->elements[header->vertex];
-    for (unsigned i = 0; i < element->properties; i++)
-        if (!strcmp(header->properties[element->first + i].name, name))
-            return true;
-    return false;
-}
-
-/* The centres of 3D Gaussians look like points, but what is seen lies between them, and their normals mean nothing. */
-static bool is_gaussians(const struct spl_ply_header *header)
-{
-    static const char *const names[] = {"f_dc_0", "opacity", "scale_0", "rot_0"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (!has_vertex_property(header, names[i]))
-            return false;
-    return true;
+    static const char *const names[][3] = {{"opacity", "scale_0", "rot_0"},
+                                           {"packed_position", "packed_rotation", "packed_rotation"}};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        bool all = true;
+        for (int k = 0; k < 3; k++)
+            all &= has_vertex_property(header, names[i][k]);
+        if (all)
+            return names[i][0];
+    }
+    return NULL;
 }
 
 /* Sets source->newline by the ending of the first line. */
@@ -216,12 +244,17 @@ int spl_ply_parse_header(struct spl_cloud *cloud, struct spl_ply_header *header,
         return code;
     if (!have_format)
         return spl_source_fail_line(source, source->line, "format", err, "is missing from the header");
+    if (!header->vertex_line && header->element_count)
+        return spl_source_fail_line(source, source->line, "element vertex", err,
+                                    "is missing from the header, which has \"%s\": there are no points to read",
+                                    header->elements[0].name);
     if (!header->vertex_line)
         return spl_source_fail_line(source, source->line, "element vertex", err,
                                     "is missing from the header: there are no points to read");
-    if (is_gaussians(header))
-        return spl_source_fail_line(source, header->vertex_line, "f_dc_0", err,
-                                    "is a model of 3D Gaussians (f_dc, opacity, scale, rot), and no scan: pack takes "
-                                    "the points that it was made of, such as a scan or COLMAP's");
+    const char *gaussians = find_gaussians(header);
+    if (gaussians)
+        return spl_source_fail_line(source, header->vertex_line, gaussians, err,
+                                    "is a model of 3D Gaussians (opacity, scale, rot), and no scan: pack takes the "
+                                    "points that it was made of, such as a scan or COLMAP's");
     return SPL_OK;
 }

@@ -156,13 +156,6 @@ static void part_packed(struct spl_layout *layout, unsigned more)
     layout->packed = 0;
 }
 
-static void add_unused(struct spl_cloud *cloud, const char *name, const char *what)
-{
-    char *unused = cloud->info.unused;
-    size_t used = strlen(unused);
-    snprintf(unused + used, sizeof cloud->info.unused - used, "%s%s%s", used ? ", " : "", name, what);
-}
-
 /* Is the column that is called as a colour one? A user who says so is believed. */
 static int check_packed(struct spl_cloud *cloud, struct spl_error *err)
 {
@@ -184,7 +177,7 @@ static int check_packed(struct spl_cloud *cloud, struct spl_error *err)
     if (is || !cloud->options->columns)
         text->layout = judged;
     if (!is && !cloud->options->columns)
-        add_unused(cloud, name, packed.numbers == packed.values ? "" : " (text)");
+        spl_cloud_add_unused(cloud, name, strlen(name), packed.numbers == packed.values ? NULL : "text");
     return SPL_OK;
 }
 
@@ -216,7 +209,7 @@ static int check_names(struct spl_cloud *cloud, struct spl_error *err)
         if (!may || kinds.numbers[i] || !kinds.texts[i])
             continue;
         layout->column[i] = SPL_COLUMN_SKIP;
-        add_unused(cloud, spl_column_name(column), " (text)");
+        spl_cloud_add_unused(cloud, spl_column_name(column), strlen(spl_column_name(column)), "text");
     }
     return code;
 }

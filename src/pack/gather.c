@@ -277,6 +277,7 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     if (is_counted_here(scans, scan))
         p->points_skipped += info->points_skipped;
     memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
+    scan->points_behind = info->points_behind; /* of text, where they end */
     if (scans->rules) {
         memset(scan->points_from, 0, sizeof scan->points_from);
         scan->points_from[info->colors.from] = scan->points_inside;

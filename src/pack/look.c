@@ -31,7 +31,8 @@ int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool rea
         }
         spl_stage_end(stage);
         stage->name = "";
-        memcpy(scan->points_from, spl_cloud_get_info(cloud)->points_from, sizeof scan->points_from);
+        memcpy(scan->points_from, info->points_from, sizeof scan->points_from);
+        scan->points_behind = info->points_behind;
     } else {
         scan->points_from[scan->colors.from] = scan->points_expected;
         for (int c = 0; c < 3 && info->has_bounds; c++) {

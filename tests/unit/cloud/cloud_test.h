@@ -76,7 +76,7 @@ struct loaded {
     struct spl_error err;
     char format[8];
     uint32_t attributes, station_count;
-    uint64_t points, skipped, expected;
+    uint64_t points, skipped, expected, behind;
     bool at_most, surveyors;
     char guessed[192], unused[200], footer[192];
     const char *north; /* static */
@@ -121,6 +121,7 @@ static inline void load_path(const char *path, const char *columns, size_t capac
         l->station_count = info->station_count;
         l->skipped = info->points_skipped;
         l->expected = info->points_expected;
+        l->behind = info->points_behind;
         l->at_most = info->points_at_most;
         l->surveyors = info->surveyors;
         l->north = info->north_first;

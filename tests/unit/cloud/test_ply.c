@@ -13,8 +13,7 @@ static void put_scalar(struct bytes *b, int order, const char *type, double v)
         return;
     }
     const char *digits = type + strcspn(type, "0123456789");
-    unsigned size = !strncmp(type, "float", 5)                       ? (strcmp(digits, "64") ? 4 : 8)
-                    : !strcmp(type, "double")                        ? 8
+    unsigned size = !strcmp(digits, "64") || !strcmp(type, "double") ? 8
                     : strstr(type, "char") || !strcmp(digits, "8")   ? 1
                     : strstr(type, "short") || !strcmp(digits, "16") ? 2
                                                                      : 4;
@@ -24,7 +23,7 @@ static void put_scalar(struct bytes *b, int order, const char *type, double v)
         uint32_t u;
         memcpy(&u, &f, 4);
         bits = u;
-    } else if (size == 8) {
+    } else if (size == 8 && !strstr(type, "int")) {
         memcpy(&bits, &v, 8);
     } else {
         bits = (uint64_t)(int64_t)v;
@@ -276,8 +275,8 @@ static void a_glint_darkens_nothing(void **state)
                           "ply\nformat ascii 1.0\nelement vertex 201\nproperty float x\nproperty float y\n"
                           "property float z\nproperty float intensity\nend_header\n");
     for (int i = 0; i <= 200; i++)
-        length += snprintf(text + length, sizeof text - (size_t)length, "0 0 %d %d\n", i,
-                           i == 40 ? 1000000 : (i + 90) % 200);
+        length +=
+            snprintf(text + length, sizeof text - (size_t)length, "0 0 %d %d\n", i, i == 40 ? 1000000 : (i + 90) % 200);
     load_text(text, NULL, &l);
     uint8_t middle = l.first.color[10][0];
     assert_true(middle > 120 && middle < 136);
@@ -308,7 +307,9 @@ static void broken_headers_are_refused(void **state)
     refused_text("ply\nend_header\n", SPL_E_INPUT, "format", "missing");
     refused_text("ply\nformat ascii 2.0\n", SPL_E_INPUT, "format", "line 2");
     refused_text("ply\nformat middle_endian 1.0\n", SPL_E_INPUT, "format", "binary_big_endian");
-    refused_text("ply\nformat ascii 1.0\nelement face 0\nend_header\n", SPL_E_INPUT, "element vertex", "missing");
+    refused_text("ply\nformat ascii 1.0\nelement face 0\nend_header\n", SPL_E_INPUT, "element vertex",
+                 "missing from the header, which has \"face\"");
+    refused_text("ply\nformat ascii 1.0\nend_header\n", SPL_E_INPUT, "element vertex", "there are no points to read");
     refused_text("ply\nformat ascii 1.0\nelement vertex\n", SPL_E_INPUT, "element", "line 3");
     refused_text("ply\nformat ascii 1.0\nelement vertex -3\n", SPL_E_INPUT, "element", "\"-3\"");
     refused_text("ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", SPL_E_INPUT, "element", "not a count");
@@ -318,7 +319,7 @@ static void broken_headers_are_refused(void **state)
     refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\n", SPL_E_INPUT, "property",
                  "list's length");
     refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
-                 SPL_E_INPUT, "z", "no such property");
+                 SPL_E_INPUT, "z", "no such property; it has \"x, y\"");
     refused_text("ply\nformat ascii 1.0\nwhat is this\n", SPL_E_INPUT, "", "\"what\"");
 }
 
@@ -362,9 +363,89 @@ static void the_wrong_byte_order_is_told(void **state)
     }
 }
 
+/* Behind the last vertex, where nothing else is due: what could be rows is counted and not read. */
+static void rows_behind_the_last_are_counted(void **state)
+{
+    static const struct {
+        const char *element, *rows; /* behind the vertices; its rows and what follows, as text */
+        unsigned bytes, behind[2];  /* of binary: bytes instead; as text and binary */
+    } all[] = {
+        {"", "", 0, {0, 0}},
+        {"", "\n \n", 11, {0, 0}},
+        {"", "1 2 3\n\n4 5 6", 36, {2, 3}},
+        {"", "END\n1 2 3\n", 12, {1, 1}},
+        {"element edge 0\nproperty int a\n", "1 2 3\n", 13, {1, 1}},
+        {"element edge 2\nproperty int a\n", "1\n2\n1 2 3\n", 20, {0, 1}}, /* as text nobody looks there */
+        {"element edge 9\nproperty int a\n", "1\n2\n", 20, {0, 0}},
+        {"element edge 18446744073709551615\nproperty int a\n", "1\n2\n", 20, {0, 0}},
+        {"element face 1\nproperty list uchar int a\n", "0\n1 2 3\n", 99, {0, 0}},
+    };
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        for (int order = 0; order < 2; order++) {
+            b.length = 0;
+            put_text(&b, "ply\nformat %s 1.0\nelement vertex 2\n" XYZ "%send_header\n", orders[order], all[i].element);
+            for (int k = 0; k < 6; k++) {
+                put_scalar(&b, order, "float", k);
+                if (k % 3 == 2)
+                    end_row(&b, order);
+            }
+            if (order)
+                put_zeros(&b, all[i].bytes);
+            else
+                put_text(&b, "%s", all[i].rows);
+            load_bytes(&b, NULL, 1, &l);
+            if (l.code < 0 || l.points != 2 || l.behind != all[i].behind[order])
+                fail_msg("%zu %s: %llu behind, %s", i, orders[order], (unsigned long long)l.behind, l.err.message);
+            loaded_finish(&l);
+        }
+}
+
+/* A name that stands twice is read once; and what is called as a column comes before what may be one. */
+static void names_that_want_the_same(void **state)
+{
+    static const struct {
+        const char *properties, *unused;
+        int class;
+    } all[] = {
+        {"float x\nproperty float y\nproperty float z\nproperty float x\nproperty float y", "x (again), y (again)", 0},
+        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint class", "", 5},
+        {"float x\nproperty float y\nproperty float z\nproperty uint CLASS\nproperty uint label", "", 4},
+        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint foo", "", 4},
+        {"float x\nproperty float y\nproperty float z\nproperty int64 label\nproperty uint64 foo", "", 4},
+    };
+    struct loaded l;
+    (void)state;
+    for (int order = 0; order < 3; order++)
+        for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+            static struct bytes b;
+            b.length = 0;
+            put_text(&b, "ply\nformat %s 1.0\nelement vertex 1\nproperty %s\nend_header\n", orders[order],
+                     all[i].properties);
+            for (int k = 0; k < 5; k++)
+                put_scalar(&b, order, k < 3 || i == 0 ? "float" : i == 4 ? "int64" : "uint", k + 1);
+            end_row(&b, order);
+            load_bytes(&b, NULL, 1, &l);
+            if (l.code < 0)
+                fail_msg("%zu: %s", i, l.err.message);
+            assert_point(&l, 0, 1, 2, 3);
+            assert_int_equal(l.first.classification[0], all[i].class);
+            assert_string_equal(l.unused, all[i].unused);
+            loaded_finish(&l);
+        }
+}
+
 /* Centres of Gaussians are no points of a scan; an opacity alone makes none. */
 static void gaussians_are_no_scan(void **state)
 {
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\n" XYZ "property float opacity\nproperty float scale_0\n"
+                 "property uchar red\nproperty float rot_0\nend_header\n1 2 3 4 5 6 7\n",
+                 SPL_E_INPUT, "opacity", "3D Gaussians");
+    refused_text("ply\nformat binary_little_endian 1.0\nelement chunk 0\nproperty float min_x\nelement vertex 0\n"
+                 "property uint packed_position\nproperty uint packed_rotation\nend_header\n",
+                 SPL_E_INPUT, "packed_position", "3D Gaussians");
     static const char header[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
                                  "property float z\nproperty float f_dc_0\nproperty float opacity\n"
                                  "property float scale_0\nproperty float %s\nend_header\n1 2 3 4 5 6 7\n";
@@ -372,7 +453,7 @@ static void gaussians_are_no_scan(void **state)
     struct loaded l;
     (void)state;
     put_text(&b, header, "rot_0");
-    refused(&b, NULL, SPL_E_INPUT, "f_dc_0", "line 3: f_dc_0: is a model of 3D Gaussians");
+    refused(&b, NULL, SPL_E_INPUT, "opacity", "line 3: opacity: is a model of 3D Gaussians");
     b.length = 0;
     put_text(&b, header, "rotation");
     write_scratch(b.data, b.length);
@@ -507,6 +588,8 @@ int main(void)
         cmocka_unit_test(packed_colours_at_their_ends),
         cmocka_unit_test(colours_that_are_not_read_are_told),
         cmocka_unit_test(gaussians_are_no_scan),
+        cmocka_unit_test(rows_behind_the_last_are_counted),
+        cmocka_unit_test(names_that_want_the_same),
         cmocka_unit_test(every_type_and_byte_order),
         cmocka_unit_test(doubles_are_exact),
         cmocka_unit_test(other_elements_and_lists_are_skipped),
