@@ -67,10 +67,11 @@ static void get_text(const struct spl_crs_keys *k, uint16_t key, char *out, size
     char text[256];
     if (!entry || at > k->text_bytes)
         return;
-    for (; i < length && at + i < k->text_bytes && i + 1 < sizeof text && k->text[at + i] &&
-           k->text[at + i] != '|';
+    for (; i < length && at + i < k->text_bytes && i + 1 < sizeof text && k->text[at + i] && k->text[at + i] != '|';
          i++)
         text[i] = (char)k->text[at + i];
+    while (i > 0 && text[i - 1] == ' ')
+        i--;
     text[i] = 0;
     if (i)
         spl_text_show(text, out, size);

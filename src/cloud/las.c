@@ -115,8 +115,8 @@ static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
     for (unsigned k = 0; k < 3; k++) {
         info->bounds[1][k] = spl_le_get_double(h + 179 + 16 * k);
         info->bounds[0][k] = spl_le_get_double(h + 187 + 16 * k);
-        info->has_bounds &= isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) &&
-                            info->bounds[0][k] <= info->bounds[1][k];
+        info->has_bounds &=
+            isfinite(info->bounds[0][k]) && isfinite(info->bounds[1][k]) && info->bounds[0][k] <= info->bounds[1][k];
     }
 }
 
@@ -205,8 +205,9 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
         return code;
     snprintf(cloud->info.version, sizeof cloud->info.version, "1.%u, point format %u", minor, las->format);
     take_bounds(&cloud->info, h);
+    const uint64_t end = all[1].count && all[1].at < size ? all[1].at : size;
     if (!compressed && !(las->format == 4 || las->format == 5 || las->format >= 9)) /* behind those lie waveforms */
-        cloud->info.points_behind = count_behind(las, all[1].count ? all[1].at : size);
+        cloud->info.points_behind = count_behind(las, end);
     cloud->info.points_expected = las->count;
     cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_INTENSITY;

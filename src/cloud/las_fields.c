@@ -38,9 +38,15 @@ static const unsigned with_infrared = 1 << 8 | 1 << 10;
 
 static const uint8_t numbers[] = {
     SPL_NUMBER_NONE,
-    [SPL_LAS_U8] = SPL_NUMBER_UINT8,   [SPL_LAS_I8] = SPL_NUMBER_INT8,     [SPL_LAS_U16] = SPL_NUMBER_UINT16,
-    [SPL_LAS_I16] = SPL_NUMBER_INT16,  [SPL_LAS_U32] = SPL_NUMBER_UINT32,  [SPL_LAS_I32] = SPL_NUMBER_INT32,
-    [SPL_LAS_U64] = SPL_NUMBER_UINT64, [SPL_LAS_I64] = SPL_NUMBER_INT64,   [SPL_LAS_F32] = SPL_NUMBER_FLOAT32,
+    [SPL_LAS_U8] = SPL_NUMBER_UINT8,
+    [SPL_LAS_I8] = SPL_NUMBER_INT8,
+    [SPL_LAS_U16] = SPL_NUMBER_UINT16,
+    [SPL_LAS_I16] = SPL_NUMBER_INT16,
+    [SPL_LAS_U32] = SPL_NUMBER_UINT32,
+    [SPL_LAS_I32] = SPL_NUMBER_INT32,
+    [SPL_LAS_U64] = SPL_NUMBER_UINT64,
+    [SPL_LAS_I64] = SPL_NUMBER_INT64,
+    [SPL_LAS_F32] = SPL_NUMBER_FLOAT32,
     [SPL_LAS_F64] = SPL_NUMBER_FLOAT64,
 };
 
@@ -118,6 +124,10 @@ static void add_extra(struct spl_las_fields *fields, struct spl_cloud *cloud, co
         .offset = options & has_offset ? number_of(SPL_LAS_F64, d + 136) : 0,
         .no_data = options & has_no_data ? number_of(wide, d + 40) : (double)NAN,
     };
+    if (field.scale == 0 || !isfinite(field.scale)) /* as not said */
+        field.scale = 1;
+    if (!isfinite(field.offset))
+        field.offset = 0;
     add(fields, cloud, name, length, field);
 }
 

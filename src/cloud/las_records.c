@@ -91,23 +91,35 @@ static int read_keys(struct spl_cloud *cloud, const struct spl_las_record record
     for (int i = 0; i < 3 && !code; i++)
         code = read_record(cloud, records, ids[i], &contents[i], &bytes[i], err);
     if (!code && contents[0])
-        spl_crs_read_keys(
-            &(struct spl_crs_keys){contents[0], contents[1], contents[2], bytes[0], bytes[1], bytes[2]}, crs);
+        spl_crs_read_keys(&(struct spl_crs_keys){contents[0], contents[1], contents[2], bytes[0], bytes[1], bytes[2]},
+                          crs);
     for (int i = 0; i < 3; i++)
         free(contents[i]);
     return code;
 }
 
-/* What `a` leaves open is taken from `b`, unless it contradicts `a`; `b` is used up. */
-static void complete(struct spl_cloud_coordinates *a, struct spl_cloud_coordinates *b)
+/* "EPSG:N in m", "us-ft", "in degrees". */
+static void show(const struct spl_cloud_coordinates *crs, char text[64])
 {
-    bool same = !a->epsg || !b->epsg || a->epsg == b->epsg;
-    if (!spl_crs_is_said(a) && a->unit_m == 0 && (spl_crs_is_said(b) || b->unit_m > 0)) {
+    char unit[SPL_UNIT_TEXT_MAX];
+    const char *in = crs->angles ? "degrees" : crs->unit_m > 0 ? spl_unit_print(crs->unit_m, unit) : "";
+    if (crs->epsg)
+        snprintf(text, 64, "EPSG:%u%s%s", crs->epsg, *in ? " in " : "", in);
+    else
+        snprintf(text, 64, "%s", in);
+}
+
+/* What `a` leaves open is taken from `b`, unless it contradicts `a`: then false. `b` is used up. */
+static bool complete(struct spl_cloud_coordinates *a, struct spl_cloud_coordinates *b)
+{
+    const bool only = !spl_crs_is_said(a) && a->unit_m == 0, none = !spl_crs_is_said(b) && b->unit_m == 0;
+    const bool fits = (!a->epsg || !b->epsg || a->epsg == b->epsg) && a->angles == b->angles &&
+                      (a->unit_m == 0 || b->unit_m == 0 || spl_unit_is_same(a->unit_m, b->unit_m));
+    if (only && !none) {
         struct spl_cloud_coordinates swapped = *a;
         *a = *b;
         *b = swapped;
-    } else if (same && a->angles == b->angles &&
-               (a->unit_m == 0 || b->unit_m == 0 || spl_unit_is_same(a->unit_m, b->unit_m))) {
+    } else if (fits) {
         a->epsg = a->epsg ? a->epsg : b->epsg;
         a->unit_m = a->unit_m > 0 ? a->unit_m : b->unit_m;
         if (a->height_unit_m == 0 && a->height_epsg == 0) {
@@ -122,6 +134,7 @@ static void complete(struct spl_cloud_coordinates *a, struct spl_cloud_coordinat
         }
     }
     spl_crs_finish(b);
+    return fits || only || none;
 }
 
 int spl_las_read_coordinates(struct spl_cloud *cloud, const struct spl_las_record records[2], bool wkt_first,
@@ -138,13 +151,19 @@ int spl_las_read_coordinates(struct spl_cloud *cloud, const struct spl_las_recor
     }
     struct spl_cloud_coordinates *crs = &cloud->info.coordinates;
     char lost[sizeof crs->lost];
+    char by_wkt[64], by_keys[64];
     memcpy(lost, wkt.lost[0] ? wkt.lost : keys.lost, sizeof lost);
-    complete(wkt_first ? &wkt : &keys, wkt_first ? &keys : &wkt);
+    show(&wkt, by_wkt);
+    show(&keys, by_keys);
+    const bool fits = complete(wkt_first ? &wkt : &keys, wkt_first ? &keys : &wkt);
     *crs = wkt_first ? wkt : keys;
     if (crs->epsg || crs->wkt)
         crs->lost[0] = 0; /* one of the two says all */
     else
         memcpy(crs->lost, lost, sizeof lost);
     spl_crs_keep_name(crs);
+    if (!fits)
+        snprintf(crs->lost, sizeof crs->lost, "its GeoTIFF keys say %s and its WKT %s: the %s taken", by_keys, by_wkt,
+                 wkt_first ? "WKT is" : "keys are");
     return SPL_OK;
 }

@@ -38,7 +38,13 @@ static bool is_padding(const struct spl_pcd_field *field)
 
 static int take_column(struct spl_cloud *cloud, struct spl_pcd_field *field)
 {
+    const struct pcd *pcd = cloud->state;
     size_t length = strlen(field->name);
+    for (const struct spl_pcd_field *other = pcd->header.fields; other < field; other++)
+        if (!strcmp(other->name, field->name)) {
+            spl_cloud_add_unused(cloud, field->name, length, "again");
+            break;
+        }
     field->packed = spl_packed_take(cloud, field->name, length, field->bytes, field->count != 1);
     if (field->packed)
         return SPL_COLUMN_RED;
@@ -127,6 +133,8 @@ static int check_count(struct spl_cloud *cloud, struct spl_error *err)
     if (h->data == SPL_PCD_COMPRESSED)
         return h->points ? check_compressed(cloud, err) : SPL_OK;
     uint64_t most = h->data == SPL_PCD_BINARY ? left / h->point_bytes : (left + 1) / (2 * (uint64_t)h->numbers);
+    if (h->data == SPL_PCD_BINARY && h->points < most)
+        cloud->info.points_behind = most - h->points;
     if (h->points <= most)
         return SPL_OK;
     return spl_source_fail_line(&cloud->source, h->points_line, "POINTS", err,

@@ -1,6 +1,7 @@
 /* PTX: one or more stations, each a header (columns, rows, scanner position and axes, 4×4 matrix with the translation
  * in its last row) and columns × rows cells "x y z [intensity [r g b]]" in the station's frame. A cell at exactly 0 0 0
- * saw nothing; it is counted and dropped.
+ * saw nothing; it is counted and dropped. Intensities are 0 to 1 and colours 8 bits, but where the first cells say
+ * otherwise: then all of the file is looked at, as of other formats.
  *
  * Invariant: the source's cursor is at the start of a line between calls. Owned by the cloud's thread. */
 #include <math.h>
@@ -11,11 +12,15 @@
 #include "cloud/fields.h"
 #include "cloud/reader.h"
 
+enum { first_cells = 1 << 16 };
+
 struct ptx {
-    uint64_t start;        /* of the first station: behind a byte order mark */
-    uint64_t cells, taken; /* of the current station */
-    unsigned fields;       /* values of a cell of this station, 0 before its first */
-    unsigned first_fields; /* of the file's first station with cells */
+    uint64_t start;                /* of the first station: behind a byte order mark */
+    uint64_t cells, taken;         /* of the current station */
+    unsigned fields;               /* values of a cell of this station, 0 before its first */
+    unsigned first_fields;         /* of the file's first station with cells */
+    bool doubtful;                 /* intensities go beyond 0 to 1, or fields of colours hold nothing */
+    struct spl_cloud_colors found; /* then: by all cells */
     size_t station_capacity;
     double pose[16]; /* row-major, station to world */
 };
@@ -151,10 +156,13 @@ static int set_fields(struct spl_cloud *cloud, unsigned fields, struct spl_error
                                     "intensity do not mix",
                                     fields, ptx->first_fields);
     ptx->fields = fields;
+    struct spl_cloud_colors colors = {.from = SPL_COLORS_INTENSITY, .white = 1};
     if (fields == 7 && !cloud->intensity)
-        spl_cloud_set_colors(cloud, &(struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255});
-    else if (fields > 3)
-        spl_cloud_set_colors(cloud, &(struct spl_cloud_colors){.from = SPL_COLORS_INTENSITY, .white = 1});
+        colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255};
+    if (ptx->doubtful && (ptx->found.from != SPL_COLORS_RGB || fields == 7))
+        colors = ptx->found;
+    if (fields > 3)
+        spl_cloud_set_colors(cloud, &colors);
     return SPL_OK;
 }
 
@@ -239,12 +247,48 @@ static int ptx_rows(struct spl_cloud *cloud, struct spl_rows *rows, size_t limit
 static int ptx_seek(struct spl_cloud *cloud, unsigned part, unsigned parts, struct spl_error *err)
 {
     struct ptx *ptx = cloud->state;
-    (void)part, (void)parts, (void)err; /* never sampled: intensities are 0 to 1 and colours 8 bits by definition */
+    (void)part, (void)parts, (void)err; /* never sampled */
+    ptx->found = cloud->info.colors;
     ptx->cells = ptx->taken = 0;
     cloud->info.station_count = 0;
     spl_source_seek(&cloud->source, ptx->start);
     cloud->source.line = 0;
     return SPL_OK;
+}
+
+/* Do intensities keep to 0 to 1, but for some glints, and has somebody filled the colours? What is malformed is told by
+ * who reads it. */
+static int look_at_first_cells(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct ptx *ptx = cloud->state;
+    struct spl_rows *rows = &cloud->rows;
+    const struct spl_cloud_colors colors = cloud->info.colors, none = {0};
+    const bool rgb = colors.from == SPL_COLORS_RGB;
+    struct spl_error ignored = {0};
+    bool wide = false, lit = false;
+    uint64_t seen = 0;
+    int code = ptx_seek(cloud, 0, 1, err);
+    while (code == SPL_OK && seen < first_cells && !wide && !lit) {
+        int got = ptx_rows(cloud, rows, SPL_ROWS, &ignored);
+        if (got <= 0) {
+            code = got == 0 || got == SPL_E_INPUT ? SPL_OK : spl_fail(err, got, "%s", ignored.message);
+            break;
+        }
+        for (size_t r = 0; r < rows->count; r++) {
+            const double v = rows->value[SPL_COLUMN_INTENSITY][r];
+            wide |= !rgb && (v < -1 || v > 2);
+            for (int k = 0; rgb && ptx->fields == 7 && k < 3; k++)
+                lit |= rows->value[SPL_COLUMN_RED + k][r] > 0;
+        }
+        seen += rows->count + 1;
+    }
+    ptx->doubtful = rgb ? !lit : wide;
+    spl_cloud_set_colors(cloud, ptx->doubtful ? &none : &colors);
+    if (ptx->doubtful && rgb) {
+        cloud->columns |= 7u << SPL_COLUMN_RED;
+        cloud->scan_colors = cloud->integer_colors = true;
+    }
+    return code;
 }
 
 /* Looks at the first cell of the first station that has any, which says what the file holds. */
@@ -267,7 +311,7 @@ static int ptx_open(struct spl_cloud *cloud, struct spl_error *err)
     if (ptx->fields > 3)
         spl_cloud_take_column(cloud, "intensity", strlen("intensity"));
     cloud->info.attributes |= SPL_CLOUD_STATION;
-    return SPL_OK;
+    return ptx->fields > 3 ? look_at_first_cells(cloud, err) : SPL_OK;
 }
 
 const struct spl_cloud_reader spl_ptx_reader = {

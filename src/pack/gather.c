@@ -325,6 +325,21 @@ static int gather(struct spl_points *points, struct spl_point_batch *batch, stru
     return rc;
 }
 
+/* A writer that was stopped before it came back to the header leaves a count of 0. */
+static int refuse_empty(const struct spl_scans *scans, const struct spl_points *points, struct spl_error *err)
+{
+    uint64_t behind = 0;
+    char more[120] = "";
+    for (size_t i = 0; i < scans->count; i++)
+        behind += scans->list[i].points_behind;
+    if (behind)
+        snprintf(more, sizeof more, "; %llu more than its header counts could lie there: mend the header's number",
+                 (unsigned long long)behind);
+    return spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite%s)",
+                    scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
+                    (unsigned long long)points->points_skipped, more);
+}
+
 /* What breaks after some of it was read has left its mark: on the common range of grey, on which arrays there are. So
  * that the result is that of a pack without it, all others are read once more. */
 int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct spl_stage *stage,
@@ -362,9 +377,7 @@ int spl_points_gather(struct spl_points *points, struct spl_scans *scans, struct
     if (!rc)
         rc = spl_points_settle(points, scans->rules, err);
     if (!rc && !points->count && !scans->rules)
-        rc = spl_fail(err, SPL_E_INPUT, "%s%s: no usable point (%llu skipped as empty or not finite)",
-                      scans->list[0].path, scans->count > 1 ? " and the other inputs" : "",
-                      (unsigned long long)points->points_skipped);
+        rc = refuse_empty(scans, points, err);
     return rc;
 }
 

@@ -197,6 +197,8 @@ static void keys_are_read(void **state)
         /* heights by the numbers of GeoTIFF's first edition */
         {{.entries = {{3072, 0, 1, 2903}, {3076, 0, 1, 9003}, {4096, 0, 1, 5103}, {4099, 0, 1, 9003}}},
          "EPSG:2903 | us-ft | us-ft", ""},
+        {{.entries = {{3072, 0, 1, 32767}, {3076, 0, 1, 9001}, {1026, 34737, 9, 0}}, .text = "site A  |"},
+         "- | m | unknown", "site A"}, /* a field of fixed length */
         {{.entries = {{1024, 0, 1, 2}, {2048, 0, 1, 4326}, {2054, 0, 1, 9102}, {2049, 34737, 7, 0}}, .text = "WGS 84|"},
          "EPSG:4326 | angles | unknown", "WGS 84"},
         {{.entries = {{2048, 0, 1, 4326}}}, "EPSG:4326 | angles | unknown", ""},

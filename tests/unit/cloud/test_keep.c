@@ -225,6 +225,18 @@ static void extra_bytes_go_by_their_names(void **state)
     assert_int_equal(k.batch.color[1][0], k.batch.color[1][2]);
     close_kept(&k);
 
+    /* a scale that is none, as an offset that is none, is not said */
+    for (int i = 0; i < 2; i++) {
+        las_set_double(&d, 112, i ? 0 : (double)NAN);
+        las_set_double(&d, 136, (double)INFINITY);
+        las_build(&b, &las);
+        las_set(&b, first + at[0], (uint64_t)-300, 2);
+        describe(&b, d.data, descriptions);
+        open_kept(&b, NULL, "amplitude", &k);
+        check(&k, SPL_SCALAR_KEPT, 0, -300);
+        close_kept(&k);
+    }
+
     /* a record that is too short for what is described: what fits is there */
     las_build(&b, &las);
     las_set(&b, 105, record - 5, 2);

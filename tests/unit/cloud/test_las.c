@@ -86,6 +86,16 @@ static void counts_of_1_4_and_before(void **state)
     load_bytes(&b, NULL, 50, &l);
     assert_int_equal(l.code, 0);
     assert_int_equal(l.points, 0);
+    assert_int_equal(l.behind, 10);
+    loaded_finish(&l);
+    las_set(&b, 235, 1ull << 40, 8); /* records that lie nowhere */
+    las_set(&b, 243, 2, 4);
+    load_bytes(&b, NULL, 50, &l);
+    assert_int_equal(l.behind, 10);
+    loaded_finish(&l);
+    las_set(&b, 235, b.length - 6 * 34, 8); /* behind the fourth */
+    load_bytes(&b, NULL, 50, &l);
+    assert_int_equal(l.behind, 4);
     loaded_finish(&l);
 }
 

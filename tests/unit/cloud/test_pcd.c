@@ -130,6 +130,30 @@ static void doubles_are_exact(void **state)
     }
 }
 
+/* Binary data goes on behind as many points as there are said to be; text is refused for it. */
+static void points_behind_and_names_that_stand_twice(void **state)
+{
+    static struct bytes b;
+    struct loaded l;
+    const struct field fields[] = {{"x", 'F', 4, 1, {1, 2, 3}},
+                                   {"y", 'F', 4, 1, {1, 2, 3}},
+                                   {"z", 'F', 4, 1, {1, 2, 3}},
+                                   {"x", 'F', 4, 1, {9, 9, 9}}};
+    (void)state;
+    for (int kind = BINARY; kind < KINDS; kind++)
+        for (unsigned count = 3; count < 5; count++) {
+            build(&b, (enum kind)kind, fields, count, 3);
+            put_zeros(&b, 2 * 4 * count + 3);
+            load_bytes(&b, NULL, 2, &l);
+            assert_int_equal(l.code, 0);
+            assert_int_equal(l.points, 3);
+            assert_int_equal(l.behind, kind == BINARY ? 2 : 0);
+            assert_string_equal(l.unused, count == 4 ? "x (again)" : "");
+            assert_point(&l, 2, 3, 3, 3);
+            loaded_finish(&l);
+        }
+}
+
 static void normals_intensity_and_label(void **state)
 {
     (void)state;
@@ -411,6 +435,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_type_and_kind),
         cmocka_unit_test(doubles_are_exact),
+        cmocka_unit_test(points_behind_and_names_that_stand_twice),
         cmocka_unit_test(normals_intensity_and_label),
         cmocka_unit_test(packed_colors),
         cmocka_unit_test(wide_colors_and_those_that_are_none),

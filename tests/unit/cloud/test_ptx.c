@@ -52,6 +52,36 @@ static void intensity_serves_where_no_colour_is(void **state)
     loaded_finish(&l);
 }
 
+/* Intensities are 0 to 1, and colours there where there are fields for them: where the first cells say otherwise all of
+ * them do. */
+static void cells_that_keep_to_no_rule(void **state)
+{
+    static const struct {
+        const char *text;
+        int first, second; /* grey, or red where a colour has a second one */
+        bool blank;
+    } all[] = {
+        {HEADER "1 2 3 0\n" HEADER "4 5 6 255\n" HEADER "7 8 9 51\n", 0, 255, false},
+        {HEADER "1 2 3 -2048\n" HEADER "4 5 6 2047\n", 0, 255, false},
+        {HEADER "0 0 0 4000\n" HEADER "1 2 3 0.25\n" HEADER "4 5 6 1\n", 64, 255, false}, /* of no point */
+        {HEADER "1 2 3 0.5\n" HEADER "4 5 6 1.5\n", 128, 255, false},                     /* a glint */
+        {HEADER "1 2 3 nan\n" HEADER "4 5 6 1\n", 0, 255, false},
+        {HEADER "1 2 3 0.25 0 0 0\n" HEADER "4 5 6 1 0 0 0\n", 0, 255, true},
+        {HEADER "1 2 3 0.25 0 0 0\n" HEADER "4 5 6 1 9 0 0\n", 0, 9, false},
+        {HEADER "1 2 3 500 0 0 0\n" HEADER "4 5 6 900 9 0 0\n", 0, 9, false}, /* intensities make no colour there */
+        {HEADER "1 2 3 500 0 0 0\n" HEADER "4 5 6 900\n", 0, 255, true},
+    };
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        load_text(all[i].text, NULL, &l);
+        if (l.first.color[0][0] != all[i].first || l.first.color[1][0] != all[i].second ||
+            l.colors.blank != all[i].blank || !(l.attributes & SPL_CLOUD_COLOR))
+            fail_msg("%zu: %d, %d", i, l.first.color[0][0], l.first.color[1][0]);
+        loaded_finish(&l);
+    }
+}
+
 static void odd_but_sound_files_load(void **state)
 {
     struct loaded l;
@@ -127,8 +157,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stations_keep_their_poses), cmocka_unit_test(intensity_serves_where_no_colour_is),
-        cmocka_unit_test(odd_but_sound_files_load),  cmocka_unit_test(many_stations_and_cells),
-        cmocka_unit_test(broken_files_are_refused),
+        cmocka_unit_test(odd_but_sound_files_load),  cmocka_unit_test(cells_that_keep_to_no_rule),
+        cmocka_unit_test(many_stations_and_cells),   cmocka_unit_test(broken_files_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, remove_scratch);
 }

@@ -407,6 +407,7 @@ static void test_coordinate_systems(void **state)
                       *degrees = "GEOGCS[\"WGS 84\",UNIT[\"degree\",0.0174],AUTHORITY[\"EPSG\",\"4326\"]]",
                       *here = "PROJCS[\"Here\",UNIT[\"metre\",1]]", *there = "PROJCS[\"There\",UNIT[\"metre\",1]]",
                       *nameless = "PROJCS[\"unnamed\",UNIT[\"metre\",1]]",
+                      *other = "PROJCS[\"O\",UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25833\"]]",
                       *mixed = "COMPD_CS[\"C\",PROJCS[\"P\","
                                "UNIT[\"metre\",1]],VERT_CS[\"V\",UNIT[\"foot\",0.3048]]]",
                       *alike = "COMPD_CS[\"C\",PROJCS[\"P\",UNIT[\"foot\",0.3048]],VERT_CS[\"V\","
@@ -510,6 +511,21 @@ static void test_coordinate_systems(void **state)
          "a.las (and 1 more): the WKT of its coordinate system cannot be read (WKT, byte 7: "},
         {{GRID, 0, 0, "PROJCS[\"no end", REST}, {0}, NULL, "EPSG:25832", "m | EPSG:25832", NULL},
         {{GRID, 25832, 0, "PROJCS[\"no end", REST}, {0}, NULL, NULL, "m | EPSG:25832", NULL},
+        /* what contradicts itself */
+        {{GRID, 25832, 0, other, REST},
+         {0},
+         NULL,
+         NULL,
+         "m | EPSG:25832",
+         "a.las: its GeoTIFF keys say EPSG:25832 in m and its WKT EPSG:25833 in m: the keys are taken; --crs"},
+        {{GRID, 0, 9003, other, REST},
+         {0},
+         NULL,
+         NULL,
+         "us-ft | null",
+         "a.las: its GeoTIFF keys say us-ft and its WKT EPSG:25833 in m: the keys are taken; --crs"},
+        {{GRID, 25833, 0, other, REST}, {0}, NULL, NULL, "m | EPSG:25833", NULL},
+        {{GRID, 0, 9001, here, REST}, {0}, NULL, NULL, "m | PROJCS[\"Here\",UNIT[\"metre\",1]]", NULL},
         {{GRID, 25832, 9002, NULL, REST},
          {0},
          NULL,
@@ -615,6 +631,13 @@ static void test_uncounted_points(void **state)
         pack_two(write_las("padded.las", &(struct las){.scale = 0.001, .red = 1, .count = 201, .uncounted = 1}), NULL,
                  false, NULL),
         "");
+    const char *none[] = {write_las("none.las", &(struct las){.scale = 0.001, .red = 1, .count = 50, .uncounted = 50})};
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = none, .input_count = 1, .output = path_of("out.spld"), .threads = 1};
+    struct spl_error err = {0};
+    assert_int_equal(spl_pack(&options, NULL, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "none.las: no usable point (0 skipped as empty or not finite; "
+                                        "50 more than its header counts could lie there: mend the header's number)"));
 }
 
 enum { laz_points = 70000, laz_bright = 69000 }; /* more than are gathered at a time */
