@@ -7,13 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/log.h"
 #include "base/memory.h"
 #include "base/text.h"
 #include "cloud/crs.h"
 #include "cloud/e57_reader.h"
 #include "cloud/fields.h"
 #include "geom/quaternion.h"
+#include "geom/unit.h"
 
 _Static_assert(SPL_E57_ROLES - SPL_E57_CLASS == SPL_COLUMN_COUNT - SPL_COLUMN_CLASS, "roles follow the columns");
 
@@ -88,7 +88,7 @@ static int set_scan(struct spl_cloud *cloud, size_t index, struct spl_error *err
     scan->spherical = !cartesian && spl_e57_have3(from, SPL_E57_RANGE);
     if (from->points && !cartesian && !scan->spherical)
         return spl_e57_fail_scan(cloud, from, "prototype", err,
-                         "its points have neither cartesianX, Y, Z nor sphericalRange, Azimuth, Elevation");
+                                 "its points have neither cartesianX, Y, Z nor sphericalRange, Azimuth, Elevation");
     bool cells = from->field[SPL_E57_ROW] >= 0 && from->field[SPL_E57_COLUMN] >= 0;
     scan->misses =
         (cells || scan->spherical) && from->field[scan->spherical ? SPL_E57_SPHERICAL_STATE : SPL_E57_STATE] < 0;
@@ -146,11 +146,15 @@ static int read_coordinates(struct spl_cloud *cloud, struct spl_error *err)
             snprintf(crs->lost, sizeof crs->lost, "the WKT of its coordinate system cannot be read (%.90s)",
                      why.message);
         if (crs->angles || (crs->unit_m > 0 && crs->unit_m != 1)) {
-            spl_log_warn(
-                "%s: its coordinateMetadata names a system that is not in metres (%.63s), as E57 always is; it "
-                "is left out, --crs can say another",
-                cloud->source.path, crs->name);
+            char unit[SPL_UNIT_TEXT_MAX], said[80];
+            const char *in = crs->angles ? "degrees" : spl_unit_print(crs->unit_m, unit);
+            if (crs->epsg)
+                snprintf(said, sizeof said, "EPSG:%u", crs->epsg);
+            else
+                snprintf(said, sizeof said, "%s", crs->name);
             spl_crs_finish(crs);
+            snprintf(crs->lost, sizeof crs->lost,
+                     "its coordinate system (%s) is in %s, and E57 always in metres: it is left out", said, in);
         }
     }
     crs->unit_m = crs->height_unit_m = 1;
