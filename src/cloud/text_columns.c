@@ -162,14 +162,18 @@ static bool is_normal(const struct spl_text_sample *s, unsigned i, bool last)
     return !s->crooked[i] && (fraction || negative || (last && !s->zero[i]));
 }
 
-static bool is_color(const struct spl_text_sample *s, unsigned i)
+enum { ECHO_LINES = 20 }; /* that decide: fewer may be a dark colour */
+
+/* `behind`: another number stands before them, which may be an intensity before an echo and a class. */
+static bool is_color(const struct spl_text_sample *s, unsigned i, bool behind)
 {
     bool integers = true, unit = true;
     for (unsigned k = i; k < i + 3; k++) {
         integers &= !s->fraction[k] && !s->wide[k];
         unit &= !s->bright[k];
     }
-    bool echoes = !s->above[i + 1] && s->above[i]; /* behind an intensity */
+    bool echoes =
+        s->above[i] ? !s->above[i + 1] : behind && s->lines >= ECHO_LINES && s->apart[i] + s->apart[i + 1] > 0;
     return (integers || unit) && !echoes;
 }
 
@@ -199,7 +203,7 @@ static unsigned find_color(const struct spl_layout *layout, const struct spl_tex
     double apart = 0;
     for (unsigned k = layout->fields - layout->first < 7; k < sizeof order; k++) {
         unsigned at = layout->first + order[k];
-        if (!free3(layout, s, at) || !is_color(s, at))
+        if (!free3(layout, s, at) || !is_color(s, at, order[k] > 3))
             continue;
         double own = s->apart[at] + s->apart[at + 1];
         bool opacity = best == at + 1 && !s->clear[best + 2];
