@@ -376,6 +376,7 @@ static void rows_behind_the_last_are_counted(void **state)
         {"", "END\n1 2 3\n", 12, {1, 1}},
         {"element edge 0\nproperty int a\n", "1 2 3\n", 13, {1, 1}},
         {"element edge 2\nproperty int a\n", "1\n2\n1 2 3\n", 20, {0, 1}}, /* as text nobody looks there */
+        {"element edge 2\nproperty int a\n", "1\n2\n", 19, {0, 0}},
         {"element edge 9\nproperty int a\n", "1\n2\n", 20, {0, 0}},
         {"element edge 18446744073709551615\nproperty int a\n", "1\n2\n", 20, {0, 0}},
         {"element face 1\nproperty list uchar int a\n", "0\n1 2 3\n", 99, {0, 0}},

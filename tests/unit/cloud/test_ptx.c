@@ -61,7 +61,7 @@ static void cells_that_keep_to_no_rule(void **state)
         int first, second; /* grey, or red where a colour has a second one */
         bool blank;
     } all[] = {
-        {HEADER "1 2 3 0\n" HEADER "4 5 6 255\n" HEADER "7 8 9 51\n", 0, 255, false},
+        {HEADER "1 2 3 0\n" HEADER "4 5 6 51\n" HEADER "7 8 9 255\n", 0, 51, false},
         {HEADER "1 2 3 -2048\n" HEADER "4 5 6 2047\n", 0, 255, false},
         {HEADER "0 0 0 4000\n" HEADER "1 2 3 0.25\n" HEADER "4 5 6 1\n", 64, 255, false}, /* of no point */
         {HEADER "1 2 3 0.5\n" HEADER "4 5 6 1.5\n", 128, 255, false},                     /* a glint */
