@@ -39,16 +39,24 @@ static enum spl_marks_verdict fold(const struct spl_marks *clip, struct conditio
     return verdict;
 }
 
-/* What the condition says, given what each of its terms does. */
-static enum spl_marks_verdict decide(const struct spl_marks *clip, struct condition *c)
+/* Vertices of lines have no values: lists of attributes say nothing of them, not even by what they leave out. */
+static enum spl_marks_verdict pass_over(struct condition *c, uint32_t first, uint32_t end)
+{
+    for (uint32_t t = first; t < end; t++)
+        c->of[t] = SPL_VERDICT_NONE;
+    return SPL_VERDICT_NONE;
+}
+
+/* What the condition says, given what each of its terms does; of a chunk of `lines`, what its shapes do. */
+static enum spl_marks_verdict decide(const struct spl_marks *clip, struct condition *c, bool lines)
 {
     enum spl_marks_verdict whole = SPL_VERDICT_NONE;
     c->values = SPL_VERDICT_NONE;
     c->open_values = c->open_shapes = false;
     for (uint32_t t = c->first, end; t < c->end; t = end) {
         end = end_of(clip, t, true);
-        const enum spl_marks_verdict own = fold(clip, c, t, end);
         const bool value = clip->terms[t].stream >= 0;
+        const enum spl_marks_verdict own = value && lines ? pass_over(c, t, end) : fold(clip, c, t, end);
         whole = own > whole ? own : whole;
         c->values = value && own > c->values ? own : c->values;
         if (own == SPL_VERDICT_SOME)
@@ -89,6 +97,7 @@ void spl_clip_judge(const struct spl_marks *clip, const struct spl_marks_view *v
                     uint32_t index, const struct spl_view_box *box, struct spl_clip_chunk *out)
 {
     uint32_t tests[SPL_TEST_WORDS * SPL_TERMS_MAX];
+    const bool lines = spl_chunk_kind(&tables->chunks[index]) == SPL_CHUNK_LINES;
     struct condition c;
     out->dropped = false;
     out->of_lines = true;
@@ -101,7 +110,9 @@ void spl_clip_judge(const struct spl_marks *clip, const struct spl_marks_view *v
             values |= clip->terms[t].stream >= 0;
             shapes |= clip->terms[t].stream < 0;
         }
-        const enum spl_marks_verdict whole = decide(clip, &c);
+        if (lines && !shapes) /* it leaves all splats that they stand for, or they would not be drawn */
+            continue;
+        const enum spl_marks_verdict whole = decide(clip, &c, lines);
         /* Lines have no attributes: where these decide, whole or in part, splats are drawn instead of them. */
         if (values && (shapes ? c.values != SPL_VERDICT_NONE : whole != SPL_VERDICT_ALL))
             out->of_lines = false;
@@ -127,7 +138,7 @@ bool spl_clip_drops_box(const struct spl_marks *clip, const struct spl_marks_vie
         c.end = end_of(clip, c.first, false);
         for (uint32_t t = c.first; t < c.end; t++)
             c.of[t] = clip->terms[t].stream >= 0 ? SPL_VERDICT_SOME : spl_marks_judge_shape(clip, t, view, box, test);
-        if (decide(clip, &c) == SPL_VERDICT_NONE)
+        if (decide(clip, &c, false) == SPL_VERDICT_NONE)
             return true;
     }
     return false;

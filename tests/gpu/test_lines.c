@@ -95,6 +95,7 @@ static struct spl_dataset *one_line(int pieces, float width, int linear)
         all[i] = (struct make_splat){.position = {0.1 * i, 0, -0.5},
                                      .normal = {0, -1, 0},
                                      .radius = 0.05f,
+                                     .classification = 7,
                                      .linear = linear == 1 || linear > 1 + i};
     for (int i = 0; i <= pieces; i++)
         all[2 + i] = (struct make_splat){.position = {2.0 * i / pieces - 1, 0, 0.2 * i / pieces},
@@ -243,6 +244,56 @@ static void lines_stand_for_linear_splats(void **state)
             }
 }
 
+static uint64_t count_lines(const struct spl_dataset *dataset, enum spl_method method, const char *clip, size_t *covered)
+{
+    struct spl_view view = in_front(3, 200, 150);
+    struct spl_frame frame;
+    struct spl_error err = {0};
+    view.method = method;
+    *covered = 0;
+    if (spl_terms_parse(clip, "clip", &view.clip, &err) || spl_renderer_render(renderer, dataset, &view, &frame, &err))
+        fail_msg("%s: %s", clip, err.message);
+    const float *depth = frame.images[SPL_LAYER_DEPTH].pixels;
+    for (size_t i = 0; i < 200 * 150; i++)
+        *covered += !isnan(depth[i]);
+    const uint64_t lines = frame.stats.lines_drawn;
+    spl_frame_finish(&frame);
+    return lines;
+}
+
+/* Lines have no attributes of their own: they are there where attributes leave out none of their splats, whatever else
+ * the clip says, and cut by its shapes; else the splats are, those that it leaves. */
+static void lines_stay_where_attributes_leave_all_splats(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *clip;
+        bool lines;
+    } clips[] = {{"class:7", true},
+                 {"class:5-9 and uncertainty:*", true},
+                 {"!class:3", true},
+                 {"class:7 and z>-9", true},
+                 {"class:3 or z>-9", true},
+                 {"class:7 or z>9", false}, /* what lies below is there for its class alone: as splats */
+                 {"!class:3 and z>9", false},
+                 {"class:3", false},
+                 {"!class:7", false},
+                 {"class:3 or z>9", false}};
+    for (int m = 0; m < 3; m++) {
+        const enum spl_method method = m < 2 ? methods[m] : SPL_METHOD_FILL;
+        struct spl_dataset *dataset = one_line(4, 0.01f, 1);
+        for (size_t i = 0; i < sizeof clips / sizeof *clips; i++) {
+            size_t covered, whole;
+            const uint64_t all = count_lines(dataset, method, "z>-9", &whole);
+            const uint64_t lines = count_lines(dataset, method, clips[i].clip, &covered);
+            assert_true(all == 4 && whole > 100);
+            if (lines != (clips[i].lines ? all : 0) || (clips[i].lines && covered != whole))
+                fail_msg("%s: %d of %d lines, %zu of %zu pixels", clips[i].clip, (int)lines, (int)all, covered, whole);
+        }
+        done(dataset);
+    }
+}
+
 /* Pixels that show any of the two discs as soft spheres. */
 static double count_soft(const struct spl_dataset *dataset, enum spl_method method)
 {
@@ -343,6 +394,7 @@ int main(int argc, char **argv)
         frames_test(lines_are_as_wide_as_they_are_and_whole),
         frames_test(a_line_that_fills_the_image_is_whole),
         frames_test(lines_stand_for_linear_splats),
+        frames_test(lines_stay_where_attributes_leave_all_splats),
         frames_test(soft_wires_have_the_area_of_their_stretch),
         frames_test(tiles_leave_no_seams_in_lines),
         frames_test(the_widest_line_matches),
