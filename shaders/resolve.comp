@@ -14,6 +14,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common/samples.glsl"
 #include "common/octahedral.glsl"
+#include "shared_soft.h"
 
 layout(local_size_x = SPL_WORKGROUP) in;
 layout(constant_id = 0) const uint LAYER = SPL_RESOLVE_COLOR;

@@ -6,6 +6,7 @@
 #define SPL_SOFT_GLSL
 
 #include "common/frame.glsl"
+#include "shared_soft.h"
 
 /* What is narrower than a sample is drawn as wide as one, and hides as much of it as it did: opacity times area
  * stays. */

@@ -2,7 +2,7 @@
 #ifndef SPL_SOFT_STEP_GLSL
 #define SPL_SOFT_STEP_GLSL
 
-#include "shared.h"
+#include "shared_soft.h"
 
 layout(std430, binding = SPL_STORAGE_STEP) readonly buffer step_buffer { spl_soft_step step_in_memory; };
 

@@ -34,7 +34,6 @@ struct spl_gpu_limits {     /* 0 = cannot */
     uint64_t buffer_bytes;  /* largest buffer */
     uint64_t binding_bytes; /* largest range a storage binding or a texel buffer sees */
     uint32_t workgroups;    /* largest dispatch, in x */
-    uint32_t subgroup;      /* lanes */
     bool atomics_64;        /* 64 bit integer atomics on storage buffers */
     bool timestamps;
 };

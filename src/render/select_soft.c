@@ -6,6 +6,7 @@
 
 #include "dataset/chunk.h"
 #include "render/select_parts.h"
+#include "shared_soft.h"
 
 /* A face of a node cuts a plane where the plane's normal has less than this along the face's. */
 static const double across_below = 0.8;

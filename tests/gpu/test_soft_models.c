@@ -15,7 +15,7 @@
 #include "base/clock.h"
 #include "gpu/gpu.h"
 #include "render/soft/models.h"
-#include "shared.h"
+#include "shared_soft.h"
 #include "support/soft_rays.h"
 
 enum { width = 36, height = 28, columns = (width + SPL_SOFT_TILE - 1) / SPL_SOFT_TILE,

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "shared.h"
+#include "shared_soft.h"
 
 struct soft_item {
     float x, y, z, radius; /* view space; drawn no narrower than params->low_pass samples, and the thinner */

@@ -5,8 +5,8 @@
 
 #include "base/memory.h"
 
-/* Tokens of GL_NVX_gpu_memory_info, GL_ATI_meminfo and GL_KHR_shader_subgroup; memory is in KiB. */
-enum { DEDICATED_VIDMEM_NVX = 0x9047, VBO_FREE_MEMORY_ATI = 0x87FB, SUBGROUP_SIZE_KHR = 0x9532 };
+/* Tokens of GL_NVX_gpu_memory_info and GL_ATI_meminfo; memory is in KiB. */
+enum { DEDICATED_VIDMEM_NVX = 0x9047, VBO_FREE_MEMORY_ATI = 0x87FB };
 
 static void gl_close(struct spl_gpu *base)
 {
@@ -38,7 +38,7 @@ static void read_limits(struct gl_gpu *gpu)
     static const uint64_t buffer_bytes = UINT64_C(1) << 31;
     const struct gl_functions *gl = &gpu->gl;
     struct spl_gpu_limits *limits = &gpu->base.limits;
-    GLint values[4] = {0}, workgroups = 0, subgroup = 0, bits = 0, texels = 0;
+    GLint values[4] = {0}, workgroups = 0, bits = 0, texels = 0;
     GLint64 binding = 0;
     if (gpu->base.info.software)
         limits->memory_bytes = spl_gpu_host_memory();
@@ -54,13 +54,10 @@ static void read_limits(struct gl_gpu *gpu)
     gl->GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
     gl->GetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &workgroups);
     gl->GetQueryiv(GL_TIMESTAMP, GL_QUERY_COUNTER_BITS, &bits);
-    if (gl_has_extension(gl, "GL_KHR_shader_subgroup"))
-        gl->GetIntegerv(SUBGROUP_SIZE_KHR, &subgroup);
     limits->buffer_bytes = buffer_bytes;
     uint64_t texel_bytes = UINT64_C(4) * (uint32_t)texels;
     limits->binding_bytes = (uint64_t)binding < texel_bytes ? (uint64_t)binding : texel_bytes;
     limits->workgroups = (uint32_t)workgroups;
-    limits->subgroup = (uint32_t)subgroup;
     limits->timestamps = bits > 0;
 }
 

@@ -32,9 +32,7 @@ static void read_limits(struct vk_gpu *gpu, VkPhysicalDeviceProperties *properti
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
     VkPhysicalDeviceMaintenance3Properties maintenance3 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES, .pNext = &maintenance4};
-    VkPhysicalDeviceSubgroupProperties subgroup = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_PROPERTIES,
-                                                   .pNext = &maintenance3};
-    VkPhysicalDeviceProperties2 all = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, .pNext = &subgroup};
+    VkPhysicalDeviceProperties2 all = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, .pNext = &maintenance3};
     vkGetPhysicalDeviceProperties2(gpu->physical, &all);
     *properties = all.properties;
     vkGetPhysicalDeviceMemoryProperties(gpu->physical, &gpu->memory);
@@ -55,7 +53,6 @@ static void read_limits(struct vk_gpu *gpu, VkPhysicalDeviceProperties *properti
     limits->binding_bytes = min64(properties->limits.maxStorageBufferRange,
                                   UINT64_C(4) * properties->limits.maxTexelBufferElements);
     limits->workgroups = properties->limits.maxComputeWorkGroupCount[0];
-    limits->subgroup = subgroup.subgroupSize;
     limits->atomics_64 = atomics_64;
     limits->timestamps = bits > 0;
     gpu->timestamp_period_ns = properties->limits.timestampPeriod;

@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-#include "shared.h"
+#include "shared_soft.h"
 
 double spl_soft_depth(double opacity)
 {

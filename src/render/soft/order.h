@@ -16,7 +16,7 @@
 
 #include "gpu/gpu.h"
 #include "render/kernels.h"
-#include "shared.h"
+#include "shared_soft.h"
 
 enum { SPL_SOFT_STEP_STRIDE = 256, SPL_SOFT_STEPS = 256 };
 /* Where many invocations run: pairs a block, bits of a digit. */

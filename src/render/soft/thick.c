@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "base/float.h"
-#include "shared.h"
+#include "shared_soft.h"
 
 /* How far a sphere at such a depth may reach, with what kernels may be off. */
 static double slack(const struct spl_soft_thick *plan, double depth)

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "render/soft/models.h"
-#include "shared.h"
+#include "shared_soft.h"
 #include "support/soft_rays.h"
 #include "synth/random.h"
 
