@@ -81,6 +81,8 @@ static void test_what_is_said_of_a_box_holds_of_its_points(void **state)
     const struct spl_dataset_info info = {.id = "made"};
     struct spl_camera camera = {.eye = {997, -2, 1}, .width = 64, .height = 64, .fx = 50, .fy = 50, .cx = 32, .cy = 32};
     assert_int_equal(spl_camera_look_at(&camera, camera.eye, (double[3]){1000, 0.3, 0}, (double[3]){0, 0, 1}, NULL), 0);
+    struct spl_chunk discs = {.count = 1};
+    const struct spl_tables tables = {.chunks = &discs, .chunk_count = 1};
     size_t dropped = 0, kept = 0, open = 0, differ = 0;
     for (int round = 0; round < rounds; round++) {
         const struct spl_terms terms = random_terms();
@@ -98,7 +100,7 @@ static void test_what_is_said_of_a_box_holds_of_its_points(void **state)
         const uint32_t used = spl_marks_see(&clip, &camera, 0, &view, words);
         const double size = round % 3 ? 0.4 * uniform() : 2;
         struct spl_view_box box = {{around(1.5), around(1.5), 3 + around(1.5)}, {size, size * uniform(), size}};
-        spl_clip_judge(&clip, &view, NULL, 0, &box, &judged);
+        spl_clip_judge(&clip, &view, &tables, 0, &box, &judged);
         assert_int_equal(judged.by_value, 0);
         if (spl_clip_drops_box(&clip, &view, &box) != judged.dropped)
             fail_msg("round %d: a node is judged otherwise", round);
