@@ -131,7 +131,8 @@ static int go_on(struct spl_frame_steps *steps, uint64_t deadline_ns, struct spl
     } else if (why.code) {
         char late[sizeof why.message] = "";
         const uint32_t part = note_late_tiles(steps);
-        bool told = rc == SPL_E_TIMEOUT && spl_dataset_tell_late(steps->dataset, part, late, sizeof late);
+        const bool named = strstr(why.message, ": its tile ");
+        bool told = rc == SPL_E_TIMEOUT && !named && spl_dataset_tell_late(steps->dataset, part, late, sizeof late);
         spl_fail(err, rc, "%s%s%s", why.message, told ? ": " : "", late);
     }
     if (rc >= 0 && clock >= deadline_ns)

@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "service/exchange.h"
 #include "service/ops/counters.h"
+#include "service/sent_bytes.h"
 #include "service/state.h"
 
 enum { slow_sweep_ms = 500 };
@@ -64,6 +65,9 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
         return; // its requests are refused
     connection->service = service;
     connection->fd = info->connect_fd;
+    // a byte out of band would be counted, but not read; without any, what was read is what came, less what waits
+    setsockopt(connection->fd, SOL_SOCKET, SO_OOBINLINE, &(int){1}, sizeof(int));
+    connection->taken = spl_taken_bytes(connection->fd);
     spl_connection_enter(connection, PHASE_READING);
     LIST_INSERT_HEAD(&service->http->connections, connection, link);
     service->http->connections_open++;
@@ -92,6 +96,14 @@ static void cut(const struct connection *connection)
         shutdown(connection->fd, SHUT_RDWR);
 }
 
+/* What was read is done with, but behind a request that waits, or whose client is told first to go on. */
+static void note_taken(struct connection *connection)
+{
+    const struct request *request = connection->request;
+    const bool waits = request && (request->suspended || (request->started && !request->comes));
+    connection->taken = waits ? SPL_TAKEN_UNKNOWN : spl_taken_bytes(connection->fd);
+}
+
 /* Cuts connections whose phase lasts too long. */
 static void on_slow_timer(uv_timer_t *timer)
 {
@@ -100,6 +112,7 @@ static void on_slow_timer(uv_timer_t *timer)
     struct connection *connection;
     LIST_FOREACH(connection, &service->http->connections, link)
     {
+        note_taken(connection);
         bool hurry = service->draining && connection->phase == PHASE_READING;
         if (has_ended_early(connection))
             shutdown(connection->fd, SHUT_RDWR);

@@ -35,6 +35,7 @@ struct request {
     bool has_host;  /* of HTTP/1.1, which demands it */
     bool head;      /* the method is HEAD */
     bool closes;    /* the connection ends with the reply */
+    bool comes;     /* some of its body has come */
     bool prepared;  /* the reply has its last headers and is counted */
     bool abandoned; /* the client has left: close without a reply */
     bool suspended; /* libmicrohttpd does not go on with it */

@@ -20,6 +20,7 @@
 #include "service/exchange.h"
 #include "service/ops/ops.h"
 #include "service/reply.h"
+#include "service/sent_bytes.h"
 #include "service/state.h"
 
 enum { idle_s = 30 };
@@ -67,6 +68,7 @@ void spl_request_finish(struct request *request, enum MHD_RequestTerminationCode
     spl_assert(!request->waits);
     spl_change_abandon(request);
     request->connection->request = NULL;
+    request->connection->taken = SPL_TAKEN_UNKNOWN; // the next one may have been read with it
     spl_connection_enter(request->connection, PHASE_IDLE);
     request->service->http->requests_open--;
     if (request->response)
@@ -206,6 +208,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         return !spl_check_framing(request, method, version) || answer_headers(request) ? send_reply(request) : MHD_YES;
     }
     if (*length) {
+        request->comes = true;
         bool taken = take_body(request, data, *length);
         *length = 0;
         return taken ? MHD_YES : MHD_NO;
@@ -237,6 +240,7 @@ void spl_request_resume(struct request *request)
     if (!request->suspended)
         return;
     request->suspended = false;
+    request->connection->taken = SPL_TAKEN_UNKNOWN; // the same of the rest of its body
     MHD_resume_connection(request->handle);
 }
 

@@ -38,6 +38,8 @@ struct connection {
     enum phase phase;
     uint64_t since_ns;   /* when the phase began */
     uint64_t sent_bytes; /* at the end of the last request that was logged */
+    uint64_t taken;      /* bytes that libmicrohttpd had read of it when it was looked at last, and has done with since;
+                            SPL_TAKEN_UNKNOWN: it may have more to do with them */
     struct request *request; // may be NULL; the one that is under way
 };
 

@@ -3,14 +3,15 @@
  * (0.9.75 builds the reply twice). It says so in its log first, on the loop's thread, and there the request is answered
  * past it; what it sends behind that finds the socket shut.
  *
- * The log names no connection. One whose length is no number is known by it; else it is the only one that could be, or
- * nobody is answered here. Also how large a chunk claims to be, which libmicrohttpd keeps to itself. Owned by the
- * loop's thread. */
+ * The log names no connection. One whose length is no number is known by it; else it is the only one that could be, of
+ * those that something was read of in the last half second, or nobody is answered here. Also how large a chunk claims
+ * to be, which libmicrohttpd keeps to itself. Owned by the loop's thread. */
 #include <stdio.h>
 #include <string.h>
 
 #include "service/exchange.h"
 #include "service/http.h"
+#include "service/sent_bytes.h"
 #include "service/state.h"
 
 enum fault { FAULT_NONE, FAULT_NO_NUMBER, FAULT_TOO_LARGE };
@@ -58,6 +59,13 @@ static bool refuse_lengths(struct spl_service *service)
     return any;
 }
 
+/* Was nothing read of the connection since it was looked at last? Then it is not what libmicrohttpd has stumbled over:
+ * that comes with new bytes, or with those behind a request that has ended or waited. */
+static bool is_at_rest(const struct connection *connection)
+{
+    return connection->taken != SPL_TAKEN_UNKNOWN && connection->taken == spl_taken_bytes(connection->fd);
+}
+
 /* The only request that libmicrohttpd can mean; NULL: there are several, or one that is answered, or a first line that
  * nobody has seen yet. */
 static struct request *find_culprit(struct spl_service *service, bool chunk, unsigned status)
@@ -67,10 +75,14 @@ static struct request *find_culprit(struct spl_service *service, bool chunk, uns
     LIST_FOREACH(connection, &service->http->connections, link)
     {
         struct request *request = connection->request;
-        if (!request && !chunk && status == MHD_HTTP_BAD_REQUEST)
-            return NULL;
-        if (!request || request->prepared || request->suspended || (request->started ? !request->chunks : chunk))
+        const bool first_line = !request && !chunk && status == MHD_HTTP_BAD_REQUEST;
+        if (!first_line && (!request || request->prepared || request->suspended ||
+                            (request->started ? !request->chunks : chunk)))
             continue;
+        if (is_at_rest(connection))
+            continue;
+        if (first_line)
+            return NULL;
         if (found || request->abandoned)
             return NULL;
         found = request;

@@ -287,6 +287,48 @@ def test_a_faulty_request_ends_no_other():
                 assert half.reply()[0] == 200 and chunks.reply()[0] == 200
 
 
+def test_who_is_at_rest_is_not_meant():
+    """Clients that keep a connection, are amid their headers or amid a body in chunks, and send nothing just now."""
+    text = json.dumps(SMALL).encode()
+    head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    with with_tours() as d:
+        with Wire(d) as kept, Wire(d) as fresh, Wire(d) as half, Wire(d) as chunks, Wire(d) as waits:
+            kept.send("GET /v1/methods HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            assert kept.reply()[0] == 200
+            fresh.send("GE")
+            half.send(head)
+            chunks.send(head, "Transfer-Encoding: chunked\r\n\r\n", b"%x\r\n" % len(text), text[:5])
+            waits.send(head, f"Content-Length: {len(text)}\r\n\r\n", text[:5])
+            time.sleep(1.2)  # looked at every half a second
+            for _ in range(2):
+                for fault, coding in ((b"zz\r\n", "Transfer-Encoding: chunked"), (b"", "no name"), (b"2\r\n{}\r\n0\r\nno name\r\n\r\n", "Transfer-Encoding: chunked")):
+                    with Wire(d) as wire:
+                        wire.send(head, coding + "\r\n\r\n", fault)
+                        status, answer, told = wire.reply()
+                        assert status == 400, (coding, status, told)
+                        check_problem(Problem(status, answer, told), "POST")
+                        assert answer["connection"].lower() == "close" and wire.ended(), (coding, answer)
+            half.send(f"Content-Length: {len(text)}\r\n\r\n", text)
+            chunks.send(text[5:], b"\r\n0\r\n\r\n")
+            waits.send(text[5:])
+            fresh.send("T /v1/methods HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            assert [wire.reply()[0] for wire in (half, chunks, waits, fresh)] == [200] * 4
+
+
+def test_what_waits_behind_a_request_is_meant():
+    """It was read with the request before, so nothing comes of it when it is looked at; nobody else may be told for it."""
+    head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    text = json.dumps(SMALL).encode()
+    slow = f"GET {VIEW}?width=16&height=9&eye=3,0,1&target=0,0,0 HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    with Daemon(FAKE, FAKE_FRAME_MS=1500) as d, Wire(d) as behind, Wire(d) as half:
+        behind.send(slow, "GET /v1/methods HTTP/1.1\r\nHost: localhost\r\nno name\r\n\r\n")
+        time.sleep(1.2)
+        half.send(head)
+        assert behind.reply()[0] == 200 and behind.reply()[0] == 400 and behind.ended()
+        half.send(f"Content-Length: {len(text)}\r\n\r\n", text)
+        assert half.reply()[0] == 200
+
+
 def test_a_request_whose_rest_does_not_come_is_told_so():
     head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
     with with_tours() as d, contextlib.ExitStack() as stack:

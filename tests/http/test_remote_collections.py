@@ -427,7 +427,7 @@ def test_a_tile_that_drips_is_named():
     drips = File(DATA["tile-1"], always="drip")
     deadline_s = 6 + 20 * SANITIZED
     with Server(files(tile_1=drips)) as server:
-        with Daemon(REAL, "--watch", "0", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
+        with Daemon(REAL, "--watch", "0", "--remote-deadline", "120000", "--deadline", str(1000 * deadline_s), datasets=[server.url("city.spld")]) as d:
             opened(d)
             for where in (IN[1], ALL):
                 whole = view(d, where + "&wait=1")
