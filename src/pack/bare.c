@@ -75,6 +75,7 @@ int spl_bare_points(struct spl_points *points, struct spl_stage *stage, struct s
     spl_stage_begin(stage, "spacing", "points", points->count);
     spl_spill_free(points->spill, points->normal);
     points->normal = NULL;
+    spl_spill_free(points->spill, points->radius); /* what lines ask for */
     points->radius = spl_spill_alloc(points->spill, points->count, sizeof *points->radius, err);
     int rc = points->radius ? size_points(&b, stage->threads, err) : SPL_E_NOMEM;
     if (rc)

@@ -52,7 +52,8 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
     double finest = 0;
     spl_stage_begin(stage, "wires, poles and cables", NULL, levels_max);
     points->linear = spl_spill_alloc(points->spill, points->count, 1, err);
-    int rc = !points->linear     ? SPL_E_NOMEM
+    points->radius = spl_spill_alloc(points->spill, points->count, sizeof *points->radius, err);
+    int rc = !points->linear || !points->radius ? SPL_E_NOMEM
              : points->cells > 0 ? spl_cells_init_at(&l.cells, points, points->cells, stage->threads, err)
                                  : spl_cells_init(&l.cells, points, cell_points, stage->threads, err);
     for (unsigned k = 0; !rc && k < levels_max; k++) {
@@ -75,7 +76,9 @@ int spl_linear_find(struct spl_points *points, struct spl_stage *stage, struct s
     finish_level(&l);
     if (rc || !marked) {
         spl_spill_free(points->spill, points->linear);
+        spl_spill_free(points->spill, points->radius);
         points->linear = NULL;
+        points->radius = NULL;
     }
     spl_stage_finish(stage);
     return rc;

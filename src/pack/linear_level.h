@@ -17,6 +17,7 @@ struct spl_line {
     float across;              /* sigma, cells */
     float spacing;             /* of points along it, cells */
     uint8_t state, next_state; /* enum spl_line_state */
+    bool beside_surface;       /* a surface's line runs beside it: it may be that surface's last */
     uint32_t parent;           /* of a union-find forest; root: itself */
     double low[3], high[3];
 };

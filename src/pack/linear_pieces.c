@@ -11,11 +11,25 @@ static const double straight = 0.97; /* cosine between those, and of each with t
 
 enum { look, clear, mark };
 
+/* Of a line's points. What is around them may be another line, whose distance says nothing of their size: a disc
+ * reaches over the next point on this one, or is as wide as a thing that has points side by side. */
+static float most_radius(const struct spl_linear_level *l, const struct spl_line *line)
+{
+    return line->beside_surface ? INFINITY : (float)l->cells.edge * fmaxf(line->spacing, 2 * line->across);
+}
+
+static void take_point(const struct spl_points *p, size_t i, bool marked, float radius)
+{
+    p->linear[i] = marked;
+    p->radius[i] = !marked ? 0 : p->radius[i] > 0 ? fminf(p->radius[i], radius) : radius;
+}
+
 /* Looks for, clears or marks the points of `cell` on the axis of `line`, whose own cell lies at `at`. */
 static bool take_points(const struct spl_points *p, const struct spl_linear_level *l, const struct spl_line *line,
                         const int64_t at[3], uint32_t cell, int what)
 {
     double origin[3], inverse = 1 / l->cells.edge, limit = fmax(3 * line->across, 0.15);
+    const float radius = most_radius(l, line);
     bool any = false;
     for (int c = 0; c < 3; c++)
         origin[c] = p->cube_min[c] + ((double)at[c] + 0.5 + line->middle[c]) * l->cells.edge;
@@ -31,7 +45,7 @@ static bool take_points(const struct spl_points *p, const struct spl_linear_leve
         any = true;
         if (what == look)
             break;
-        p->linear[i] = what == mark;
+        take_point(p, i, what == mark, radius);
     }
     return any;
 }
@@ -183,6 +197,7 @@ uint64_t spl_linear_mark(struct spl_points *p, struct spl_linear_level *l)
             int steps = 0;
             if (continuation(l, line, at, side, &axis, &steps) == UINT32_MAX)
                 continue;
+            axis.spacing = INFINITY; /* of what a gap holds */
             for (int n = 1; n < steps; n++) {
                 uint32_t cell = along(l, &axis, at, n);
                 if (cell != UINT32_MAX && !l->is_line[cell])

@@ -113,6 +113,7 @@ static void check_sides(void *context, size_t begin, size_t end, unsigned worker
         }
         if (l->border && sides.found && 2 * sides.surface > sides.found)
             line->next_state = SPL_LINE_BORDER;
+        line->beside_surface = sides.surface;
     }
 }
 

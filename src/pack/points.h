@@ -41,7 +41,8 @@ struct spl_points {
     uint16_t *station;           /* index into stations or SPL_NO_STATION; NULL when no input has any */
     float (*normal)[3];          /* given ones (0,0,0 = none); NULL when no input has any; spl_surface() fills it */
     uint8_t *linear;             /* 1 on a wire, a pole or a cable; made by spl_linear_find(); may be NULL: none is */
-    float *radius, *uncertainty; /* made by spl_surface() or spl_bare_points() */
+    float *radius, *uncertainty; /* made by spl_surface() or spl_bare_points(); between spl_linear_find() and these,
+                                    `radius` is the most that a linear point's line asks for; 0: it does not say */
     struct spl_scalar_values scalar[SPL_POINT_SCALARS]; /* settled by spl_points_gather() */
     const struct spl_keep *keep;                        /* what they are called; borrowed */
     struct spl_point_clip *clip; /* made by spl_surface(); NULL = none */

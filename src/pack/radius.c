@@ -3,7 +3,8 @@
  * The radius is eq. 20 with the square that its unit asks for, r = 2 sqrt(max |pi - pj|^2 / K): right amid a surface.
  * Elsewhere it would make blobs or leave gaps, so the neighbours' spread (sigma_0 <= sigma_1 <= sigma_2, from the
  * normal's PCA) changes it:
- * - along a line (a wire) the share of a point is a length: the disc reaches over the next point;
+ * - along a line (a wire) the share of a point is a length: the disc reaches over the next point. Neighbours of two
+ * wires beside each other look like a surface's: the search for lines sees farther, and bounds it (linear_pieces.c);
  * - in a volume (foliage) a disc does not stand for the surface between its neighbours, most of which are on other
  * leaves: it takes what its nearest ones say, as spread grows round. A noisy surface looks like a volume too: the
  * neighbours' neighbours tell, as noise fades in a wider view, and give the normal where they show a surface;

@@ -31,7 +31,9 @@ static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, 
 {
     double least[3], round, side = 1;
     double radius = spl_radius_estimate(vicinity, i, own, around, *limit, near, least, &round, edge);
-    p->radius[i] = fmaxf((float)radius, smallest_radius);
+    /* as its line asks for; of others nothing is read: pages that are written first are large ones */
+    float most = p->linear && p->linear[i] && p->radius[i] > 0 ? p->radius[i] : INFINITY;
+    p->radius[i] = fmaxf(fminf((float)radius, most), smallest_radius);
     *limit = flat_limit + (float)round * (round_limit - flat_limit);
 
     float *normal = p->normal[i];
@@ -151,7 +153,8 @@ static float find_usual_reach(const struct spl_points *p, const struct spl_neigh
 static int allocate(struct spl_surfaces *s, struct spl_error *err)
 {
     struct spl_points *p = s->points;
-    p->radius = spl_spill_alloc_raw(p->spill, p->count, sizeof *p->radius, err);
+    if (!p->radius)
+        p->radius = spl_spill_alloc(p->spill, p->count, sizeof *p->radius, err);
     p->uncertainty = spl_spill_alloc_raw(p->spill, p->count, sizeof *p->uncertainty, err);
     if (!p->normal)
         p->normal = spl_spill_alloc(p->spill, p->count + SPL_POINTS_PAD, sizeof *p->normal, err);

@@ -42,7 +42,7 @@ static void compare(const struct spl_points *p, const struct spl_scene *scene)
         double at[3], best = tolerance;
         uint32_t object = UINT32_MAX;
         for (int c = 0; c < 3; c++)
-            at[c] = p->axis[c][i] - scene->offset[c];
+            at[c] = spl_points_at(p, c, i) - scene->offset[c];
         for (size_t k = 0; k < scene->primitive_count; k++) {
             if (scene->primitives[k].kind != SPL_PRIMITIVE_CONE)
                 continue;
@@ -154,7 +154,7 @@ static void write_ply(const struct spl_points *p, const char *path)
         if (p->linear && p->linear[i])
             memcpy(rgb, (uint8_t[]){255, 0, 0}, 3);
         for (int c = 0; c < 3; c++)
-            fwrite(&p->axis[c][i], sizeof(double), 1, file);
+            fwrite(&(double){spl_points_at(p, c, i)}, sizeof(double), 1, file);
         fwrite(rgb, 1, 3, file);
     }
     fclose(file);
