@@ -63,7 +63,8 @@ static inline void spl_merge_options_init(struct spl_merge_options *options)
 /* Writes `options->output` (temporary file, sync, rename), one dataset of what a collection and all of its tiles hold,
  * which needs neither of them any more: its splats are theirs bit for bit, at every level. What is written depends on
  * these files alone. Blocks; takes about 72 bytes of memory a chunk (of up to 128 splats) and three pages, and as much
- * room on disk as the tiles. SPL_E_USAGE of options; SPL_E_INPUT of a dataset that is no collection; of a tile that is
+ * room on disk as the tiles. Nothing is written where the file could not be opened. SPL_E_USAGE of options, of an
+ * output that is read; SPL_E_INPUT of a dataset that is no collection; of a tile that is
  * missing, another one or damaged what opening and reading says, with its name. Any thread. */
 SPL_API int spl_merge(const struct spl_merge_options *options, struct spl_error *err);
 

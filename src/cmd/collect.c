@@ -84,10 +84,15 @@ int spl_cmd_print_collection(const char *output, struct spl_error *err)
 
 int spl_cmd_print_merged(const char *output, struct spl_error *err)
 {
+    struct spl_dataset_source source;
     struct spl_dataset *dataset;
-    int rc = spl_dataset_open(output, false, &dataset, err);
+    int rc = spl_dataset_source_open_file(output, &source, err);
     if (rc)
         return rc;
+    if ((rc = spl_dataset_open_source(&source, "merged", false, NULL, &dataset, err))) { /* any name may be its file's */
+        spl_dataset_source_close(&source);
+        return rc;
+    }
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     spl_cmd_put_text(stderr, output, 0);
     fprintf(stderr, ": %llu points in one file, version %016llx, %.2f MB\n", (unsigned long long)info->points,

@@ -60,12 +60,13 @@ int spl_cmd_pack(int argc, char **argv)
         return rc ? spl_cmd_fail(&err) : 0;
     }
     warn_of_name(a.pack.output);
-    clean_up_on_signals(a.pack.output);
     if (a.parts) {
+        spl_cmd_pack_clean_up_on_signals(a.pack.output);
         rc = spl_cmd_pack_run_parts(&a, &listener, &err);
         spl_cmd_pack_finish_left_out(&listener, !rc);
         return rc ? spl_cmd_fail(&err) : 0;
     }
+    clean_up_on_signals(a.pack.output);
     rc = spl_pack(&a.pack, &report, &err);
     spl_cmd_progress_finish(&listener.progress);
     if (!rc)

@@ -134,12 +134,17 @@ static int plan(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
     return SPL_OK;
 }
 
-static void clean_up_on_signals(const char *output)
+void spl_cmd_pack_clean_up_on_signals(const char *output)
 {
-    char path[4096];
-    int length = snprintf(path, sizeof path, "%s.part-%ld", output, (long)getpid());
-    if (length >= 0 && (size_t)length < sizeof path)
-        spl_cmd_remove_unfinished(path);
+    const long pid = (long)getpid();
+    for (int i = 0; i < 3; i++) {
+        char path[4096];
+        int length = i == 0   ? snprintf(path, sizeof path, "%s.part-%ld", output, pid)
+                     : i == 1 ? snprintf(path, sizeof path, "%s.part-%ld-tiles", output, pid)
+                              : snprintf(path, sizeof path, "%s.part-%ld-tiles.part-%ld", output, pid, pid);
+        if (length >= 0 && (size_t)length < sizeof path)
+            spl_cmd_remove_unfinished(path);
+    }
 }
 
 static int pack_part(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, struct spl_error *err)
@@ -153,7 +158,7 @@ static int pack_part(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener 
         return rc;
     char *path = spl_job_part_path(&job, number, false);
     if (path)
-        clean_up_on_signals(path);
+        spl_cmd_pack_clean_up_on_signals(path);
     rc = path ? spl_job_pack(&job, number, &a->pack, &report, &outcome, err)
               : spl_fail(err, SPL_E_NOMEM, "out of memory for the names of parts");
     spl_cmd_progress_finish(&listener->progress);
@@ -171,32 +176,18 @@ static int pack_part(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener 
     return rc;
 }
 
-int spl_cmd_pack_join(const struct spl_cmd_pack *a, const struct spl_job *job, const char *output,
-                      struct spl_error *err)
+struct spl_collect_options spl_cmd_pack_joined(const struct spl_cmd_pack *a, const char *output)
 {
-    const struct spl_collect_options options = {.size = sizeof options,
-                                                .output = output,
-                                                .title = a->pack.title,
-                                                .description = a->pack.description,
-                                                .default_view = a->pack.default_view,
-                                                .views = a->pack.views,
-                                                .view_count = a->pack.view_count,
-                                                .threads = a->pack.threads,
-                                                .progress = a->pack.progress,
-                                                .progress_context = a->pack.progress_context};
-    return spl_job_join(job, &options, err);
-}
-
-int spl_cmd_pack_merge(const struct spl_cmd_pack *a, const struct spl_job *job, const char *collection,
-                       struct spl_error *err)
-{
-    const struct spl_merge_options options = {.size = sizeof options,
-                                              .collection = collection,
-                                              .output = a->pack.output,
-                                              .threads = a->pack.threads,
-                                              .progress = a->pack.progress,
-                                              .progress_context = a->pack.progress_context};
-    return spl_job_merge(job, &options, err);
+    return (struct spl_collect_options){.size = sizeof(struct spl_collect_options),
+                                        .output = output,
+                                        .title = a->pack.title,
+                                        .description = a->pack.description,
+                                        .default_view = a->pack.default_view,
+                                        .views = a->pack.views,
+                                        .view_count = a->pack.view_count,
+                                        .threads = a->pack.threads,
+                                        .progress = a->pack.progress,
+                                        .progress_context = a->pack.progress_context};
 }
 
 static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, struct spl_error *err)
@@ -208,20 +199,16 @@ static int join(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
         rc = spl_job_read(&job, a->pack.inputs[0], err);
     if (rc)
         return rc;
-    if ((a->merge || !a->pack.output) && asprintf(&all, "%s/all.spld", job.folder) < 0)
+    if (!a->pack.output && asprintf(&all, "%s/all.spld", job.folder) < 0)
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of the dataset");
-    const char *collection = all ? all : a->pack.output;
+    const struct spl_collect_options options = spl_cmd_pack_joined(a, all ? all : a->pack.output);
     if (!rc) {
-        clean_up_on_signals(collection);
-        if (a->merge)
-            clean_up_on_signals(a->pack.output);
-        rc = spl_cmd_pack_join(a, &job, collection, err);
+        spl_cmd_pack_clean_up_on_signals(options.output);
+        rc = a->merge ? spl_job_merge(&job, &options, err) : spl_job_join(&job, &options, err);
     }
-    if (!rc && a->merge)
-        rc = spl_cmd_pack_merge(a, &job, collection, err);
     spl_cmd_progress_finish(&listener->progress);
     if (!rc)
-        rc = a->merge ? spl_cmd_print_merged(a->pack.output, err) : spl_cmd_print_collection(collection, err);
+        rc = a->merge ? spl_cmd_print_merged(options.output, err) : spl_cmd_print_collection(options.output, err);
     free(all);
     spl_job_finish(&job);
     return rc;

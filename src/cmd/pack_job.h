@@ -11,13 +11,12 @@ bool spl_cmd_pack_is_job(const struct spl_cmd_pack *arguments);
 int spl_cmd_pack_check_job(const struct spl_cmd_pack *arguments, char *const *words, int word_count, int operands,
                            struct spl_error *err);
 
-struct spl_job;
+/* Has temporary files removed where a signal ends the command: the output's own, and the collection's that it is merged
+ * from. */
+void spl_cmd_pack_clean_up_on_signals(const char *output);
 
-/* Makes the collection `output` of the job's parts, and one file of that, a->pack.output. */
-int spl_cmd_pack_join(const struct spl_cmd_pack *arguments, const struct spl_job *job, const char *output,
-                      struct spl_error *err);
-int spl_cmd_pack_merge(const struct spl_cmd_pack *arguments, const struct spl_job *job, const char *collection,
-                       struct spl_error *err);
+/* What the options say of the dataset that parts become. */
+struct spl_collect_options spl_cmd_pack_joined(const struct spl_cmd_pack *arguments, const char *output);
 
 /* --parts: plans, packs each part that is not there, joins and merges them. */
 int spl_cmd_pack_run_parts(struct spl_cmd_pack *arguments, struct spl_cmd_pack_listener *listener,

@@ -208,6 +208,11 @@ void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const str
     writer->stream_count = count;
 }
 
+void spl_dataset_writer_check_what_is_written(struct spl_dataset_writer *writer)
+{
+    writer->checked = true;
+}
+
 void spl_dataset_writer_destroy(struct spl_dataset_writer *writer)
 {
     if (!writer)

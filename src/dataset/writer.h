@@ -62,6 +62,10 @@ int spl_dataset_writer_add_map(struct spl_dataset_writer *writer, const uint32_t
 void spl_dataset_writer_set_streams(struct spl_dataset_writer *writer, const struct spl_stream *streams,
                                     uint32_t count);
 
+/* Before the file takes the target's place it is opened: SPL_E_CORRUPT, and the target stays, where it is none that
+ * can be. For what is made of files that others have made. */
+void spl_dataset_writer_check_what_is_written(struct spl_dataset_writer *writer);
+
 /* Writes `meta` (borrowed; "streams" follow from set_streams, "counts" from what is written), directory, heads, the
  * table and the header, syncs file and folder, renames over the target. Nodes come in the order in which they were
  * added, with the page that add_node gave them, breadth first: the children of each follow those of the one before it,

@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "dataset/atoms.h"
 #include "dataset/counts.h"
+#include "dataset/dataset.h"
 #include "dataset/head.h"
 #include "dataset/values.h"
 #include "dataset/writer_parts.h"
@@ -154,6 +155,22 @@ static int write_rest(struct spl_dataset_writer *writer, const struct described 
     return rc ? rc : spl_part_file_write(&writer->file, 0, &header, sizeof header, err);
 }
 
+static int check(const struct spl_dataset_writer *writer, struct spl_error *err)
+{
+    struct spl_dataset_source source;
+    struct spl_dataset *dataset = NULL;
+    struct spl_error why = {0};
+    int rc = spl_dataset_source_open_file(writer->file.part_path, &source, err);
+    if (rc)
+        return rc;
+    if ((rc = spl_dataset_open_source(&source, "it", false, NULL, &dataset, &why)))
+        spl_dataset_source_close(&source);
+    spl_dataset_close(dataset);
+    return rc ? spl_fail_field(err, rc, why.field, "%s is not written, as what it is made of does not fit: %s",
+                               writer->file.path, why.message)
+              : SPL_OK;
+}
+
 static int finish(struct spl_dataset_writer *writer, const struct described *what, const json_t *meta,
                   struct spl_error *err)
 {
@@ -172,6 +189,8 @@ static int finish(struct spl_dataset_writer *writer, const struct described *wha
                  ? spl_fail(err, SPL_E_LIMIT, "what describes the dataset has %zu bytes, a file takes %u", strlen(text),
                             SPL_META_BYTES_MAX)
                  : write_rest(writer, what, text, err);
+    if (!rc && writer->checked)
+        rc = check(writer, err);
     if (!rc)
         rc = spl_part_file_commit(&writer->file, err);
     free(text);

@@ -30,6 +30,7 @@ struct spl_dataset_writer {
     struct spl_section *sections;
     size_t section_count, section_capacity;
     uint32_t page_count;
+    bool checked;      /* it is opened before it is committed */
     unsigned threads;  /* that sums are taken in, at least 1 */
     size_t page_limit; /* bytes that a page is to have at most; one with a larger node has more */
 };

@@ -147,6 +147,33 @@ def check_headers(survey, top):
     assert {s["name"] for s in whole["streams"]} <= {s["name"] for s in joined["streams"]}, joined["streams"]
 
 
+def check_leftovers(survey, command, whole, parts):
+    """Of another number of parts nothing stays; what is a user's does; two at once are told; scans written meanwhile are read."""
+    first = whole.read_bytes()
+    others = [*command[:3], "2", *command[4:]]
+    parts.mkdir()
+    for name in "part-3.spld", "part-7.empty", f"part-3.spld.part-{2**22 + 1}", f".job.json.{2**22 + 1}-0":
+        (parts / name).write_text("of a plan before")
+    (parts / "job.json").write_text("{}")
+    assert subprocess.run(others, stderr=subprocess.DEVNULL).returncode == 0 and not parts.exists(), list(parts.iterdir())
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as running:
+        for line in running.stderr:
+            if line.startswith("part 2 of"):
+                break
+        running.send_signal(signal.SIGSTOP)
+        second = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+        assert second.returncode == 2 and "another splatd packs these parts" in second.stderr, second.stderr
+        running.kill()
+    (parts / "notes.txt").write_text("mine")
+    time.sleep(0.01)
+    (survey.scans / "scan 0.ply").touch()
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 0 and "it is packed anew" in done.stderr and "it is left" in done.stderr, done.stderr
+    assert sorted(p.name for p in parts.iterdir()) == ["job.json", "notes.txt"] and whole.read_bytes() == first
+    (parts / "notes.txt").unlink()
+    assert subprocess.run(command, stderr=subprocess.DEVNULL).returncode == 0 and not parts.exists()
+
+
 def check_one_file(survey, top):
     """Parts merged, from any folder, and the same file by one process, which is killed in each of its parts and goes on."""
     merged, whole, parts = top / "merged.spld", top / "whole.spld", top / "whole.spld.parts"
@@ -173,15 +200,26 @@ def check_one_file(survey, top):
                                        stdout=subprocess.PIPE).stdout)
     for field in "points", "leaf_splats", "bounds", "unit", "levels":
         assert info[field] == joined[field], (field, info[field], joined[field])
+    assert sorted(p.name for p in survey.truth.iterdir()) == sorted(
+        [f"part-{part}.spld" for part in range(PARTS)] + ["all.spld", "job.json"])  # merging writes nothing there
+    check_leftovers(survey, command, whole, parts)
+    shutil.copy(survey.scans / "scan 0.ply", top / "copy.spld")
+    (top / "folder.spld").mkdir()
+    assert survey.run("--plan", 2, top / "copy.spld", "-o", top / "of copy").returncode == 0
+    assert survey.run("--part", 0, top / "of copy").returncode == survey.run("--part", 1, top / "of copy").returncode == 0
     for words, says in ((("--merge", survey.scans, "-o", whole), "--merge is of parts that are joined"),
                         (("--join", survey.truth, "--merge"), "--merge needs a dataset to write"),
                         (("--join", survey.truth, "--merge", "-o", survey.truth / "part-0.spld"), "is a tile of"),
+                        (("--parts", 3, top / "copy.spld", "-o", top / "copy.spld"), "is an input too"),
+                        (("--join", top / "of copy", "--merge", "-o", top / "copy.spld"), "is an input too"),
+                        (("--parts", 3, survey.scans, "-o", top / "folder.spld"), "exists and is no file"),
                         (("--parts", 3, "--part", 1, survey.truth), "name one way"),
                         (("--parts", 3, "--prune", 9, survey.scans, "-o", merged), "cannot be split into parts"),
                         (("--parts", 3, survey.scans, "-o", survey.truth), "writes a dataset")):
         said = survey.run(*words)
         assert said.returncode == 2 and says in said.stdout, (words, said.stdout)
-    assert not (top / "merged.spld.parts").exists()
+    for name in "merged", "copy", "folder":
+        assert not (top / f"{name}.spld.parts").exists(), name
 
 
 def check_refusals(survey):

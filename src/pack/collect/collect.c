@@ -150,7 +150,7 @@ static void finish(struct spl_collect *c)
     spl_wires_finish(&c->wires);
 }
 
-static int collect(const struct spl_collect_options *options, struct spl_error *err)
+static int collect(const struct spl_collect_options *options, bool apart, struct spl_error *err)
 {
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
@@ -164,7 +164,7 @@ static int collect(const struct spl_collect_options *options, struct spl_error *
                                           .default_view = options->default_view,
                                           .views = options->views,
                                           .view_count = options->view_count};
-    struct spl_collect c = {.options = options, .stage = &stage};
+    struct spl_collect c = {.options = options, .apart = apart, .stage = &stage};
     struct spl_dataset_writer *writer = NULL;
     struct spl_emitted emitted = {0};
     struct spl_tree tree = {0};
@@ -197,5 +197,10 @@ int spl_collect(const struct spl_collect_options *options, struct spl_error *err
 {
     struct spl_collect_options known = {0};
     int rc = spl_sized_read(options, &known, sizeof known, "spl_collect_options", err);
-    return rc ? rc : collect(&known, err);
+    return rc ? rc : collect(&known, false, err);
+}
+
+int spl_collect_apart(const struct spl_collect_options *options, struct spl_error *err)
+{
+    return collect(options, true, err);
 }

@@ -38,6 +38,7 @@ enum { SPL_COLLECT_JOB_MAX = 32 };
 
 struct spl_collect {
     const struct spl_collect_options *options;
+    bool apart; /* it is written elsewhere, for spl_merge_of(): tiles lie in one folder, which need not be the output's */
     struct spl_stage *stage;
     struct spl_collect_tile *tiles; /* by name; by place once they are grouped */
     size_t count, capacity;
@@ -59,6 +60,9 @@ struct spl_collect {
     struct spl_points points;
     struct spl_wires wires;
 };
+
+/* spl_collect() of a file that lies apart from its tiles, and is known where these are. */
+int spl_collect_apart(const struct spl_collect_options *options, struct spl_error *err);
 
 /* Fills the tiles' names from the options, sorted by name, none twice, all in the output's folder (find.c). */
 int spl_collect_find(struct spl_collect *c, struct spl_error *err);

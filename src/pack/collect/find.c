@@ -168,7 +168,7 @@ int spl_collect_find(struct spl_collect *c, struct spl_error *err)
         return spl_fail_field(err, SPL_E_USAGE, "output", "name the dataset to write, such as city.spld");
     if (!stat(o->output, &status) && !S_ISREG(status.st_mode))
         return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s exists and is no file", o->output);
-    rc = find_folder(o->output, &folder, err);
+    rc = find_folder(c->apart ? o->inputs[0] : o->output, &folder, err);
     for (size_t i = 0; !rc && i < o->input_count; i++)
         rc = !*o->inputs[i]          ? spl_fail_field(err, SPL_E_USAGE, "inputs", "a tile's name is empty")
              : o->inputs[i][0] == '@' ? add_list(c, o->inputs[i] + 1, err)

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/file.h"
 #include "base/memory.h"
@@ -150,7 +151,7 @@ static int allocate(struct merge *m, struct spl_error *err)
 }
 
 /* META of the collection, in which the tiles' leaves are the file's own; NULL: no memory. */
-static json_t *describe(const struct merge *m, const json_t *sources)
+static json_t *describe(const struct merge *m, const struct spl_merge_of *of)
 {
     static const char *const of_tiles[] = {"tiles", "tile_values", "bits"};
     json_t *meta = json_copy((json_t *)spl_dataset_get_meta(m->from));
@@ -162,29 +163,44 @@ static json_t *describe(const struct merge *m, const json_t *sources)
         !json_object_set_new(meta, "leaf_splats", json_integer((json_int_t)m->info->leaf_splats)) &&
         !json_object_set_new(meta, "levels", json_integer(m->info->levels)) &&
         !json_object_set_new(meta, "splat_radius", json_real(m->info->splat_radius)) &&
-        (!sources || !json_object_set(meta, "sources", (json_t *)sources)))
+        !json_object_set_new(meta, "merged", json_integer(m->info->tiles)) &&
+        (!of->sources || !json_object_set(meta, "sources", (json_t *)of->sources)) &&
+        (!of->skipped || !json_object_set(meta, "skipped", (json_t *)of->skipped)))
         return meta;
     json_decref(meta);
     return NULL;
 }
 
-/* A tile would be gone once the output has taken its place; the collection itself may be replaced. */
-static int check_output(const struct spl_merge_options *o, const struct spl_dataset *from, struct spl_error *err)
+static bool is_same_file(const char *path, const struct stat *other)
 {
-    const int folder = (int)(spl_input_name(o->collection) - o->collection);
+    struct stat status;
+    return !stat(path, &status) && status.st_dev == other->st_dev && status.st_ino == other->st_ino;
+}
+
+/* What is read would be gone once the output has taken its place. */
+static int check_output(const struct spl_merge_options *o, const char *beside, const struct spl_dataset *from,
+                        struct spl_error *err)
+{
+    const int folder = (int)(spl_input_name(beside) - beside);
     const json_t *tiles = json_object_get(spl_dataset_get_meta(from), "tiles"), *tile;
-    struct stat output, status;
+    struct stat output;
     size_t i;
-    if (spl_dataset_is_remote(from) || stat(o->output, &output))
+    if (stat(o->output, &output))
         return SPL_OK;
     if (!S_ISREG(output.st_mode))
         return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s exists and is no file", o->output);
+    if (spl_dataset_is_remote(from))
+        return SPL_OK;
+    bool same = is_same_file(o->collection, &output);
+    if (same)
+        return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s is the collection, which is read: choose another name",
+                              o->output);
     json_array_foreach(tiles, i, tile)
     {
         char *path = NULL;
-        if (asprintf(&path, "%.*s%s", folder, o->collection, json_string_value(json_object_get(tile, "file"))) < 0)
+        if (asprintf(&path, "%.*s%s", folder, beside, json_string_value(json_object_get(tile, "file"))) < 0)
             return spl_fail(err, SPL_E_NOMEM, "out of memory for the names of tiles");
-        const bool same = !stat(path, &status) && status.st_dev == output.st_dev && status.st_ino == output.st_ino;
+        same = is_same_file(path, &output);
         free(path);
         if (same)
             return spl_fail_field(err, SPL_E_USAGE, "output",
@@ -200,21 +216,22 @@ static int check_room(const struct merge *m, const char *output, struct spl_erro
     return bytes <= free_bytes
                ? SPL_OK
                : spl_fail_field(err, SPL_E_IO, "output",
-                                "%.300s will have %.1f GB, and %.1f GB are free there: make room, or write it to "
+                                "%.300s will have %.1f MB, and %.1f MB are free there: make room, or write it to "
                                 "another disk",
-                                output, (double)bytes / 1e9, (double)free_bytes / 1e9);
+                                output, (double)bytes / 1e6, (double)free_bytes / 1e6);
 }
 
-static int merge(struct merge *m, const struct spl_merge_options *o, const json_t *sources, struct spl_stage *stage,
-                 struct spl_error *err)
+static int merge(struct merge *m, const struct spl_merge_options *o, const struct spl_merge_of *of,
+                 struct spl_stage *stage, struct spl_error *err)
 {
     int rc = spl_dataset_writer_create(o->output, &m->writer, err);
     if (rc)
         return rc;
     spl_dataset_writer_set_threads(m->writer, stage->threads);
+    spl_dataset_writer_check_what_is_written(m->writer);
     if ((rc = allocate(m, err)) || (rc = write_nodes(m, stage, err)))
         return rc;
-    json_t *meta = describe(m, sources);
+    json_t *meta = describe(m, of);
     if (!meta)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the description of %.300s", o->output);
     spl_stage_begin(stage, "writing", NULL, 0);
@@ -239,13 +256,27 @@ static void finish(struct merge *m)
     }
 }
 
-int spl_merge_of(const struct spl_merge_options *options, const json_t *sources, struct spl_error *err)
+static int open_collection(const struct spl_merge_options *o, const struct spl_merge_of *of,
+                           struct spl_dataset_opening *how, struct spl_dataset **out, struct spl_error *err)
+{
+    struct spl_dataset_source source;
+    if (!of->beside)
+        return spl_dataset_open_as(o->collection, how, out, err);
+    how->beside = of->beside;
+    int rc = spl_dataset_source_open_file(o->collection, &source, err);
+    if (!rc && (rc = spl_dataset_open_source_as(&source, "parts", how, out, err)))
+        spl_dataset_source_close(&source);
+    unlink(o->collection); /* what is open of it stays until it is closed */
+    return rc;
+}
+
+int spl_merge_of(const struct spl_merge_options *options, const struct spl_merge_of *of, struct spl_error *err)
 {
     struct spl_stage stage = {.callback = options->progress,
                               .context = options->progress_context,
                               .threads = spl_thread_count(options->threads),
                               .cancelled = spl_cancel_get_flag(options->cancel)};
-    const struct spl_dataset_opening how = {.verify = true, .tables_bytes = 1, .cancelled = stage.cancelled};
+    struct spl_dataset_opening how = {.verify = true, .tables_bytes = 1, .cancelled = stage.cancelled};
     struct spl_dataset *from = NULL;
     struct merge m = {.page = UINT32_MAX};
     struct spl_error why = {0};
@@ -253,19 +284,19 @@ int spl_merge_of(const struct spl_merge_options *options, const json_t *sources,
         return spl_fail_field(err, SPL_E_USAGE, "collection", "name the collection to merge, such as city.spld");
     if (!options->output || !*spl_input_name(options->output))
         return spl_fail_field(err, SPL_E_USAGE, "output", "name the dataset to write, such as whole.spld");
-    int rc = spl_dataset_open_as(options->collection, &how, &from, &why);
+    int rc = open_collection(options, of, &how, &from, &why);
     if (rc)
         return spl_fail_field(err, rc, "collection", "%s", why.message);
     m.from = from;
     m.info = spl_dataset_get_info(from);
-    rc = m.info->tiles ? check_output(options, from, &why)
+    rc = m.info->tiles ? check_output(options, of->beside ? of->beside : options->collection, from, &why)
                        : spl_fail_field(&why, SPL_E_INPUT, "collection",
                                         "%.300s: it is no collection, but a dataset of one file already",
                                         options->collection);
     if (!rc)
         rc = check_room(&m, options->output, &why);
     if (!rc)
-        rc = merge(&m, options, sources, &stage, &why);
+        rc = merge(&m, options, of, &stage, &why);
     finish(&m);
     spl_dataset_close(from);
     return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
@@ -275,5 +306,5 @@ int spl_merge(const struct spl_merge_options *options, struct spl_error *err)
 {
     struct spl_merge_options known = {0};
     int rc = spl_sized_read(options, &known, sizeof known, "spl_merge_options", err);
-    return rc ? rc : spl_merge_of(&known, NULL, err);
+    return rc ? rc : spl_merge_of(&known, &(struct spl_merge_of){0}, err);
 }

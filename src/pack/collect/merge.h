@@ -6,7 +6,14 @@
 
 #include <splatd/collect.h>
 
-/* The same with META's "sources" (borrowed; NULL: those of the collection, its tiles' names). */
-int spl_merge_of(const struct spl_merge_options *options, const json_t *sources, struct spl_error *err);
+struct spl_merge_of {
+    const char *beside;     /* a path in the tiles' folder, of a collection that lies apart from them and is of no use
+                               to anybody else: it is removed; NULL: it lies beside them */
+    const json_t *sources;  /* META's "sources"; NULL: those of the collection, its tiles' names */
+    const json_t *skipped;  /* META's "skipped"; NULL = none */
+};
+
+/* The same with what the caller knows; all of it is borrowed. */
+int spl_merge_of(const struct spl_merge_options *options, const struct spl_merge_of *of, struct spl_error *err);
 
 #endif

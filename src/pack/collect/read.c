@@ -166,12 +166,13 @@ static json_t *describe(const struct spl_collect_tile *tile, const struct spl_da
     return NULL;
 }
 
-/* A collection is no tile, whether it can be opened or not: left out of a folder, refused where it was named itself. */
-static int refuse_collection(const struct spl_collect *c, const struct spl_collect_tile *tile, struct spl_error *err)
+/* A collection is no tile, whether it can be opened or not, and one that was merged holds what its tiles hold, which
+ * may lie beside it: left out of a folder; a collection is refused where it was named itself. */
+static int refuse(const struct spl_collect *c, const struct spl_collect_tile *tile, const char *what,
+                  struct spl_error *err)
 {
     struct spl_error why = {0};
-    int rc = spl_fail_field(tile->in_folder ? &why : err, SPL_E_INPUT, "inputs",
-                            "%.200s: it is a collection itself (\"tiles\")%s", tile->path,
+    int rc = spl_fail_field(tile->in_folder ? &why : err, SPL_E_INPUT, "inputs", "%.200s: it is %s%s", tile->path, what,
                             tile->in_folder ? ", and no tile" : "; name its tiles instead");
     if (tile->in_folder && c->options->left_out)
         c->options->left_out(c->options->progress_context, &why);
@@ -187,12 +188,16 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
     int rc = spl_dataset_open_as(tile->path, &how, &dataset, &why);
     if (kind == SPL_FILE_COLLECTION && rc != SPL_E_CANCELLED) {
         spl_dataset_close(dataset);
-        return refuse_collection(c, tile, err);
+        return refuse(c, tile, "a collection itself (\"tiles\")", err);
     }
     if (rc)
         return spl_fail_field(err, rc, why.field, "%s", why.message);
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const json_t *meta = spl_dataset_get_meta(dataset);
+    if (tile->in_folder && json_object_get(meta, "merged")) {
+        spl_dataset_close(dataset);
+        return refuse(c, tile, "a collection made one file (\"merged\"): name it to have it taken", err);
+    }
     rc = check(tile, info, err);
     if (!rc && !c->first) {
         take_first(c, info, meta);

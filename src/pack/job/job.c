@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 bool spl_job_reads(const struct spl_job *job, uint32_t part, const struct spl_job_input *input)
 {
@@ -35,23 +34,6 @@ char *spl_job_part_path(const struct spl_job *job, uint32_t part, bool mark)
 {
     char *path;
     return asprintf(&path, "%s/part-%u.%s", job->folder, part, mark ? "empty" : "spld") < 0 ? NULL : path;
-}
-
-void spl_job_remove(const struct spl_job *job)
-{
-    char *plan = NULL;
-    for (uint32_t k = 0; k < job->part_count; k++)
-        for (int mark = 0; mark < 2; mark++) {
-            char *path = spl_job_part_path(job, k, mark);
-            if (path)
-                unlink(path);
-            free(path);
-        }
-    if (asprintf(&plan, "%s/" SPL_JOB_FILE, job->folder) >= 0) { /* last: without it nobody goes on here */
-        unlink(plan);
-        free(plan);
-    }
-    rmdir(job->folder);
 }
 
 void spl_job_finish(struct spl_job *job)

@@ -98,10 +98,16 @@ int spl_job_pack(const struct spl_job *job, uint32_t part, const struct spl_pack
  * where they are given. SPL_E_INPUT names what is missing or of another job. */
 int spl_job_join(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err);
 
-/* spl_merge() of the collection that the job was joined to; its sources are the scans. */
-int spl_job_merge(const struct spl_job *job, const struct spl_merge_options *options, struct spl_error *err);
+/* Joins them and makes options->output one file of that, in any folder; its sources are the scans. Nothing is written
+ * to the job's folder; SPL_E_USAGE where the output is one of the scans. */
+int spl_job_merge(const struct spl_job *job, const struct spl_collect_options *options, struct spl_error *err);
 
-/* Removes parts, marks, plan, and the folder where nothing else is in it; what cannot be removed is left. */
-void spl_job_remove(const struct spl_job *job);
+/* Makes the folder `path` where there is none, and has it for one process until the descriptor *lock is closed:
+ * SPL_E_USAGE where another one has it. */
+int spl_job_lock(const char *path, int *lock, struct spl_error *err);
+
+/* Removes parts, of older plans too, what killed packs left of them, the plan, and the folder. False: something else
+ * lies there, or could not be removed, and so stay folder and plan. */
+bool spl_job_remove(const char *folder);
 
 #endif

@@ -17,7 +17,8 @@ enum { cells_least = 1 << 15, cells_most = 1 << 18, cells_a_part = 1 << 12, scan
  * out. */
 static bool headers_tell(const struct spl_planning *p)
 {
-    bool tell = p->scans.count / scans_a_part >= p->options->parts && !p->keep.count;
+    bool tell = p->scans.count / scans_a_part >= p->options->parts && !p->keep.count &&
+                !p->options->pack.left_out; /* what is broken inside is found by who reads it all */
     uint64_t points = 0;
     for (size_t i = 0; tell && i < p->scans.count; i++)
         points += p->scans.list[i].counted ? p->scans.list[i].points_expected : 0;

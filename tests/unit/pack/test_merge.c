@@ -247,9 +247,6 @@ static void test_the_same_bytes(void **state)
     if (merge("kept.spld", "other.spld", 2, &err))
         fail_msg("%s", err.message);
     folder_assert_same("whole.spld", "other.spld");
-    if (merge("kept.spld", "kept.spld", 2, &err)) /* it may take the collection's own place */
-        fail_msg("%s", err.message);
-    folder_assert_same("whole.spld", "kept.spld");
     unlink(in_folder("kept.spld"));
     unlink(in_folder("other.spld"));
     unlink(in_folder("whole.spld"));
@@ -272,6 +269,7 @@ static void test_what_cannot_be_merged(void **state)
     refuse(SPL_E_INPUT, tile_name(1), "whole.spld", "tile-01.spld: it is no collection, but a dataset of one file");
     refuse(SPL_E_NOT_FOUND, "nosuch.spld", "whole.spld", "nosuch.spld");
     refuse(SPL_E_USAGE, "city.spld", tile_name(2), "tile-02.spld is a tile of ");
+    refuse(SPL_E_USAGE, "city.spld", "city.spld", "city.spld is the collection, which is read");
     assert_int_equal(symlink(tile_name(2), in_folder("alias.spld")), 0);
     refuse(SPL_E_USAGE, "city.spld", "alias.spld", "is a tile of ");
     unlink(in_folder("alias.spld"));
@@ -289,6 +287,46 @@ static void test_what_cannot_be_merged(void **state)
     assert_int_equal(spl_merge(&(struct spl_merge_options){0}, NULL), SPL_E_USAGE);
     assert_int_equal(spl_merge(&SPL_SIZED(spl_merge_options, .output = "/tmp/none.spld"), NULL), SPL_E_USAGE);
     assert_int_equal(spl_merge(&SPL_SIZED(spl_merge_options, .collection = "/tmp/none.spld"), NULL), SPL_E_USAGE);
+}
+
+/* One that lies beside its tiles is none of them when they are collected anew, unless it is named. */
+static void test_a_merged_file_in_the_folder_of_its_tiles(void **state)
+{
+    (void)state;
+    char path[800];
+    const char *whole[] = {path};
+    struct spl_error err = {0};
+    snprintf(path, sizeof path, "%s", in_folder("whole.spld"));
+    merge_all("whole.spld", 2);
+    assert_int_equal(rename(in_folder("city.spld"), in_folder("before")), 0);
+    collect();
+    folder_assert_same("city.spld", "before");
+    unlink(in_folder("before"));
+    if (spl_collect(&SPL_SIZED(spl_collect_options, .inputs = whole, .input_count = 1,
+                               .output = in_folder("again.spld")), &err))
+        fail_msg("%s", err.message);
+    unlink(in_folder("again.spld"));
+    unlink(in_folder("whole.spld"));
+}
+
+/* A collection whose META does not fit its tiles: what is there stays. */
+static void test_what_would_not_open_takes_no_place(void **state)
+{
+    (void)state;
+    struct spoil file = spoil_load(in_folder("city.spld"));
+    char *count = strstr(spoil_at(&file, SPL_SECTION_META), "\"points\": 7000"); /* of the first tile, as its splats */
+    assert_non_null(count);
+    count[10] = '1';
+    spoil_store(&file, in_folder("odd.spld"), true);
+    free(file.bytes);
+    folder_put_text("whole.spld", "as it was");
+    refuse(SPL_E_CORRUPT, "odd.spld", "whole.spld", "whole.spld is not written, as what it is made of does not fit");
+    size_t length;
+    char *kept = folder_get("whole.spld", &length);
+    assert_memory_equal(kept, "as it was", length);
+    free(kept);
+    unlink(in_folder("whole.spld"));
+    unlink(in_folder("odd.spld"));
 }
 
 static void test_nothing_is_left_of_what_fails(void **state)
@@ -327,6 +365,8 @@ int main(void)
         cmocka_unit_test(test_other_kinds_of_splats),
         cmocka_unit_test(test_the_same_bytes),
         cmocka_unit_test(test_what_cannot_be_merged),
+        cmocka_unit_test(test_a_merged_file_in_the_folder_of_its_tiles),
+        cmocka_unit_test(test_what_would_not_open_takes_no_place),
         cmocka_unit_test(test_nothing_is_left_of_what_fails),
     };
     return cmocka_run_group_tests(tests, setup, folder_remove);
