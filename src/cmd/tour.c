@@ -261,6 +261,7 @@ static int run(struct arguments *a, struct spl_error *err)
         rc = resolve_cameras(a, dataset, err);
     if (!rc) {
         spl_cmd_drawing_set_unit(&a->drawing, dataset);
+        spl_cmd_warn_clip(&a->drawing.view, dataset);
         spl_cmd_warn_soft(&a->drawing.view, dataset, NULL);
     }
     if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
