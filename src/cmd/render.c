@@ -120,8 +120,8 @@ static void report(const struct spl_device_info *device, const struct spl_datase
     if (!drawn && !clipped)
         fprintf(stderr,
                 "splatd: nothing %sis in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g%s\n",
-                a->drawing.view.clip.count ? "that the clip leaves " : "", low[0], low[1], low[2], high[0], high[1], high[2],
-                is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
+                a->drawing.view.clip.count ? "that the clip leaves " : "", low[0], low[1], low[2], high[0], high[1],
+                high[2], is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
     else if (drawn)
         spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
