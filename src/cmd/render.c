@@ -13,6 +13,7 @@
 
 #include "cmd/cmd.h"
 #include "cmd/output.h"
+#include "cmd/waiting.h"
 #include "dataset/dataset.h"
 #include "geom/camera_json.h"
 #include "geom/ground.h"
@@ -139,7 +140,10 @@ static int render(struct spl_cmd_render *a, struct spl_error *err)
     struct spl_frame frame = {0};
     struct spl_encoded encoded = {0};
     int rc = a->rays_file ? read_rays(a, err) : SPL_OK;
+    struct spl_cmd_waiting waiting;
+    spl_cmd_waiting_begin(&waiting, a->dataset);
     rc = rc ? rc : spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
+    spl_cmd_waiting_end(&waiting);
     if (!rc)
         rc = spl_cmd_render_set_camera(a, dataset, err);
     if (!rc)
