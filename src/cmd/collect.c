@@ -14,6 +14,7 @@
 #include "cmd/progress.h"
 #include "cmd/table.h"
 #include "cmd/unfinished.h"
+#include "cmd/views.h"
 #include "dataset/dataset.h"
 
 static void clean_up_on_signals(const char *output)
@@ -26,8 +27,25 @@ static void clean_up_on_signals(const char *output)
 
 struct arguments {
     struct spl_collect_options collect;
+    struct spl_cmd_views views;
     bool merge;
 };
+
+static int take_default_view(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    a->collect.default_view = &a->views.first;
+    return spl_cmd_views_take_first(&a->views, option, text, err);
+}
+
+static int take_view(void *arguments, const char *option, char *text, struct spl_error *err)
+{
+    struct arguments *a = arguments;
+    int rc = spl_cmd_views_take(&a->views, option, text, err);
+    a->collect.views = a->views.named;
+    a->collect.view_count = a->views.count;
+    return rc;
+}
 
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld",
@@ -37,21 +55,29 @@ static const struct spl_cmd_option options[] = {
      SPL_CMD_FLAG(struct arguments, merge)},
     {"title", "TEXT", "what people call it, a line", SPL_CMD_TEXT(struct arguments, collect.title)},
     {"description", "TEXT", "more about it", SPL_CMD_TEXT(struct arguments, collect.description)},
+    {"default-view", "VIEW", "the view that is seen first: eye=X,Y,Z,target=X,Y,Z[,up=X,Y,Z][,fov=DEG]",
+     .otherwise = "found in the tiles, whatever theirs are", .take = take_default_view},
+    {"view", "NAME=VIEW",
+     "the same under a name, for view=NAME; up to 64 times; view_height=UNITS: orthographic, so high",
+     .take = take_view},
     {"threads", "N", "", .otherwise = "all cores", SPL_CMD_COUNT_32(struct arguments, collect.threads, 1, 64)},
 };
 
 static const struct spl_cmd_table table = {
     .command = "collect",
     .before =
-        "usage: splatd collect TILE.spld... -o NAME.spld [--title TEXT] [--description TEXT] [--threads N]\n"
+        "usage: splatd collect TILE.spld... -o NAME.spld [--title TEXT] [--description TEXT] [--default-view VIEW]\n"
+        "                      [--view NAME=VIEW]... [--threads N]\n"
         "       splatd collect --merge COLLECTION.spld -o NAME.spld [--threads N]\n\n"
         "Puts datasets of neighbouring tiles together as one, to serve and to render as a whole. Nothing is packed\n"
         "again: NAME.spld holds what is seen from afar, a few MB, and names the tiles, which hold all that is finer\n"
-        "and stay where they are, in the same folder. A tile that changes later needs the collection made anew.\n"
+        "and stay where they are, in the same folder. A tile that changes later needs the collection made anew,\n"
+        "with its title and views said again.\n"
         "TILE is a dataset, a folder (all NAME.spld in it but collections) or @LIST, a text with a path a line,\n"
         "relative to its own folder (those with # in front are comments); up to 10,000 tiles. They have one unit,\n"
         "coordinate system and list of attributes, and neither textures nor maps of stations.\n\n"
         "Tiles of a survey packed each on its own, and one city of them:\n"
+        "  mkdir -p city\n"
         "  for tile in las/*.laz; do splatd pack $tile --keep intensity -o city/$(basename $tile .laz).spld; done\n"
         "  splatd collect city -o city/city.spld --title 'The city'\n"
         "Some of the tiles, by name, and what the collection is:\n"
@@ -120,9 +146,9 @@ static int run_merge(const struct spl_collect_options *o, struct spl_cmd_progres
     if (o->input_count != 1)
         return spl_fail(err, SPL_E_USAGE,
                         "--merge takes one dataset, a collection: splatd collect --merge city.spld -o whole.spld");
-    if (o->title || o->description)
-        return spl_fail(err, SPL_E_USAGE, "--merge keeps title and description: leave out --title and --description, "
-                                          "or give them to the collection");
+    if (o->title || o->description || o->default_view || o->view_count)
+        return spl_fail(err, SPL_E_USAGE, "--merge keeps title, description and views: leave out --title, "
+                                          "--description, --default-view and --view, or give them to the collection");
     int rc = spl_cmd_check_dataset("collect --merge", o->output, err);
     if (rc)
         return rc;

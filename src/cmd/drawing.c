@@ -181,6 +181,40 @@ void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *da
         fprintf(stderr, "splatd: nothing of what is in view is soft, or it lies behind what is not\n");
 }
 
+/* Why no splat fulfils the condition that begins with term `first`, by each of its terms; false: some may. */
+static bool explain_condition(const struct spl_terms *clip, uint32_t first, uint32_t next,
+                              const struct spl_dataset_info *info, char reason[SPL_SOFT_REASON_MAX])
+{
+    char one[SPL_SOFT_REASON_MAX], before[SPL_SOFT_REASON_MAX] = "";
+    size_t used = 0;
+    *reason = '\0';
+    for (uint32_t t = first; t < next; t++) {
+        spl_soft_explain(&clip->terms[t], info, one);
+        if (!*one)
+            return false;
+        if (strcmp(one, before) && used < SPL_SOFT_REASON_MAX - 1)
+            used += (size_t)snprintf(reason + used, SPL_SOFT_REASON_MAX - used, "%s%s", used ? "; " : "", one);
+        memcpy(before, one, sizeof one);
+    }
+    return true;
+}
+
+bool spl_cmd_warn_clip(const struct spl_view *view, const struct spl_dataset *dataset)
+{
+    bool told = false;
+    for (uint32_t i = 0, next; i < view->clip.count; i = next) {
+        char reason[SPL_SOFT_REASON_MAX], text[SPL_TERMS_TEXT_MAX + 1];
+        spl_terms_print_condition(&view->clip, i, &next, text, sizeof text);
+        if (!explain_condition(&view->clip, i, next, spl_dataset_get_info(dataset), reason))
+            continue;
+        fprintf(stderr, "splatd: no splat passes '%s': ", text);
+        spl_cmd_put_text(stderr, reason, 0);
+        fputc('\n', stderr);
+        told = true;
+    }
+    return told;
+}
+
 int spl_cmd_take_background(void *drawing, const char *option, char *text, struct spl_error *err)
 {
     struct spl_cmd_drawing *d = drawing;

@@ -37,6 +37,10 @@ int spl_cmd_check_drawing(const struct spl_cmd_drawing *drawing, struct spl_erro
 void spl_cmd_warn_soft(const struct spl_view *view, const struct spl_dataset *dataset,
                        const struct spl_frame_stats *stats);
 
+/* Says on stderr which conditions of the view's clip no splat of the dataset fulfils, and what there is instead; false:
+ * nothing is known to be so. */
+bool spl_cmd_warn_clip(const struct spl_view *view, const struct spl_dataset *dataset);
+
 /* `take` of rows. */
 int spl_cmd_take_layer(void *drawing, const char *option, char *text, struct spl_error *err);
 int spl_cmd_take_method(void *drawing, const char *option, char *text, struct spl_error *err);

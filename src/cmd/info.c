@@ -17,6 +17,7 @@
 #include "cmd/output.h"
 #include "cmd/progress.h"
 #include "cmd/table.h"
+#include "cmd/waiting.h"
 #include "dataset/dataset.h"
 #include "dataset/remote_url.h"
 
@@ -123,7 +124,10 @@ int spl_cmd_info(int argc, char **argv)
         struct spl_info_report report;
         const struct spl_dataset_opening how = {
             .verify = !a.no_verify, .tables_bytes = SPL_TABLES_BYTES, .verify_remote = true};
+        struct spl_cmd_waiting waiting;
+        spl_cmd_waiting_begin(&waiting, argv[i]);
         int rc = spl_dataset_open_as(argv[i], &how, &dataset, &err);
+        spl_cmd_waiting_end(&waiting);
         if (!rc)
             rc = spl_info_gather(&report, dataset, &err);
         if (!rc && report.info->tiles && !a.no_verify && !spl_remote_is_url(argv[i]))

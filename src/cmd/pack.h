@@ -6,6 +6,7 @@
 #include <splatd/pack.h>
 
 #include "cmd/pack_report.h"
+#include "cmd/views.h"
 
 #define SPL_CMD_PACK_NO_PART UINT64_MAX
 
@@ -22,7 +23,7 @@ struct spl_cmd_pack {
     bool join, merge;
     uint32_t parts; /* one after the other, into one file; 0 = in one piece */
     double halo; /* negative: as wide as need be */
-    struct spl_saved_view default_view, views[SPL_SAVED_VIEWS_MAX];
+    struct spl_cmd_views views;
 };
 
 /* Fills *arguments from the command line, whose texts they borrow, callbacks and all; `listener` is their context.

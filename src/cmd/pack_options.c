@@ -12,8 +12,10 @@
 #include "cmd/output.h"
 #include "cmd/pack_job.h"
 #include "cmd/table.h"
+#include "cmd/views.h"
 #include "geom/unit.h"
 #include "pack/job/job.h"
+#include "pack/said.h"
 
 static const char *const texture_names[SPL_TEXTURES_COUNT + 1] = {"none", "adaptive", "D8W4", "D12W4", "D16W8"};
 
@@ -79,66 +81,20 @@ static int take_error(void *arguments, const char *option, char *text, struct sp
     return SPL_OK;
 }
 
-/* "eye=X,Y,Z,target=X,Y,Z,up=X,Y,Z,fov=DEG,view_height=UNITS", in any order. */
-static int parse_view(const char *option, char *text, struct spl_saved_view *view, struct spl_error *err)
-{
-    static const char *const names[] = {"eye", "target", "up", "fov", "view_height"};
-    enum { count = sizeof names / sizeof *names };
-    bool given[count] = {0};
-    for (char *at = text, *next; at && *at; at = next) {
-        int key = 0;
-        size_t length = strcspn(at, "=");
-        while (key < count && (strlen(names[key]) != length || strncmp(at, names[key], length)))
-            key++;
-        if (key == count || at[length] != '=' || given[key])
-            return spl_fail_field(
-                err, SPL_E_USAGE, option + 2,
-                "%s takes eye=X,Y,Z,target=X,Y,Z, and up=X,Y,Z, fov=DEG and view_height=UNITS, each once, not '%.60s'",
-                option, at);
-        given[key] = true;
-        char *value = at + length + 1;
-        for (next = value; *next && !(*next == ',' && isalpha((unsigned char)next[1]));)
-            next++;
-        if (*next)
-            *next++ = 0;
-        double *out[] = {view->eye, view->target, view->up};
-        int rc = key < 3    ? spl_cmd_parse_vector(option, value, out[key], err)
-                 : key == 3 ? spl_cmd_parse_real(option, value, 1e-6, 179, &view->fov, err)
-                            : spl_cmd_parse_real(option, value, 1e-9, 1e12, &view->view_height, err);
-        if (rc)
-            return rc;
-    }
-    return given[0] && given[1]
-               ? SPL_OK
-               : spl_fail_field(err, SPL_E_USAGE, option + 2, "%s needs eye=X,Y,Z and target=X,Y,Z", option);
-}
-
 static int take_default_view(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     struct spl_cmd_pack *a = arguments;
-    a->default_view = (struct spl_saved_view){0};
-    a->pack.default_view = &a->default_view;
-    return parse_view(option, text, &a->default_view, err);
+    a->pack.default_view = &a->views.first;
+    return spl_cmd_views_take_first(&a->views, option, text, err);
 }
 
 static int take_view(void *arguments, const char *option, char *text, struct spl_error *err)
 {
     struct spl_cmd_pack *a = arguments;
-    size_t length = strcspn(text, "=");
-    if (a->pack.view_count == SPL_SAVED_VIEWS_MAX)
-        return spl_fail_field(err, SPL_E_USAGE, "view", "%s is given more than %d times", option, SPL_SAVED_VIEWS_MAX);
-    struct spl_saved_view *view = &a->views[a->pack.view_count];
-    *view = (struct spl_saved_view){0};
-    if (text[length] != '=' || !length || length >= sizeof view->name)
-        return spl_fail_field(
-            err, SPL_E_USAGE, "view",
-            "%s takes NAME=eye=X,Y,Z,target=X,Y,Z, the name of at most 63 letters, digits, '.', '_' and "
-            "'-', not '%.60s'",
-            option, text);
-    memcpy(view->name, text, length);
-    a->pack.views = a->views;
-    a->pack.view_count++;
-    return parse_view(option, text + length + 1, view, err);
+    int rc = spl_cmd_views_take(&a->views, option, text, err);
+    a->pack.views = a->views.named;
+    a->pack.view_count = a->views.count;
+    return rc;
 }
 
 static const struct spl_cmd_option options[] = {
@@ -275,8 +231,8 @@ static const struct spl_cmd_table table = {
         "                   [--primitives all [--error LENGTH] [--export-primitives FILE]]\n"
         "       splatd pack --plan N IN... -o JOB [--halo LENGTH] [--OPTION]...\n"
         "       splatd pack --part K JOB [--memory MIB] [--threads N]\n"
-        "       splatd pack --join JOB [-o JOB/NAME.spld] [--title TEXT] [--description TEXT]\n"
-        "       splatd pack --join JOB --merge -o NAME.spld\n"
+        "       splatd pack --join JOB [-o JOB/NAME.spld | --merge -o NAME.spld] [--title TEXT] [--description TEXT]\n"
+        "                   [--default-view VIEW] [--view NAME=VIEW]... [--threads N]\n"
         "       splatd pack --parts N IN... -o NAME.spld [--halo LENGTH] [--OPTION]...\n\n"
         "Turns scans (PLY, LAS, LAZ, COPC, E57, PCD, PTX, PTS, XYZ, other text) into one dataset to serve and\n"
         "render: normals, radii, levels of detail, quantised under the stated errors. Points of equal coordinates\n"
@@ -375,7 +331,9 @@ static int check(const struct spl_cmd_pack *a, struct spl_error *err)
     if (rc)
         return rc;
     const char *contradiction = find_contradiction(a);
-    return contradiction ? spl_fail(err, SPL_E_USAGE, "%s", contradiction) : SPL_OK;
+    if (contradiction)
+        return spl_fail(err, SPL_E_USAGE, "%s", contradiction);
+    return a->parts ? spl_said_check_pack(o, err) : SPL_OK; /* what parts become is told it when all are packed */
 }
 
 int spl_cmd_pack_parse(struct spl_cmd_pack *a, struct spl_cmd_pack_listener *listener, int argc, char **argv,

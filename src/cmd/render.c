@@ -13,6 +13,7 @@
 
 #include "cmd/cmd.h"
 #include "cmd/output.h"
+#include "cmd/waiting.h"
 #include "dataset/dataset.h"
 #include "geom/camera_json.h"
 #include "geom/ground.h"
@@ -116,12 +117,13 @@ static void report(const struct spl_device_info *device, const struct spl_datase
         fprintf(stderr, "; coarser%s than asked for: not everything fits the memory limit",
                 info->maps && a->drawing.view.maps == SPL_MAPS_ON ? ", or with fewer maps of stations," : "");
     fputc('\n', stderr);
-    if (!drawn)
+    const bool clipped = spl_cmd_warn_clip(&a->drawing.view, dataset);
+    if (!drawn && !clipped)
         fprintf(stderr,
-                "splatd: nothing is in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g%s\n",
-                low[0], low[1], low[2], high[0], high[1], high[2],
-                is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
-    else
+                "splatd: nothing %sis in view; the dataset's bounds are %.10g,%.10g,%.10g to %.10g,%.10g,%.10g%s\n",
+                a->drawing.view.clip.count ? "that the clip leaves " : "", low[0], low[1], low[2], high[0], high[1],
+                high[2], is_behind(&a->drawing.view.camera, low, high) ? ", all of it behind the eye" : "");
+    else if (drawn)
         spl_cmd_warn_soft(&a->drawing.view, dataset, stats);
     if (encoded->saturated)
         fprintf(stderr, "splatd: %llu pixels lie beyond 65535 steps; a smaller --depth-scale reaches farther\n",
@@ -138,7 +140,10 @@ static int render(struct spl_cmd_render *a, struct spl_error *err)
     struct spl_frame frame = {0};
     struct spl_encoded encoded = {0};
     int rc = a->rays_file ? read_rays(a, err) : SPL_OK;
+    struct spl_cmd_waiting waiting;
+    spl_cmd_waiting_begin(&waiting, a->dataset);
     rc = rc ? rc : spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
+    spl_cmd_waiting_end(&waiting);
     if (!rc)
         rc = spl_cmd_render_set_camera(a, dataset, err);
     if (!rc)

@@ -26,6 +26,7 @@
 #include "cmd/drawing.h"
 #include "cmd/output.h"
 #include "cmd/progress.h"
+#include "cmd/waiting.h"
 #include "image/video.h"
 #include "service/place/places.h"
 #include "service/tour/fade.h"
@@ -256,11 +257,15 @@ static int run(struct arguments *a, struct spl_error *err)
 {
     struct spl_dataset *dataset = NULL;
     struct spl_renderer *renderer = NULL;
+    struct spl_cmd_waiting waiting;
+    spl_cmd_waiting_begin(&waiting, a->dataset);
     int rc = spl_dataset_open(a->dataset, !a->drawing.no_verify, &dataset, err);
+    spl_cmd_waiting_end(&waiting);
     if (!rc)
         rc = resolve_cameras(a, dataset, err);
     if (!rc) {
         spl_cmd_drawing_set_unit(&a->drawing, dataset);
+        spl_cmd_warn_clip(&a->drawing.view, dataset);
         spl_cmd_warn_soft(&a->drawing.view, dataset, NULL);
     }
     if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)

@@ -249,17 +249,17 @@ static struct spl_soft_work work_of(const struct spl_setting *setting, uint32_t 
     return (struct spl_soft_work){1e-6 * samples, setting->lod, layer, setting->method, 0, 1};
 }
 
-/* How one candidate stands to the demand. */
+/* How one candidate stands to the demand; `bound` as of the candidate, NAN where its own is that of something else. */
 struct standing {
-    double ms, tail_ms;
+    double ms, tail_ms, bound;
     bool in_time, accurate;
 };
 
 static struct standing assess(const struct spl_planner *planner, size_t index, const struct spl_demand *demand)
 {
     const struct spl_candidate *c = &planner->candidates[index];
-    double bound = is_unmeasured(&c->setting, demand) ? NAN : c->bound;
-    struct standing s = {.in_time = true, .accurate = isnan(demand->psnr) || rank(bound) >= demand->psnr};
+    struct standing s = {.in_time = true, .bound = is_unmeasured(&c->setting, demand) ? NAN : c->bound};
+    s.accurate = isnan(demand->psnr) || rank(s.bound) >= demand->psnr;
     double spread = planner->spread;
     s.ms = spl_planner_estimate(planner, index, demand->width, demand->height, demand->layer);
     if (demand->soft && demand->soft->what.count) {
@@ -289,7 +289,9 @@ static bool better(const struct spl_demand *demand, const struct spl_candidate *
         return x->accurate;
     if (!isnan(demand->psnr) && x->accurate) // both: the cheaper
         return x->ms < y->ms;
-    double gain = rank(a->psnr) - rank(b->psnr); // what they do, not what they promise; NAN: both unknown
+    double gain = isnan(demand->psnr) ? NAN : rank(x->bound) - rank(y->bound); // out of reach: as near as is promised
+    if (isnan(gain)) // nobody asks for a promise, or neither makes one: what they do; NAN again: both unknown
+        gain = rank(a->psnr) - rank(b->psnr);
     return isnan(gain) || gain == 0 ? x->ms < y->ms : gain > 0;
 }
 

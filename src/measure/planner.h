@@ -34,7 +34,8 @@ struct spl_choice {
     size_t index; /* of the planner's setting; for learn() */
     double ms;    /* expected time of the frame, without extra_ms */
     double psnr;  /* dB that 19 of 20 views reach, see spl_profile_psnr_bound(); NAN without a profile */
-    bool meets;   /* whether the demand can be met; else this is the best there is */
+    bool meets;   /* whether the demand can be met; else this is the best there is: of an accuracy out of reach the one
+                     that promises most, in the least time */
 };
 
 struct spl_planner {

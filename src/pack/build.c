@@ -263,8 +263,6 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
     struct spl_system_options said = {options->unit, options->crs, options->warn, options->progress_context};
     uint64_t begin_ns = spl_now_ns();
     int rc = spl_pack_check(options, &p.neighbours, &p.chunk, err);
-    if (!rc)
-        rc = spl_said_check(options, err);
     if (!rc && options->export_primitives)
         rc = spl_export_check(options->export_primitives, (const char *const *)inputs->paths, inputs->count, err);
     if (!rc)
@@ -287,6 +285,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         spl_maps_plan(stage, &later->pictures, p.points.station_count, p.points.count);
     if (!rc)
         settle_up(&p, later && options->photos ? &later->photographs : NULL);
+    if (!rc && !part)
+        rc = spl_said_check_views(options, p.points.up, err);
     if (!rc && later)
         rc = spl_eyes_take(&p.points, later->photographs.count ? &later->photographs : &later->pictures, err);
     if (!rc)

@@ -19,6 +19,7 @@
 #include "pack/build.h"
 #include "pack/check.h"
 #include "pack/prune.h"
+#include "pack/said.h"
 
 static const double prune_near = 1.1; /* times the factor, or as much less: not worth a word */
 
@@ -137,6 +138,8 @@ static int pack(const struct spl_pack_options *options, struct spl_pack_report *
                               "maps of stations are put onto discs; pack without --points-only, or without "
                               "--panoramas");
     int rc = spl_pack_check_primitives(options, err);
+    if (!rc)
+        rc = spl_said_check_pack(options, err);
     if (rc)
         return rc;
     struct spl_stage stage = {.callback = options->progress,

@@ -252,6 +252,30 @@ def info(*arguments, **environment):
                           env={**os.environ, **environment})
 
 
+def test_who_waits_is_told_for_what():
+    """Once, after two seconds, without what the URL has of secrets; of what answers nothing."""
+    slow = File(DATA, delay_s=3)
+    with tempfile.TemporaryDirectory() as folder, Server({"/slow.spld": slow, "/tree.spld": File(DATA)}) as server:
+        path = pathlib.Path(folder, "path.txt")
+        path.write_text("0 0 0 2 0 0 0 1\n1 1 0 2 0 0 0 1\n")
+        said = f"splatd: waiting for http://127.0.0.1:{server.port}/slow.spld, which is given up when nothing comes for "
+        for command in (["info"], ["render", "--size", "16", "-o", os.devnull, "--format", "png"],
+                        ["tour", "--path", path, "--size", "16", "-o", f"{folder}/frames"]):
+            slow.delay_s = 3
+            process = subprocess.Popen([REAL, *command, server.url("slow.spld", user=f"me:{SECRET}") + f"?sig={SECRET}"], text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            begun = time.monotonic()
+            first = process.stderr.readline()
+            took = time.monotonic() - begun
+            slow.delay_s = 0
+            process.kill()
+            rest = process.communicate()[1]
+            assert first.startswith(said) and 1.9 < took < 60, (command, took, first, rest)
+            assert SECRET not in first + rest and rest.count("waiting for") == 0, rest
+        quick = info(server.url("tree.spld"))
+        assert quick.returncode == 0 and "waiting" not in quick.stderr, quick.stderr
+
+
 def test_s3():
     keys = {"AWS_ACCESS_KEY_ID": ACCOUNT[0], "AWS_SECRET_ACCESS_KEY": SECRET, "AWS_REGION": ACCOUNT[2]}
     token = "TOKEN/+=" + SECRET

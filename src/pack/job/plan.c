@@ -43,7 +43,8 @@ static int check_options(const struct spl_plan_options *options, struct spl_erro
                               o->default_view ? "--default-view" : "--view");
     if (what)
         return spl_fail_field(err, SPL_E_USAGE, "plan",
-                              "%s cannot be split into parts: leave it out, or pack without --plan, in one piece",
+                              "%s cannot be split into parts: leave it out, or pack without --plan and --parts, in one "
+                              "piece",
                               what);
     if (o->primitives != SPL_PRIMITIVES_OFF && !(o->error > 0)) /* each would choose by its own noise and spacing */
         return spl_fail_field(err, SPL_E_USAGE, "error",

@@ -105,8 +105,19 @@ static void test_psnr_takes_the_cheapest_that_reaches_it(void **state)
     expect(&planner, demand(NAN, 25.5), 1, true);
     expect(&planner, demand(NAN, 26.5), 2, true);
     expect(&planner, demand(NAN, 32), 3, false);
-    planner.candidates[3].bound = 20; // nobody promises 32 dB: the most accurate, not what promises most
-    expect(&planner, demand(NAN, 32), 3, false);
+    planner.candidates[3].bound = 20; // nobody promises 32 dB: what promises most, by which a demand is met
+    expect(&planner, demand(NAN, 32), 2, false);
+    expect(&planner, demand(1000, 32), 2, false);
+    expect(&planner, demand(1000, NAN), 3, true); // of a budget alone nothing is promised but time: the most accurate
+    planner.candidates[1].bound = planner.candidates[2].bound;
+    expect(&planner, demand(NAN, 32), 1, false); // as much in less time
+    for (size_t i = 1; i < setting_count; i++)
+        planner.candidates[i].bound = NAN;
+    expect(&planner, demand(NAN, 32), 0, false); // some promise is more than none
+    planner.candidates[0].bound = NAN;
+    expect(&planner, demand(NAN, 32), 3, false); // without any, the most accurate
+    spl_planner_finish(&planner);
+    planner = make_planner(1);
     struct spl_choice choice;
     struct spl_demand wanted = demand(NAN, 25.5);
     assert_int_equal(spl_planner_choose(&planner, &wanted, &choice, NULL), 0);

@@ -339,6 +339,58 @@ static void what_is_said_wrongly_is_refused_by_name(void **state)
     free(cloud.at);
 }
 
+/* Up is what it is told to be, or z, before a scan is opened; of tiles it is theirs. */
+static void views_along_up_are_refused_at_once(void **state)
+{
+    (void)state;
+    static const struct spl_saved_view down = {.name = "plan", .eye = {0, 0, 50}, .target = {0, 0, 1}},
+                                       along_y = {.name = "side", .eye = {0, 9, 0}},
+                                       turned = {.name = "map", .eye = {0, 0, 50}, .up = {0, 1, 0}};
+    const struct {
+        struct spl_pack_options options;
+        const char *field, *says; /* NULL: the scan is missing, which is all that is wrong */
+    } cases[] = {
+        {{.default_view = &down}, "default-view", "--default-view: from eye 0,0,50 to target 0,0,1 with up 0,0,1: "},
+        {{.views = &down, .view_count = 1}, "view", "--view plan: from eye 0,0,50 to target 0,0,1 with up 0,0,1: "},
+        {{.default_view = &along_y, .up = {0, -7, 0}}, "default-view", "from eye 0,9,0 to target 0,0,0 with up 0,-7,0"},
+        {{.views = &along_y, .view_count = 1, .up = {0, -7, 0}}, "view", "give another, such as up="},
+        {{.default_view = &down, .up = {0, -7, 0}}, NULL, NULL},
+        {{.default_view = &along_y, .views = &turned, .view_count = 1}, NULL, NULL},
+    };
+    const char *const gone[] = {"/nonexistent/gone.ply"};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_error err = {0};
+        struct spl_pack_options options = cases[i].options;
+        options.size = sizeof options;
+        options.inputs = gone;
+        options.input_count = 1;
+        options.output = packed;
+        int rc = spl_pack(&options, NULL, &err);
+        if ((rc == SPL_E_USAGE) != !!cases[i].field || !strstr(err.message, cases[i].says ? cases[i].says : "gone.ply"))
+            fail_msg("case %zu: %s", i, err.message);
+        assert_true(!cases[i].field || !strcmp(err.field, cases[i].field));
+    }
+
+    struct cloud cloud = {0};
+    struct spl_error err = {0};
+    char all[96];
+    add_box(&cloud, 10, 5, 3, 0.3, false);
+    assert_int_equal(pack_with(&cloud, false, &(struct spl_pack_options){.up = {0, -1, 0}}, &err), 0);
+    free(cloud.at);
+    snprintf(all, sizeof all, "%s/all.spld", folder);
+    const char *const tiles[] = {packed};
+    struct spl_collect_options collect = {
+        .size = sizeof collect, .inputs = tiles, .input_count = 1, .output = all, .default_view = &along_y};
+    assert_int_equal(spl_collect(&collect, &err), SPL_E_USAGE);
+    assert_string_equal(err.field, "default-view");
+    assert_non_null(strstr(err.message, "with up 0,-1,0"));
+    assert_int_equal(access(all, F_OK), -1);
+    collect.default_view = &down;
+    err = (struct spl_error){0};
+    assert_int_equal(spl_collect(&collect, &err), 0);
+    unlink(all);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -424,6 +476,7 @@ int main(void)
         cmocka_unit_test(a_quantile_is_that_of_sorted_values),
         cmocka_unit_test(what_is_said_stands),
         cmocka_unit_test(what_is_said_wrongly_is_refused_by_name),
+        cmocka_unit_test(views_along_up_are_refused_at_once),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
