@@ -115,7 +115,8 @@ int spl_cmd_print_merged(const char *output, struct spl_error *err)
     int rc = spl_dataset_source_open_file(output, &source, err);
     if (rc)
         return rc;
-    if ((rc = spl_dataset_open_source(&source, "merged", false, NULL, &dataset, err))) { /* any name may be its file's */
+    rc = spl_dataset_open_source(&source, "merged", false, NULL, &dataset, err); /* its file may have any name */
+    if (rc) {
         spl_dataset_source_close(&source);
         return rc;
     }

@@ -244,7 +244,8 @@ static void lines_stand_for_linear_splats(void **state)
             }
 }
 
-static uint64_t count_lines(const struct spl_dataset *dataset, enum spl_method method, const char *clip, size_t *covered)
+static uint64_t count_lines(const struct spl_dataset *dataset, enum spl_method method, const char *clip,
+                            size_t *covered)
 {
     struct spl_view view = in_front(3, 200, 150);
     struct spl_frame frame;

@@ -38,7 +38,7 @@ enum { SPL_COLLECT_JOB_MAX = 32 };
 
 struct spl_collect {
     const struct spl_collect_options *options;
-    bool apart; /* it is written elsewhere, for spl_merge_of(): tiles lie in one folder, which need not be the output's */
+    bool apart; /* it is written elsewhere, for spl_merge_of(): tiles lie in one folder, not the output's */
     struct spl_stage *stage;
     struct spl_collect_tile *tiles; /* by name; by place once they are grouped */
     size_t count, capacity;

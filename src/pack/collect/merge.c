@@ -193,8 +193,8 @@ static int check_output(const struct spl_merge_options *o, const char *beside, c
         return SPL_OK;
     bool same = is_same_file(o->collection, &output);
     if (same)
-        return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s is the collection, which is read: choose another name",
-                              o->output);
+        return spl_fail_field(err, SPL_E_USAGE, "output",
+                              "%.300s is the collection, which is read: choose another name", o->output);
     json_array_foreach(tiles, i, tile)
     {
         char *path = NULL;
