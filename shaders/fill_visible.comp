@@ -8,9 +8,7 @@
  * image, which is proportional to its inverse depth, and frame.fill_kernel at most. Of the rings around a sample, each
  * half as wide as the one before, the nearest sample of eight cells of their level is looked at: the time goes with
  * the kernel's logarithm. The first is the widest within reach of the coarse level's nearest sample; the last is where
- * enough sectors are blocked, or where nothing in the ring or within it is nearer. Most samples need two. A cell's
- * nearest sample stands for others that lie in other sectors, so more sectors seem open than are: where two that are
- * opposite are blocked, as none are beyond an edge, a sample that holds nothing counts one of them as blocked.
+ * enough sectors are blocked, or where nothing in the ring or within it is nearer. Most samples need two.
  * Constant 0 = 0, constant: every sample within frame.fill_kernel, as the earlier work has it.
  *
  * The state of a sample: its word of level 0 where it is visible, SPL_FILL_HOLE, or 0 = nothing to see. */
@@ -162,10 +160,6 @@ void main()
         float q = min(intBitsToFloat(cones[k]) * frame.fx * frame.fx, 1e12);
         open -= sqrt(q / (q + 1.0));
     }
-    int both = 0;
-    for (int k = 0; k < 4; k++)
-        both = max(both, min(cones[k], cones[k + 4]));
-    open -= own == 0u && both > 0 ? 1.0 : 0.0;
     bool visible = open >= frame.fill_threshold;
     planes[frame.fill_from + i] = visible || (own != 0u && (frame.flags & SPL_FRAME_KEEP) != 0u) ? own : SPL_FILL_HOLE;
 }

@@ -34,7 +34,8 @@ void draw(spl_draw_chunk chunk, splat s)
         return;
     uint bits = floatBitsToUint(p.z);
     if (FILL != 0u)
-        bits = fill_word(bits, spacing_radius(chunk, s.index), is_linear(chunk, s.index));
+        bits = fill_word(bits, min(load_radius(chunk, s.index), SPL_FILL_STRAY * chunk.radius_min),
+                         is_linear(chunk, s.index));
     uint at = image_sample_index(ivec2(center));
     if (wins(at, bits))
         put(at, bits, payload(chunk, s));

@@ -132,8 +132,7 @@
 #define SPL_FILL_LINEAR 1u
 #define SPL_FILL_SPACING_BITS 5
 #define SPL_FILL_DEPTH_BITS 63u
-/* A point whose radius is more than so many times the least of its chunk, and more than the chunk's mean, strays: it
- * counts as the larger of both. */
+/* A point whose radius is more than so many times the least of its chunk strays: it counts as this. */
 #define SPL_FILL_STRAY 3.0f
 #define SPL_FILL_LINE_MOST 50000 /* samples along which a line is drawn */
 #define SPL_FILL_HOLE 0x80000000u
@@ -208,8 +207,7 @@ struct spl_draw_chunk {
     SPL_U32 texture;                      /* its word of CTEX, with as many planes as are drawn */
     SPL_F32 texture_scale;                /* drawn radius over the radius that its textures are for; half a line's
                                              width, metres; of soft splats that are linear: the square of the radius
-                                             that one of radius 1 has; of points of method fill: the radius that
-                                             one counts as at most */
+                                             that one of radius 1 has */
     SPL_U32 marks;                        /* word of the marks where its begin; 0 = all of it is solid, or all soft */
     SPL_U32 paint_word, paint_bits, paint_base; /* of the attribute that colours show: where its codes begin, their
                                              width and SPL_PAINT_LAST_NONE, and what they are added to */

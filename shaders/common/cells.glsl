@@ -86,11 +86,6 @@ float load_radius(spl_draw_chunk chunk, uint index)
     return chunk.radius_min;
 }
 
-float spacing_radius(spl_draw_chunk chunk, uint index)
-{
-    return chunk.radius_min;
-}
-
 bool is_linear(spl_draw_chunk chunk, uint index)
 {
     return false;

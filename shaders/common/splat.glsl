@@ -250,12 +250,6 @@ float load_radius(spl_draw_chunk chunk, uint index)
     return radius;
 }
 
-/* The same where it says how far splats lie apart. */
-float spacing_radius(spl_draw_chunk chunk, uint index)
-{
-    return min(load_radius(chunk, index), chunk.texture_scale);
-}
-
 /* 8 bit sRGB, exact. */
 uvec3 load_color(spl_draw_chunk chunk, uint index)
 {

@@ -126,8 +126,6 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
     if (rc || !w->judged.solid)
         return rc;
     out.texture = drawn_texture(w, chunk, page, reach.near);
-    if (!w->params->discs) // not of the least alone: of clusters a few are far smaller than the rest of their chunk
-        out.texture_scale = fmaxf(SPL_FILL_STRAY * out.radius_min, (float)(chunk->radius_mean * scale));
     int trims = spl_walk_add_map_cells(w, chunk, &box, whole, err), cut = spl_walk_get_cut(w, err);
     if (trims < 0 || cut < 0)
         return trims < 0 ? trims : cut;

@@ -9,8 +9,6 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "base/memory.h"
-#include "dataset/format.h"
 #include "gpu/frames.h"
 
 static void what_method_fill_takes_matches(void **state)
@@ -112,70 +110,12 @@ static void points_around_the_eye_match(void **state)
     }
 }
 
-/* Pixels that a wall of jittered points, so many a pixel where it is nearest, leaves empty; the wall turns away by
- * `slant` and reaches beyond the image. `odd`: of every 64 points one has a twelfth of the others' radius. */
-static unsigned count_holes(double points_a_pixel, double slant, bool odd)
-{
-    enum { width = 240, height = 180, side = 640 };
-    const double focal = 300, far_off = 3, spacing = far_off / focal / sqrt(points_a_pixel);
-    struct make_splat *splats = spl_alloc((size_t)side * side, sizeof *splats, NULL);
-    size_t count = 0;
-    unsigned holes = 0;
-    for (uint32_t i = 0; i < side * side; i++) {
-        /* blocks of 8 x 8, two of which are a chunk */
-        const uint32_t block = i / 64, column = block % (side / 8) * 8 + i % 8,
-                       row = block / (side / 8) * 8 + i / 8 % 8;
-        const double u = spacing * (column + uniform() - side / 2), v = spacing * (row + uniform() - side / 2);
-        const double small = odd && i % 64 == 37 ? 1.0 / 12 : 1;
-        splats[count++] = (struct make_splat){.position = {u * cos(slant), u * sin(slant), v},
-                                              .normal = {(float)sin(slant), (float)-cos(slant), 0},
-                                              .radius = (float)(small * SPL_RADIUS_SPACING * spacing),
-                                              .color = {(uint8_t)(column % 200), 100, 50}};
-    }
-    struct spl_dataset *dataset = make_dataset(splats, count);
-    struct spl_view view = looking(origin, far_off, width, height);
-    const double eye[3] = {0, -far_off, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
-    struct spl_frame frame;
-    free(splats);
-    assert_int_equal(spl_renderer_add(renderer, dataset, NULL), SPL_OK);
-    view.method = SPL_METHOD_FILL;
-    view.lod = 0;
-    view.camera.fx = view.camera.fy = focal;
-    assert_int_equal(spl_camera_look_at(&view.camera, eye, target, up, NULL), SPL_OK);
-    assert_int_equal(spl_renderer_render(renderer, dataset, &view, &frame, NULL), SPL_OK);
-    for (uint32_t i = 0; i < width * height; i++)
-        holes += !(((const float *)frame.images[SPL_LAYER_COVERAGE].pixels)[i] > 0);
-    spl_frame_finish(&frame);
-    printf("%.1f points a pixel, %.1f: %u holes\n", points_a_pixel, slant, holes);
-    same_images(dataset, &view, "a wall");
-    done(dataset);
-    return holes;
-}
-
-/* A wall of points about a pixel apart is closed but for a pixel in 10^4, whichever way it turns, */
-static void walls_of_points_are_closed(void **state)
-{
-    (void)state;
-    for (int i = 0; i < 6; i++)
-        assert_true(count_holes((double[]){1.2, 1, 0.7}[i % 3], i < 3 ? 0 : 0.6, false) <= 4);
-}
-
-/* also where a few of its points lie closer together than the others. */
-static void few_close_points_leave_walls_closed(void **state)
-{
-    (void)state;
-    for (int i = 0; i < 6; i++)
-        assert_true(count_holes((double[]){1.2, 1, 0.7}[i % 3], i < 3 ? 0 : 0.6, true) <= 4);
-}
-
 int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         frames_test(what_method_fill_takes_matches),
         frames_test(wires_are_lines_along_themselves),
         frames_test(points_around_the_eye_match),
-        frames_test(walls_of_points_are_closed),
-        frames_test(few_close_points_leave_walls_closed),
     };
     return frames_run(argc, argv, "fill", tests, sizeof tests / sizeof *tests);
 }

@@ -501,8 +501,7 @@ static bool load_disc(struct scene *s, const struct naive_chunk *drawn, uint32_t
         d->p[i] += (float)origin;
     }
     double median = spl_dataset_get_info(s->dataset)->splat_radius;
-    float mean = (float)(chunk->radius_mean * drawn->scale);
-    float radius = fminf(splat.radius, fmaxf(SPL_FILL_STRAY * local.radius_min, mean));
+    float radius = fminf(splat.radius, SPL_FILL_STRAY * local.radius_min);
     *low_bits = reference_fill_code(radius, median) << 1 | (splat.linear ? SPL_FILL_LINEAR : 0);
     return d->p[2] >= (float)s->camera.near && d->p[2] <= (float)s->camera.far;
 }

@@ -102,8 +102,6 @@ static void pull(struct filter *f, uint32_t level)
     }
 }
 
-static const float beyond = 1e30f; /* depth of a sample that holds nothing */
-
 /* Whether the sample of `c` is nearer than z; then it blocks its sector, where it is near enough. */
 static bool block(const struct filter *f, const struct cell *c, float z, int dx, int dy, bool constant, float steep[8])
 {
@@ -167,24 +165,18 @@ static bool is_visible(const struct filter *f, int x, int y, float z)
         float s = fminf(steep[i], 1e6f);
         open += 1 - s / sqrtf(s * s + 1);
     }
-    bool between = false; /* what is blocked on both sides of what holds nothing */
-    for (int i = 0; i < 4; i++)
-        between |= z == beyond && steep[i] > 0 && steep[i + 4] > 0;
-    return open - (between ? 1 : 0) >= f->threshold;
+    return open >= f->threshold;
 }
 
-/* The nearest of the cells whose inverse depth is below `most`, of equals the one of the largest spacing, NULL = there
- * is none; and the inverse depth from which on cells belong to its surface, which is `samples` wide. */
+/* The nearest of the cells whose inverse depth is below `most`, NULL = there is none; and the inverse depth from which
+ * on cells belong to its surface, which is `samples` wide. */
 static const struct cell *find_surface(const struct filter *f, const struct cell *const cells[4], float samples,
                                        float most, float *least)
 {
     const struct cell *near = NULL;
-    for (int i = 0; i < 4; i++) {
-        const struct cell *c = cells[i];
-        if (c && c->w > 0 && c->w < most && !c->hole &&
-            (!near || c->w > near->w || (c->w == near->w && c->spacing > near->spacing)))
-            near = c;
-    }
+    for (int i = 0; i < 4; i++)
+        if (cells[i] && cells[i]->w > 0 && cells[i]->w < most && !cells[i]->hole && (!near || cells[i]->w > near->w))
+            near = cells[i];
     if (near) {
         float slope = samples * SPL_FILL_SLOPE * (1 / f->focal) * (f->parallel ? near->w : 1);
         *least = near->w / (1 + (slope + f->margin * f->radius * near->w * near->spacing));
@@ -310,7 +302,7 @@ void reference_fill(struct fill_sample *samples, const struct spl_camera *camera
         f.means[0][i] = *own;
         bool keeps = own->w > 0 && view->fill.visibility == SPL_VISIBILITY_NONE;
         f.means[0][i].hole =
-            !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : beyond);
+            !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
     }
     for (uint32_t level = 1; level <= plan->levels; level++)
         gather(&f, level);
