@@ -207,6 +207,9 @@ def check_one_file(survey, top):
     (top / "folder.spld").mkdir()
     assert survey.run("--plan", 2, top / "copy.spld", "-o", top / "of copy").returncode == 0
     assert survey.run("--part", 0, top / "of copy").returncode == survey.run("--part", 1, top / "of copy").returncode == 0
+    (top / "link.spld.parts").symlink_to(top / "nowhere")
+    said = survey.run("--parts", 3, survey.scans, "-o", top / "link.spld")
+    assert said.returncode == 1 and "link.spld.parts: parts lie in this folder, and it cannot be opened" in said.stdout, said.stdout
     for words, says in ((("--merge", survey.scans, "-o", whole), "--merge is of parts that are joined"),
                         (("--join", survey.truth, "--merge"), "--merge needs a dataset to write"),
                         (("--join", survey.truth, "--merge", "-o", survey.truth / "part-0.spld"), "is a tile of"),

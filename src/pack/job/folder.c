@@ -15,12 +15,13 @@
 /* The lock is the folder's own; one that was removed meanwhile is made and taken again. */
 int spl_job_lock(const char *path, int *lock, struct spl_error *err)
 {
+    enum { tries_most = 16 }; /* a link that leads nowhere is there, and cannot be opened, each time */
     struct stat own, there;
-    for (;;) {
+    for (int tries = 0;; tries++) {
         if (mkdir(path, 0777) && errno != EEXIST)
             return spl_fail_errno(err, errno, "%.300s: this folder cannot be made", path);
         *lock = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-        if (*lock < 0 && errno == ENOENT)
+        if (*lock < 0 && errno == ENOENT && tries < tries_most)
             continue;
         if (*lock < 0)
             return spl_fail_errno(err, errno, "%.300s: parts lie in this folder, and it cannot be opened", path);
@@ -33,6 +34,9 @@ int spl_job_lock(const char *path, int *lock, struct spl_error *err)
         if (!stat(path, &there) && !fstat(*lock, &own) && own.st_ino == there.st_ino && own.st_dev == there.st_dev)
             return SPL_OK;
         close(*lock);
+        if (tries >= tries_most)
+            return spl_fail_field(err, SPL_E_IO, "output", "%.300s: this folder is removed by others, again and again",
+                                  path);
     }
 }
 
