@@ -45,6 +45,12 @@ static char *copy_folder(const char *path)
     return length ? strndup(path, (size_t)length) : strdup(".");
 }
 
+bool spl_file_is_same(const char *path, const char *other)
+{
+    struct stat one, second;
+    return !stat(path, &one) && !stat(other, &second) && one.st_dev == second.st_dev && one.st_ino == second.st_ino;
+}
+
 uint64_t spl_file_get_free(const char *path)
 {
     struct statvfs status;

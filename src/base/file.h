@@ -2,6 +2,7 @@
 #ifndef SPL_BASE_FILE_H
 #define SPL_BASE_FILE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -20,6 +21,9 @@ int spl_file_replace(const char *path, const void *bytes, size_t length, struct 
 void spl_file_sweep(const char *begin, const char *end);
 /* The same of spl_file_replace() at `path`. Not part of it: it looks through the whole folder. */
 void spl_file_sweep_beside(const char *path);
+
+/* Are both there, and one file? Any thread. */
+bool spl_file_is_same(const char *path, const char *other);
 
 /* Bytes that are free in the folder of `path`; UINT64_MAX: nobody says so. Any thread. */
 uint64_t spl_file_get_free(const char *path);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <sys/stat.h>
 
+#include "base/file.h"
 #include "pack/neighbours.h"
 
 static const double error_most = 1e6; /* metres: a tenth of the way from a pole to the equator */
@@ -70,13 +71,11 @@ int spl_pack_check(const struct spl_pack_options *o, unsigned *neighbours, struc
                               o->up[1], o->up[2]);
     *chunk = (struct spl_chunk_options){
         .position_error = position, .normal_error = normal * M_PI / 180, .radius_error = 0.05};
-    struct stat output, input;
-    if (stat(o->output, &output) == 0) {
-        for (size_t i = 0; i < o->input_count; i++)
-            if (stat(o->inputs[i], &input) == 0 && input.st_dev == output.st_dev && input.st_ino == output.st_ino)
-                return spl_fail_field(err, SPL_E_USAGE, "output", "%s is an input too; choose another name", o->output);
-        if (!S_ISREG(output.st_mode))
-            return spl_fail_field(err, SPL_E_USAGE, "output", "%s exists and is no file", o->output);
-    }
+    struct stat output;
+    for (size_t i = 0; i < o->input_count; i++)
+        if (spl_file_is_same(o->inputs[i], o->output))
+            return spl_fail_field(err, SPL_E_USAGE, "output", "%s is an input too; choose another name", o->output);
+    if (!stat(o->output, &output) && !S_ISREG(output.st_mode))
+        return spl_fail_field(err, SPL_E_USAGE, "output", "%s exists and is no file", o->output);
     return 0;
 }

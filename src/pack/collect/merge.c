@@ -171,12 +171,6 @@ static json_t *describe(const struct merge *m, const struct spl_merge_of *of)
     return NULL;
 }
 
-static bool is_same_file(const char *path, const struct stat *other)
-{
-    struct stat status;
-    return !stat(path, &status) && status.st_dev == other->st_dev && status.st_ino == other->st_ino;
-}
-
 /* What is read would be gone once the output has taken its place. */
 static int check_output(const struct spl_merge_options *o, const char *beside, const struct spl_dataset *from,
                         struct spl_error *err)
@@ -191,7 +185,7 @@ static int check_output(const struct spl_merge_options *o, const char *beside, c
         return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s exists and is no file", o->output);
     if (spl_dataset_is_remote(from))
         return SPL_OK;
-    bool same = is_same_file(o->collection, &output);
+    bool same = spl_file_is_same(o->collection, o->output);
     if (same)
         return spl_fail_field(err, SPL_E_USAGE, "output",
                               "%.300s is the collection, which is read: choose another name", o->output);
@@ -200,7 +194,7 @@ static int check_output(const struct spl_merge_options *o, const char *beside, c
         char *path = NULL;
         if (asprintf(&path, "%.*s%s", folder, beside, json_string_value(json_object_get(tile, "file"))) < 0)
             return spl_fail(err, SPL_E_NOMEM, "out of memory for the names of tiles");
-        same = is_same_file(path, &output);
+        same = spl_file_is_same(path, o->output);
         free(path);
         if (same)
             return spl_fail_field(err, SPL_E_USAGE, "output",

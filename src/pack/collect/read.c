@@ -196,7 +196,7 @@ int spl_collect_read(struct spl_collect *c, struct spl_collect_tile *tile, struc
     const json_t *meta = spl_dataset_get_meta(dataset);
     if (tile->in_folder && json_object_get(meta, "merged")) {
         spl_dataset_close(dataset);
-        return refuse(c, tile, "a collection made one file (\"merged\"): name it to have it taken", err);
+        return refuse(c, tile, "a collection made one file (\"merged\"), which is taken where it is named", err);
     }
     rc = check(tile, info, err);
     if (!rc && !c->first) {

@@ -2,9 +2,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 #include "dataset/dataset.h"
 #include "pack/collect/collect.h"
@@ -199,14 +199,9 @@ static const char *name_of_input(const void *job, size_t i)
 /* It is written over none of the scans. */
 static int check_output(const struct spl_job *job, const char *output, struct spl_error *err)
 {
-    struct stat status, input;
-    if (!stat(output, &status) && !S_ISREG(status.st_mode))
-        return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s exists and is no file", output);
-    if (!stat(output, &status))
-        for (size_t i = 0; i < job->input_count; i++)
-            if (!stat(job->inputs[i].file, &input) && input.st_dev == status.st_dev && input.st_ino == status.st_ino)
-                return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s is an input too; choose another name",
-                                      output);
+    for (size_t i = 0; i < job->input_count; i++)
+        if (spl_file_is_same(output, job->inputs[i].file))
+            return spl_fail_field(err, SPL_E_USAGE, "output", "%.300s is an input too; choose another name", output);
     return SPL_OK;
 }
 
