@@ -18,7 +18,11 @@ esac
 out=$PWD/build-tests
 mkdir -p "$out"
 passed=0 failed=0 skipped=0
-finish() { echo "$passed passed, $failed failed, $skipped skipped"; [ "$failed" = 0 ]; }
+finish() { # what failed once more, where a log that is cut still has it
+    cat "$out/why.txt"
+    echo "$passed passed, $failed failed, $skipped skipped"
+    [ "$failed" = 0 ]
+}
 
 strict=-Dwerror=true # not with sanitisers: their checks add paths that GCC then warns of
 
@@ -46,7 +50,7 @@ built() {
         sleep 1
     done
     cat "$out/$1.said"
-    [ "$(cat "$out/$1.built")" = yes ] || { failed=$((failed + 1)); return 1; }
+    [ "$(cat "$out/$1.built")" = yes ] || { failed=$((failed + 1)); tail -20 "$out/$1.said" >>"$out/why.txt"; return 1; }
 }
 
 # name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
@@ -58,7 +62,7 @@ suites() {
     rm -f "$log".{json,txt}
     ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" ${but+"${but[@]/#/--no-suite=}"} --print-errorlogs ${only-} \
         --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$1.log" 2>&1 || true
-    told=$(python3 tests/counts.py "$name" "$log.json" "$@")
+    told=$(python3 tests/counts.py "$name" "$log.json" "$out/why.txt" "$@")
     echo "${told%$'\n'*}"
     read -r p f s <<<"${told##*$'\n'}"
     [ "$f" = 0 ] || cat "$out/$name-$1.log"
@@ -79,6 +83,7 @@ deploy/install-packages.sh build run quickstart test
 [ "$mode" != --full ] || deploy/install-packages.sh full
 
 rm -f "$out"/*.built
+: >"$out/why.txt"
 sanitised=(-Ddebug=false -Dc_args=-g1 -Doptimization=1 -Db_lundef=false) # lines are all that their reports show
 leaks=1
 sanitiser_runs address env || leaks=0
@@ -169,7 +174,7 @@ program() {
     if "$@" >"$out/$name.log" 2>&1; then
         passed=$((passed + 1))
     else
-        tail -40 "$out/$name.log"
+        tail -40 "$out/$name.log" | tee -a "$out/why.txt"
         failed=$((failed + 1)) verdict=FAILED
     fi
     printf '%-10s %-8s %s in %d s\n' "$name" "" "$verdict" $((SECONDS - begin))

@@ -5,6 +5,7 @@
  * opened. */
 #include "cmd/cmd.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
@@ -253,6 +254,30 @@ static int make_video(struct arguments *a, const struct spl_dataset *dataset, st
     return rc;
 }
 
+/* The folder, without images of a longer tour, which would be taken for the end of this one. */
+static int make_folder(const struct arguments *a, struct spl_error *err)
+{
+    const char *output = a->drawing.output, *ending = spl_format_name(a->drawing.encode.format);
+    const struct dirent *entry;
+    int rc = SPL_OK;
+    if (!mkdir(output, 0777))
+        return SPL_OK;
+    DIR *folder = errno == EEXIST ? opendir(output) : NULL;
+    if (!folder)
+        return spl_fail_errno(err, errno, "cannot make the folder '%s'", output);
+    while (!rc && (entry = readdir(folder))) {
+        char *end;
+        if (*entry->d_name >= '0' && *entry->d_name <= '9' && strtoull(entry->d_name, &end, 10) >= a->count &&
+            *end == '.' && !strcmp(end + 1, ending))
+            rc = spl_fail(err, SPL_E_USAGE,
+                          "'%s' holds %s, of a longer tour than this one of %zu frames: empty it, or give another "
+                          "folder",
+                          output, entry->d_name, a->count);
+    }
+    closedir(folder);
+    return rc;
+}
+
 static int run(struct arguments *a, struct spl_error *err)
 {
     struct spl_dataset *dataset = NULL;
@@ -268,8 +293,8 @@ static int run(struct arguments *a, struct spl_error *err)
         spl_cmd_warn_clip(&a->drawing.view, dataset);
         spl_cmd_warn_soft(&a->drawing.view, dataset, NULL);
     }
-    if (!rc && !a->video && mkdir(a->drawing.output, 0777) && errno != EEXIST)
-        rc = spl_fail_errno(err, errno, "cannot make the folder '%s'", a->drawing.output);
+    if (!rc && !a->video)
+        rc = make_folder(a, err);
     if (!rc)
         rc = spl_renderer_create(&a->drawing.renderer, &renderer, err);
     if (!rc)

@@ -182,8 +182,15 @@ class Page:
             self.mouse("mousePressed", x, y, button="left", clickCount=count)
             self.mouse("mouseReleased", x, y, button="left", clickCount=count)
 
+    def drawn(self):
+        """Waits for the page's parts and two frames: browsers drop what comes before a page's first picture."""
+        self.run("""(async () => {
+            if (document.readyState !== 'complete') await new Promise(done => addEventListener('load', done));
+            for (let i = 0; i < 2; i++) await new Promise(requestAnimationFrame); })()""")
+
     def press_on(self, selector):
         """A click on an element's middle."""
+        self.drawn()
         x, y = self.run(
             f"(e => {{ e.scrollIntoView({{block: 'center'}}); const b = e.getBoundingClientRect(); "
             f"return [b.x + b.width / 2, b.y + b.height / 2] }})(document.querySelector({json.dumps(selector)}))"

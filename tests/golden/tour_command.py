@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -67,6 +68,13 @@ with tempfile.TemporaryDirectory() as folder:
             "-o", "key.png")
         assert pathlib.Path("key.png").read_bytes() == frames[i], i
     assert len(set(frames)) == 6 and keys[0]["soft_opacity"] == 1 and keys[-1]["soft_opacity"] == 0
+    # five images stay two only where nobody takes the other three for theirs; of other endings any may lie beside them
+    before = {name: pathlib.Path("depth", name).read_bytes() for name in os.listdir("depth")}
+    few = ["--path", "keys.json", "--size", "64x48", "--frames", 2, "-o", "depth"]
+    message = run("tour", "c.spld", *few, "--format", "npy", code=2)
+    assert re.search(r"'depth' holds 00000[234]\.npy, of a longer tour than this one of 2 frames", message), message
+    assert before == {name: pathlib.Path("depth", name).read_bytes() for name in os.listdir("depth")}
+    run("tour", "c.spld", *few, "--format", "jpeg")
     for arguments, said in [
         (["-o", "x"], "--path"), (["--path", "keys.json"], "-o"), (["--path", "nowhere.json", "-o", "x"], "nowhere.json"),
         (["--path", "keys.json", "-o", "x"], "frames or seconds"), (["--path", "keys.json", "--ease", "up", "-o", "x"], "--ease"),

@@ -130,7 +130,7 @@ class Daemon:
             code = self.stop()
         else:
             code = 0 if self.code is not None else self.process.wait() or "0, early"
-        if kind or code:
+        if code or kind not in (None, SystemExit):  # that of run(), whose tests had their say
             sys.stdout.write("".join(self.lines) + f"the daemon's exit code: {code}\n")
         if not kind:
             assert code == 0, f"exit code {code}"
