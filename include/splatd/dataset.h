@@ -132,9 +132,9 @@ static inline const struct spl_stream_values *spl_dataset_info_get_values(const 
 }
 
 /* Opens `path` and checks header, section table and node graph. `verify` also hashes every section (else pages are
- * trusted). Of a dataset whose tables (nodes, headers of chunks: some 0.6 bytes a splat) take more than 64 MiB only the
- * first part is kept; the others are read and checked when they are needed. Errors name the section. On success the
- * caller owns *out. Blocks on disk.
+ * trusted); in a file of more than 1 GiB, pages only when they are read. Of a dataset whose tables (nodes, headers of
+ * chunks: some 0.6 bytes a splat) take more than 64 MiB only the first part is kept; the others are read and checked
+ * when they are needed. Errors name the section. On success the caller owns *out. Blocks on disk.
  * A path that begins with https://, http:// or s3:// is asked of that server (api/remote.md), with the keys of the
  * process's environment: do not pass on paths of strangers. Pages are then held against their checksums when they are
  * read, whatever `verify` says.

@@ -123,7 +123,7 @@ int spl_cmd_info(int argc, char **argv)
         struct spl_error err = {0};
         struct spl_info_report report;
         const struct spl_dataset_opening how = {
-            .verify = !a.no_verify, .tables_bytes = SPL_TABLES_BYTES, .verify_remote = true};
+            .verify = !a.no_verify, .tables_bytes = SPL_TABLES_BYTES, .verify_all = true};
         struct spl_cmd_waiting waiting;
         spl_cmd_waiting_begin(&waiting, argv[i]);
         int rc = spl_dataset_open_as(argv[i], &how, &dataset, &err);

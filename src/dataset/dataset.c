@@ -142,8 +142,8 @@ int spl_dataset_open_whole(const char *path, bool verify, struct spl_dataset **o
         return spl_fail(err, SPL_E_USAGE,
                         "%s: this goes through all of a dataset, and needs it in a file: fetch it first",
                         spl_remote_show(path, shown, sizeof shown));
-    return spl_dataset_open_as(path, &(struct spl_dataset_opening){.verify = verify, .tables_bytes = UINT64_MAX}, out,
-                               err);
+    const struct spl_dataset_opening how = {.verify = verify, .verify_all = true, .tables_bytes = UINT64_MAX};
+    return spl_dataset_open_as(path, &how, out, err);
 }
 
 int spl_dataset_open_source(const struct spl_dataset_source *source, const char *name, bool verify,
@@ -168,7 +168,8 @@ int spl_dataset_open_source_as(const struct spl_dataset_source *source, const ch
     dataset->cancelled = how->cancelled;
     dataset->source = *source;
     dataset->remote = source->far;
-    dataset->lazily = source->far && !(how->verify && how->verify_remote);
+    dataset->lazily = !(how->verify && how->verify_all) &&
+                      (source->far || (how->verify && source->size > SPL_VERIFY_AT_OPEN_MAX));
     dataset->tables_limit = how->tables_bytes;
     dataset->how = how;
     dataset->info.file_bytes = source->size;

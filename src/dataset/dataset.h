@@ -47,7 +47,7 @@ struct spl_dataset_opening {
     const atomic_bool *cancelled; // may be NULL; as of spl_dataset_open_until()
     struct spl_page_cache *page_cache; // may be NULL; of what comes from servers
     uint64_t remote_deadline_ms;       /* how long a server is asked in vain; 0 = as long as remote.h says */
-    bool verify_remote;                /* with `verify`: also of a server all is read at first */
+    bool verify_all;                   /* with `verify`: also of a server or a large file all is read at first */
     enum spl_file_kind *kind; // may be NULL; zero before; what the file is, after a failure too
     const char *beside; /* where tiles of a collection lie: beside this path; set by open_as(); NULL = nowhere */
     struct spl_expected *expected; // may be NULL; of a tile
@@ -55,9 +55,12 @@ struct spl_dataset_opening {
     _Atomic uint64_t *moved_ns; // may be NULL; what from a server comes is noted there too; borrowed until close
 };
 
-/* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless
- * `verify_remote`, and each part is held against its checksum when it is read, whatever `verify` says. */
+/* Bytes. A larger file is opened without reading all of it, which would take a second and more. */
+#define SPL_VERIFY_AT_OPEN_MAX (1ull << 30)
 
+/* `path` may be a URL (remote_url.h). Of such a dataset nothing but what describes it is read at first, unless
+ * `verify_all`, and each part is held against its checksum when it is read, whatever `verify` says. So it is, with
+ * `verify`, of files of more than SPL_VERIFY_AT_OPEN_MAX bytes. */
 int spl_dataset_open_as(const char *path, const struct spl_dataset_opening *how, struct spl_dataset **out,
                         struct spl_error *err);
 

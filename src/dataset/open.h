@@ -40,7 +40,7 @@ struct spl_dataset {
     struct spl_tiles *tiles; // of a collection (tiles.h); NULL = it is none
     bool verified;                /* every page had its checksum when it was opened, or has it when it is read */
     bool remote;                  /* what is wrong may have come so, and is asked for once more */
-    bool lazily;                  /* it is remote, and what is large is held against checksums when it is read alone */
+    bool lazily; /* remote or large: pages and textures are held against checksums when they are read alone */
     bool opened;                  /* all is checked; what is read from here on is read while in use */
     struct spl_section *sections;
     uint32_t section_count;

@@ -47,6 +47,9 @@ int spl_dataset_fail_checksum(const struct spl_dataset *dataset, const char *wha
                     dataset->remote
                         ? "%s: %s %u fails its checksum, fetched twice: it is damaged at its server; upload the "
                           "dataset again under another name"
+                    : dataset->lazily
+                        ? "%s: %s %u fails its checksum: it is damaged, or was overwritten while in use; put the "
+                          "dataset back under another name and rename it"
                         : "%s: %s %u was overwritten while in use; put the dataset back under another name "
                           "and rename it",
                     spl_dataset_get_name(dataset), what, index);

@@ -173,12 +173,13 @@ struct there {
 static int look_at_dataset(const struct spl_job *job, uint32_t number, const char *path,
                            const struct spl_pack_options *o, struct there *there, struct spl_error *err)
 {
+    const struct spl_dataset_opening how = {.verify = true, .verify_all = true, .tables_bytes = SPL_TABLES_BYTES};
     struct spl_dataset *dataset = NULL;
     struct spl_error why = {0};
     bool older = false;
     if (access(path, F_OK))
         return SPL_OK;
-    int rc = spl_dataset_open(path, true, &dataset, &why);
+    int rc = spl_dataset_open_as(path, &how, &dataset, &why);
     if (rc == SPL_E_INPUT || rc == SPL_E_CORRUPT) {
         there->replace = true;
         spl_pack_warn(o->warn, o->progress_context, "%.300s: it is broken, and packed anew: %.300s", path, why.message);

@@ -96,7 +96,7 @@ static void run_step(uv_work_t *work)
     struct spl_incoming *incoming = &change->incoming;
     struct spl_error *err = &change->err;
     struct spl_dataset_opening how = spl_library_get_opening(change->service);
-    how.verify = true; // whatever the operator says: it comes from outside
+    how.verify = how.verify_all = true; // whatever the operator says: it comes from outside
     switch (change->step) {
     case SPL_CHANGE_APPEND:
     case SPL_CHANGE_CHECK:

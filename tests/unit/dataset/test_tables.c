@@ -287,6 +287,65 @@ static void a_head_that_changes_is_refused(void **state)
     free(raw.data);
 }
 
+static void flip_bit(int fd, uint64_t at)
+{
+    char byte;
+    assert_int_equal(pread(fd, &byte, 1, (off_t)at), 1);
+    byte ^= 1;
+    assert_int_equal(pwrite(fd, &byte, 1, (off_t)at), 1);
+}
+
+/* Its section table lies behind a hole, so that it takes no room on the disk. What is damaged is refused when it is
+ * read, and before where all of it is to be verified. */
+static void a_large_file_is_verified_as_it_is_read(void **state)
+{
+    (void)state;
+    enum { broken = 5 };
+    const struct spl_dataset_opening all = {.verify = true, .verify_all = true, .tables_bytes = 0};
+    struct raw raw = load_raw();
+    struct spl_file_header *header = (void *)raw.data;
+    const size_t table_bytes = header->section_count * sizeof(struct spl_section);
+    const uint64_t page_at = find(&raw, SPL_SECTION_PAGE, broken)->offset,
+                   head_at = find(&raw, SPL_SECTION_HEAD, broken)->offset;
+    void *table = raw.data + header->table_offset;
+    const int fd = open(path, O_RDWR);
+    header->table_offset = SPL_VERIFY_AT_OPEN_MAX;
+    header->file_bytes = header->table_offset + table_bytes;
+    header->header_hash = XXH3_64bits(header, offsetof(struct spl_file_header, header_hash));
+    assert_int_equal(pwrite(fd, table, table_bytes, (off_t)header->table_offset), table_bytes);
+    assert_int_equal(pwrite(fd, header, sizeof *header, 0), sizeof *header);
+
+    struct spl_dataset *dataset = open_good(0), *refused;
+    struct spl_error err = {0};
+    struct spl_tables *read;
+    uint32_t *words = malloc(SPL_PAGE_BYTES_MAX);
+    assert_int_equal(spl_dataset_read_page(dataset, broken, words, NULL), 0);
+    spl_dataset_close(dataset);
+    flip_bit(fd, page_at);
+    dataset = open_good(0);
+    assert_int_equal(spl_dataset_read_page(dataset, broken, words, &err), SPL_E_CORRUPT);
+    assert_non_null(strstr(err.message, "tree: page 5 fails its checksum: it is damaged, or was overwritten"));
+    assert_int_equal(spl_dataset_read_page(dataset, broken - 1, words, NULL), 0);
+    err = (struct spl_error){0};
+    assert_int_equal(spl_dataset_open_as(path, &all, &refused, &err), SPL_E_CORRUPT);
+    assert_non_null(strstr(err.message, "section PAGE 5 fails its checksum"));
+    assert_int_equal(spl_dataset_open_whole(path, true, &refused, NULL), SPL_E_CORRUPT);
+    flip_bit(fd, page_at);
+    assert_int_equal(spl_dataset_read_page(dataset, broken, words, NULL), 0);
+    spl_dataset_close(dataset);
+    flip_bit(fd, head_at);
+    dataset = open_good(0);
+    err = (struct spl_error){0};
+    assert_null(spl_dataset_borrow_tables(dataset, broken, &read, &err));
+    assert_non_null(strstr(err.message, "tree: section HEAD 5 fails its checksum"));
+    assert_int_equal(spl_dataset_open_as(path, &all, &refused, NULL), SPL_E_CORRUPT);
+    spl_dataset_close(dataset);
+    close(fd);
+    free(words);
+    make_tree_file(path, points, page_bytes);
+    free(raw.data);
+}
+
 static void refused_memory_is_an_error(void **state)
 {
     (void)state;
@@ -322,7 +381,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(by_page_they_are_the_same),     cmocka_unit_test(all_are_kept_where_they_fit),
         cmocka_unit_test(splats_are_found_by_id),        cmocka_unit_test(a_head_is_held_against_its_row),
-        cmocka_unit_test(a_head_that_changes_is_refused), cmocka_unit_test(refused_memory_is_an_error),
+        cmocka_unit_test(a_head_that_changes_is_refused), cmocka_unit_test(a_large_file_is_verified_as_it_is_read),
+        cmocka_unit_test(refused_memory_is_an_error),
     };
     make_folder(folder);
     snprintf(path, sizeof path, "%s/tree.spld", folder);
