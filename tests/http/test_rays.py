@@ -233,7 +233,7 @@ def test_who_dawdles_keeps_no_place_of_long_lists():
             raise AssertionError("nobody's place was given up")
         steady.sendall(body[i + 100000:])
         assert b" 200 " in steady.recv(4096).split(b"\r\n")[0]
-        told = [sock for sock in silent if select.select([sock], [], [], 0)[0]]
+        told = select.select(silent, [], [], 30)[0]
         assert len(told) == 1 and b" 408 " in told[0].recv(4096).split(b"\r\n")[0], told
         for sock in silent:
             sock.close()
