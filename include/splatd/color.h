@@ -11,6 +11,8 @@
 #include <splatd/dataset.h>
 #include <splatd/error.h>
 
+struct spl_view; /* <splatd/render.h> */
+
 SPL_BEGIN_DECLARATIONS
 
 /* How what is solid is shaded, once it is drawn: any of these together, or none. */
@@ -82,9 +84,8 @@ SPL_API int spl_color_print(const struct spl_color_params *color, char *text, si
 /* Is all of it in range? SPL_E_USAGE names the field. */
 SPL_API int spl_color_check(const struct spl_color_params *color, struct spl_error *err);
 
-/* The kinds that a view of the dataset in these colours is shaded by, without NONE: 0 = none. */
-SPL_API uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
-                               const struct spl_dataset_info *dataset);
+/* The kinds that the colours of a view of the dataset are shaded by, without NONE: 0 = none. */
+SPL_API uint32_t spl_shade_for(const struct spl_view *view, const struct spl_dataset_info *dataset);
 
 SPL_END_DECLARATIONS
 

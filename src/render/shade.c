@@ -7,6 +7,7 @@
 
 #include "base/decimal.h"
 #include "base/error.h"
+#include "render/select.h"
 
 enum { radius_most = 5 };
 
@@ -105,19 +106,20 @@ int spl_shade_check(const struct spl_shade_params *shade, struct spl_error *err)
 }
 
 /* What colours tell of shape: that of nothing, where all is of one; little, where each class has its own. */
-static uint32_t find_missing(const struct spl_color_params *color, const struct spl_dataset_info *dataset)
+static uint32_t find_missing(const struct spl_view *view, const struct spl_dataset_info *dataset)
 {
-    const bool one = color->by == SPL_COLOR_BY_FLAT || (color->by == SPL_COLOR_BY_RGB && !dataset->has_color);
+    const struct spl_color_params *color = &view->color;
+    const bool own = color->by == SPL_COLOR_BY_RGB, mapped = own && dataset->maps && spl_view_get_maps(view),
+               colored = dataset->has_color || mapped, one = color->by == SPL_COLOR_BY_FLAT || (own && !colored);
     if (one && dataset->has_surface)
         return SPL_SHADE_EDL | SPL_SHADE_HEADLIGHT;
     const bool classes = color->by == SPL_COLOR_BY_ATTRIBUTE && !strcmp(color->name, "class");
-    return one || !dataset->has_color || (classes && !color->rgb) ? SPL_SHADE_EDL : 0;
+    return one || !colored || (classes && !color->rgb) ? SPL_SHADE_EDL : 0;
 }
 
-uint32_t spl_shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
-                       const struct spl_dataset_info *dataset)
+uint32_t spl_shade_for(const struct spl_view *view, const struct spl_dataset_info *dataset)
 {
-    if (!shade->kinds)
-        return find_missing(color, dataset);
-    return shade->kinds & ~(uint32_t)SPL_SHADE_NONE;
+    if (!view->shade.kinds)
+        return find_missing(view, dataset);
+    return view->shade.kinds & ~(uint32_t)SPL_SHADE_NONE;
 }

@@ -9,7 +9,7 @@
 
 uint32_t spl_shade_get_kinds(const struct spl_view *view, const struct spl_dataset_info *info)
 {
-    return view->layers >> SPL_LAYER_COLOR & 1 ? spl_shade_for(&view->shade, &view->color, info) : 0;
+    return view->layers >> SPL_LAYER_COLOR & 1 ? spl_shade_for(view, info) : 0;
 }
 
 uint32_t spl_tile_get_shades(const struct spl_tile *tile)

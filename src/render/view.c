@@ -247,7 +247,7 @@ int spl_view_check_layers(const struct spl_view *view, const struct spl_dataset_
 int spl_view_check_colors(const struct spl_view *view, const struct spl_dataset_info *info, struct spl_error *err)
 {
     struct spl_paint paint;
-    const uint32_t lit = spl_shade_for(&view->shade, &view->color, info) & (SPL_SHADE_HEADLIGHT | SPL_SHADE_SUN);
+    const uint32_t lit = spl_shade_for(view, info) & (SPL_SHADE_HEADLIGHT | SPL_SHADE_SUN);
     if (lit && view->layers >> SPL_LAYER_COLOR & 1 && !spl_method_has_normals(view->method, info))
         return refuse_normals(info, "shade", err);
     int rc = spl_paint_init(&paint, &view->color, info, err);

@@ -85,6 +85,8 @@ def test_a_legend_says_what_colours_mean():
         assert texts("color_by=class&range=0..200") == ["class", "0", "50", "100", "150", "200"]
         assert texts("color_by=height&range=-1..1&ramp=grey")[1:] == ["-1", "-0.5", "0", "0.5", "1"]
         assert texts("color_by=height&range=1.23456..9.87654")[1:] == ["1.2346", "5.5556", "9.8765"]  # more would touch
+        assert texts("color_by=height&range=500000..500010")[1:] == ["500000", "500005", "500010"]
+        assert texts("color_by=height&range=1714564800..1714564801")[1:] == ["1714564800", "1714564801"]  # seconds of a day
         assert texts("color_by=height")[0].startswith("height (")
         assert texts("color_by=class")[0] == "class" and len(texts("color_by=class")) > 1
         assert texts("color_by=normal") == ["normal", "x", "y", "z"]

@@ -13,7 +13,7 @@
 #include "service/request/values.h"
 
 enum { width = 280, margin = 12, bar = 18, row = 20, title = 22, ticks = 5, text_room = 5 };
-enum { stops = 17, kinds_most = 32 };
+enum { stops = 17, kinds_most = 32, digits_least = 5, digits_most = 15 };
 
 static void begin(FILE *out, const char *name, const char *unit, int height)
 {
@@ -37,6 +37,13 @@ static void print_color(FILE *out, uint32_t color)
     fprintf(out, "#%02x%02x%02x", color & 255, color >> 8 & 255, color >> 16 & 255);
 }
 
+/* As many as tell values apart: large ones close to each other have more, as coordinates and times have. */
+static int digits_of(double low, double high)
+{
+    const double most = fmax(fabs(low), fabs(high)), step = (high - low) / (ticks - 1);
+    return step > 0 && most > 0 ? (int)fmin(fmax(ceil(log10(most / step)) + 2, digits_least), digits_most) : digits_least;
+}
+
 static void draw_ramp(FILE *out, const struct spl_paint *paint)
 {
     fprintf(out, "<defs><linearGradient id=\"ramp\">");
@@ -49,13 +56,15 @@ static void draw_ramp(FILE *out, const struct spl_paint *paint)
             margin, title + 4, width - 2 * margin, bar);
     char texts[ticks][32];
     size_t longest = 0;
+    const int digits = digits_of(paint->low, paint->high);
     for (int i = 0; i < ticks; i++) {
         const double share = i / (double)(ticks - 1);
-        snprintf(texts[i], sizeof texts[i], "%.5g", paint->low + share * (paint->high - paint->low));
+        snprintf(texts[i], sizeof texts[i], "%.*g", digits, paint->low + share * (paint->high - paint->low));
         if (strlen(texts[i]) > longest)
             longest = strlen(texts[i]);
     }
-    for (int i = 0; i < ticks; i += longest > text_room ? 2 : 1) // every second one where they would touch
+    const int step = longest <= text_room ? 1 : longest <= 2 * text_room ? 2 : ticks - 1; // others would touch
+    for (int i = 0; i < ticks; i += step)
         fprintf(out, "<text x=\"%g\" y=\"%d\" text-anchor=\"%s\">%s</text>\n",
                 margin + i * (width - 2 * margin) / (double)(ticks - 1), title + 4 + bar + 15,
                 !i ? "start" : i == ticks - 1 ? "end" : "middle", texts[i]);

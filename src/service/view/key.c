@@ -153,7 +153,7 @@ struct spl_key spl_key_make(const struct spl_view_request *request, const struct
     add_number(&form, view->lod);
     add_number(&form, view->supersample);
     bool colored = view->layers >> SPL_LAYER_COLOR & 1;
-    const uint32_t shades = colored && !request->picks ? spl_shade_for(&view->shade, &view->color, dataset) : 0;
+    const uint32_t shades = colored && !request->picks ? spl_shade_for(view, dataset) : 0;
     const bool painted = colored && !request->picks && view->color.by != SPL_COLOR_BY_RGB;
     uint32_t params = spl_method_get_params(view->method);
     for (int i = 0; i < SPL_PARAM_COUNT; i++) {

@@ -69,11 +69,18 @@ static void test_shading_that_is_none_is_refused(void **state)
     assert_string_equal(err.field, "edl_strength");
 }
 
+static uint32_t shade_for(const struct spl_shade_params *shade, const struct spl_color_params *color,
+                          const struct spl_dataset_info *info)
+{
+    return spl_shade_for(&(struct spl_view){.shade = *shade, .color = *color}, info);
+}
+
 static void test_what_is_shaded_by_itself(void **state)
 {
     (void)state;
     struct spl_dataset_info plain = {.has_color = false}, colored = {.has_color = true};
-    struct spl_dataset_info grey = {.has_surface = true}, scan = {.has_color = true, .has_surface = true};
+    struct spl_dataset_info grey = {.has_surface = true}, scan = {.has_color = true, .has_surface = true},
+                            mapped = {.has_surface = true, .maps = 2};
     const struct spl_shade_params by_itself = {0}, none = {.kinds = SPL_SHADE_NONE},
                                   lit = {.kinds = SPL_SHADE_HEADLIGHT};
     static const struct {
@@ -87,13 +94,20 @@ static void test_what_is_shaded_by_itself(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_color_params color = {0};
         assert_int_equal(spl_color_parse(rows[i].color, &color, NULL), SPL_OK);
-        assert_int_equal(spl_shade_for(&by_itself, &color, &plain), SPL_SHADE_EDL);
-        assert_int_equal(spl_shade_for(&by_itself, &color, &colored), rows[i].even ? SPL_SHADE_EDL : 0);
-        assert_int_equal(spl_shade_for(&by_itself, &color, &grey), rows[i].one ? both : SPL_SHADE_EDL);
-        assert_int_equal(spl_shade_for(&by_itself, &color, &scan),
+        assert_int_equal(shade_for(&by_itself, &color, &plain), SPL_SHADE_EDL);
+        assert_int_equal(shade_for(&by_itself, &color, &colored), rows[i].even ? SPL_SHADE_EDL : 0);
+        assert_int_equal(shade_for(&by_itself, &color, &grey), rows[i].one ? both : SPL_SHADE_EDL);
+        assert_int_equal(shade_for(&by_itself, &color, &scan),
                          rows[i].even && rows[i].one ? both : rows[i].even ? SPL_SHADE_EDL : 0);
-        assert_int_equal(spl_shade_for(&none, &color, &plain), 0);
-        assert_int_equal(spl_shade_for(&lit, &color, &plain), SPL_SHADE_HEADLIGHT);
+        assert_int_equal(shade_for(&none, &color, &plain), 0);
+        assert_int_equal(shade_for(&lit, &color, &plain), SPL_SHADE_HEADLIGHT);
+        struct spl_view view = {.color = color, .method = SPL_METHOD_SPLAT};
+        assert_int_equal(view.maps, SPL_MAPS_ON); // photographs are colours, where they are drawn
+        assert_int_equal(spl_shade_for(&view, &mapped), rows[i].one && rows[i].even ? both : rows[i].one ? 0 : SPL_SHADE_EDL);
+        view.maps = SPL_MAPS_OFF;
+        assert_int_equal(spl_shade_for(&view, &mapped), rows[i].one ? both : SPL_SHADE_EDL);
+        view = (struct spl_view){.color = color, .method = SPL_METHOD_POINTS};
+        assert_int_equal(spl_shade_for(&view, &mapped), rows[i].one ? both : SPL_SHADE_EDL);
     }
 }
 
