@@ -57,7 +57,7 @@ static const struct spl_cmd_option options[] = {
     {"path", "FILE", "JSON, a TUM text, or the folder of a COLMAP model, binary or text",
      SPL_CMD_TEXT(struct arguments, path)},
     {"frames", "N", "how many, or --seconds", SPL_CMD_COUNT(struct arguments, frames, 1, SPL_CAMERA_PATH_MAX)},
-    {"seconds", "S", "how long; without both every camera of the path is a frame",
+    {"seconds", "S", "how long; without both keyframes have their times, and of other paths every camera is a frame",
      SPL_CMD_REAL(struct arguments, seconds, 1e-3, 86400)},
     {"fps", "F", "frames a second", .otherwise = "the path's own, or 30",
      SPL_CMD_REAL(struct arguments, fps, 1e-3, 1000)},

@@ -23,13 +23,7 @@ static const struct {
 #undef PARAM
 };
 
-/* All names, each with two more characters: room for any list of them. */
-enum {
-    NAMES_SIZE = 1
-#define PARAM(name, alias, kind, places, help) +sizeof(#name ", ")
-#include "geom/camera_params.def"
-#undef PARAM
-};
+enum { NAMES_SIZE = 400 }; /* of a list in a message */
 
 int spl_value_claim(struct spl_value *value, const char *name, struct spl_error *err)
 {
@@ -149,7 +143,16 @@ void spl_camera_locate(const json_t *view, struct spl_error *why)
         strcpy(why->field, field);
 }
 
-static int find(const char *name, enum spl_value_place place, struct spl_error *err)
+static void add_name(char known[NAMES_SIZE], const char *name)
+{
+    const size_t length = strlen(known);
+    if (length + strlen(name) + sizeof ", , …" <= NAMES_SIZE)
+        snprintf(known + length, NAMES_SIZE - length, "%s%s", length ? ", " : "", name);
+    else if (!strstr(known, "…"))
+        snprintf(known + length, NAMES_SIZE - length, ", …");
+}
+
+static int find(const char *name, enum spl_value_place place, const char *const *others, struct spl_error *err)
 {
     for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
         if (!strcmp(name, params[i].name) && (params[i].places & place))
@@ -157,9 +160,11 @@ static int find(const char *name, enum spl_value_place place, struct spl_error *
         else if (!strcmp(name, params[i].name))
             return spl_fail_field(err, SPL_E_INPUT, name, "'%s' belongs into the \"camera\" object", name);
     char known[NAMES_SIZE] = "";
+    for (; *others; others++)
+        add_name(known, *others);
     for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
         if (params[i].places & place)
-            strcat(strcat(known, *known ? ", " : ""), params[i].name);
+            add_name(known, params[i].name);
     return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s; known are %s", name,
                           place == SPL_CAMERA ? "camera" : "view", known);
 }
@@ -181,7 +186,7 @@ static int collect(struct spl_value values[SPL_CAMERA_PARAMS], json_t *object, e
         int param, rc;
         if (among(name, others))
             continue;
-        if ((param = find(name, place, err)) < 0)
+        if ((param = find(name, place, others, err)) < 0)
             return param;
         if ((rc = spl_value_claim(&values[param], name, err)) ||
             (rc = params[param].kind == SPL_KIND_FORM
