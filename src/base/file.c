@@ -66,6 +66,8 @@ int spl_file_sync_folder(const char *path)
     if (!folder)
         return -1;
     int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC), rc = fd < 0 ? -1 : fsync(fd), why = errno;
+    if (fd >= 0 && rc && why == EINVAL)
+        rc = 0;
     if (fd >= 0)
         close(fd);
     free(folder);

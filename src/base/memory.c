@@ -3,6 +3,7 @@
 
 #include <ctype.h>
 #include <errno.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -46,6 +47,27 @@ void *spl_realloc(void *old, size_t count, size_t size, struct spl_error *err)
     size_t bytes = count * size;
     void *p = injected() ? NULL : realloc(old, bytes ? bytes : 1);
     return p ? p : refuse(count, size, err);
+}
+
+static void *free_it(void *memory)
+{
+    free(memory);
+    return NULL;
+}
+
+void spl_free_aside(void *memory, size_t bytes)
+{
+    enum { slow_bytes = 16 << 20 }; /* more than a millisecond */
+    pthread_attr_t detached;
+    pthread_t thread;
+    if (bytes < slow_bytes || pthread_attr_init(&detached)) {
+        free(memory);
+        return;
+    }
+    pthread_attr_setdetachstate(&detached, PTHREAD_CREATE_DETACHED);
+    if (pthread_create(&thread, &detached, free_it, memory))
+        free(memory);
+    pthread_attr_destroy(&detached);
 }
 
 bool spl_bytes_from_text(const char *text, uint64_t unit, uint64_t *out)

@@ -124,7 +124,6 @@ static int plan(const struct spl_cmd_pack *a, struct spl_cmd_pack_listener *list
     const struct spl_plan_options options = {.pack = a->pack, .parts = a->plan, .halo = a->halo};
     struct spl_job job;
     bool unchanged = false;
-    spl_cmd_ignore_limits();
     int rc = spl_job_plan(&options, &job, &unchanged, err);
     spl_cmd_progress_finish(&listener->progress);
     if (rc)

@@ -165,7 +165,6 @@ int spl_cmd_pack_run_parts(struct spl_cmd_pack *a, struct spl_cmd_pack_listener 
     if (!rc)
         rc = spl_job_lock(folder, &lock, err);
     a->pack.progress_context = &parts;
-    spl_cmd_ignore_limits();
     if (!rc) {
         rc = run(a, folder, &parts, err);
         close(lock);

@@ -18,11 +18,6 @@ static void remove_all(int signal_number)
     raise(signal_number);
 }
 
-void spl_cmd_ignore_limits(void)
-{
-    signal(SIGXFSZ, SIG_IGN); /* a file at its limit is an error like a full disk */
-}
-
 void spl_cmd_remove_unfinished(const char *path)
 {
     size_t length = strlen(path);
@@ -36,5 +31,4 @@ void spl_cmd_remove_unfinished(const char *path)
     sigaction(SIGTERM, &action, NULL);
     sigaction(SIGHUP, &action, NULL);
     sigaction(SIGPIPE, &action, NULL); /* of who reads the progress */
-    spl_cmd_ignore_limits();
 }

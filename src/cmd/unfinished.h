@@ -3,11 +3,8 @@
 #define SPL_CMD_UNFINISHED_H
 
 /* Has the file at `path` removed where SIGINT, SIGTERM, SIGHUP or SIGPIPE ends the command; the signal still ends it.
- * Of at most 5 files, named before the work begins; one with a name too long for a path is left out. A file at the
- * limit of its size is an error like a full disk from then on. Copies `path`. Call from the main thread alone. */
+ * Of at most 5 files, named before the work begins; one with a name too long for a path is left out. Copies `path`.
+ * Call from the main thread alone. */
 void spl_cmd_remove_unfinished(const char *path);
-
-/* What remove_unfinished() does too: a file that grows beyond what the process may write fails as on a full disk. */
-void spl_cmd_ignore_limits(void);
 
 #endif

@@ -50,11 +50,16 @@ void spl_reply_text(struct request *request, const char *type, char *body)
     set_text(request, MHD_HTTP_OK, type, body);
 }
 
-void spl_reply_json(struct request *request, json_t *json)
+char *spl_json_print(json_t *json)
 {
     char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
     json_decref(json);
-    set_text(request, MHD_HTTP_OK, "application/json", text);
+    return text;
+}
+
+void spl_reply_json(struct request *request, json_t *json)
+{
+    set_text(request, MHD_HTTP_OK, "application/json", spl_json_print(json));
 }
 
 /* Text that came from outside, as JSON: jansson refuses what is not UTF-8. */

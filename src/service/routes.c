@@ -48,20 +48,6 @@ static void index_page(struct request *request, const struct spl_call *call)
         MHD_add_response_header(request->response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT);
 }
 
-static void list_datasets(struct request *request, const struct spl_call *call)
-{
-    (void)call;
-    const struct spl_catalog *catalog = &request->service->library->catalog;
-    json_t *list = json_array();
-    for (size_t i = 0; i < catalog->count; i++)
-        if (spl_access_may_see(request, catalog->slots[i].id))
-            json_array_append_new(list, spl_describe_slot(&catalog->slots[i]));
-    json_t *json = json_pack("{s:o}", "datasets", list);
-    if (catalog->left_out)
-        json_object_set_new(json, "left_out", json_integer((json_int_t)catalog->left_out));
-    spl_reply_json(request, json);
-}
-
 static void show_status(struct request *request, const struct spl_call *call)
 {
     (void)call;
@@ -86,7 +72,7 @@ static const struct route {
     {"/v1/openapi.json", GET, SPL_SCOPE_NONE, false, spl_show_openapi_json},
     {"/v1/methods", GET, SPL_SCOPE_NONE, false, spl_show_methods},
     {"/v1/status", GET, SPL_SCOPE_VIEW, false, show_status},
-    {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, list_datasets},
+    {"/v1/datasets", GET, SPL_SCOPE_VIEW, false, spl_list_datasets},
     {"/v1/datasets/{id}", GET, SPL_SCOPE_VIEW, true, spl_show_dataset},
     {"/v1/datasets/{id}", PUT, SPL_SCOPE_ADMIN, false, spl_put_dataset}, // called before the body
     {"/v1/datasets/{id}", DELETE, SPL_SCOPE_ADMIN, false, spl_delete_dataset},

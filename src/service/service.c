@@ -312,6 +312,7 @@ done:
     spl_tours_stop(service->tours);
     spl_library_stop(service);
     spl_page_cache_let_go(service->library->page_cache);
+    spl_listing_finish(&service->library->listing);
     spl_catalog_finish(&service->library->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_views_finish(service);
     spl_access_finish(service);

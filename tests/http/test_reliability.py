@@ -11,6 +11,7 @@ import select
 import shutil
 import socket
 import struct
+import subprocess
 import tempfile
 import threading
 import time
@@ -149,6 +150,48 @@ def test_bodies_on_their_way_have_memory_together():
         for s in held:
             s.close()
         eventually(lambda: all_are_taken(d))
+
+
+def resident_kb(d):
+    with open(f"/proc/{d.process.pid}/status") as file:
+        return int(re.search(r"VmRSS:\s*(\d+)", file.read())[1])
+
+
+def las(wkt):
+    """A scan of four points, version 1.4, whose coordinate system is described at length."""
+    points = b"".join(struct.pack("<3iH4BhHd", x, y, 0, 0, 17, 0, 2, 0, 0, 0, 0) for x in (0, 100) for y in (0, 100))
+    record = struct.pack("<H16sHH32s", 0, b"LASF_Projection", 2112, len(wkt), b"") + wkt
+    begin = struct.pack("<4sHH16s2B32s32sHHHIIBHI5I", b"LASF", 0, 16, b"", 1, 4, b"", b"", 1, 2026, 375, 375 + len(record), 1, 6, 30, 0, *[0] * 5)
+    bounds = struct.pack("<12d", .01, .01, .01, 0, 0, 0, 1, 0, 1, 0, 0, 0)
+    return begin + bounds + struct.pack("<QQI16Q", 0, 0, 0, 4, 4, *[0] * 14) + record + points
+
+
+def test_what_all_are_told_is_held_once():
+    """60 clients that ask what there is, 200 datasets that have much to say, and read nothing of it."""
+    utm = (b'PROJCS["' + b"site " * 6000 + b'",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
+           b'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",9],'
+           b'PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]]')
+    with tempfile.TemporaryDirectory() as folder:
+        with open(f"{folder}/scan.las", "wb") as file:
+            file.write(las(utm))
+        subprocess.run([REAL, "pack", f"{folder}/scan.las", "-o", f"{folder}/tile-0.spld"], check=True, capture_output=True)
+        for i in range(1, 200):
+            os.link(f"{folder}/tile-0.spld", f"{folder}/tile-{i}.spld")
+        with Daemon(FAKE, datasets=[folder]) as d:
+            whole, held = d.ask("/v1/datasets").body, []
+            assert len(json.loads(whole)["datasets"]) == 200 and len(whole) > 6e6, len(whole)
+            before = resident_kb(d)
+            for _ in range(60):
+                held.append(socket.socket())
+                held[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+                held[-1].connect(("127.0.0.1", d.port))
+                held[-1].sendall(b"GET /v1/datasets HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            eventually(lambda: d.status()["connections"] > 60)
+            assert SANITIZED or resident_kb(d) - before < 60000, (resident_kb(d), before)  # 360 MB in copies
+            got = b"".join(iter(lambda: held[0].recv(1 << 20), b""))
+            assert got.startswith(b"HTTP/1.1 200 ") and got.endswith(b"\r\n\r\n" + whole), got[:500]
+            for s in held:
+                s.close()
 
 
 def test_a_clock_that_jumps():

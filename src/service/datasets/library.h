@@ -14,6 +14,14 @@
 struct spl_service;
 struct request;
 struct spl_call;
+struct spl_token;
+
+/* The last text of GET /v1/datasets (list_route.c). */
+struct spl_listing {
+    struct spl_listed *last;         // may be NULL
+    uint64_t turn;                   /* of libmicrohttpd, in which it was made */
+    const struct spl_token *seen_by; // may be NULL; what those show who see what it has; compared alone
+};
 
 struct spl_library {
     struct spl_catalog catalog;  /* empty while `loading` */
@@ -29,6 +37,7 @@ struct spl_library {
     atomic_bool cancelled;       /* what is being opened is given up; read by every thread that opens */
     uint64_t looks;              /* so far */
     struct spl_error last;       /* of the last look, so that it is logged once */
+    struct spl_listing listing;
     LIST_HEAD(, change) changes; /* of clients, in progress */
     uint64_t changes_made;       /* a look that began before one of them says nothing */
 };
@@ -67,6 +76,8 @@ void spl_saving_abandon(struct spl_saving *saving); /* its request no longer wai
 
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
+void spl_list_datasets(struct request *request, const struct spl_call *call);
+void spl_listing_finish(struct spl_listing *listing); /* idempotent */
 void spl_show_legend(struct request *request, const struct spl_call *call);
 
 /* describe.c: new references; NULL without memory. */

@@ -208,11 +208,11 @@ int spl_stored_remove(const char *path, struct spl_error *err)
         free(profile);
         return SPL_E_NOMEM;
     }
-    int rc = unlink(path) && errno != ENOENT ? spl_fail_errno(err, errno, "cannot remove the dataset's file") : 0;
-    if (!rc) {
-        unlink(profile);
-        unlink(views);
-    }
+    const char *const names[] = {views, profile, path}; // the next dataset of this name inherits neither
+    int rc = 0;
+    for (size_t i = 0; i < sizeof names / sizeof *names && !rc; i++)
+        if (unlink(names[i]) && errno != ENOENT)
+            rc = spl_fail_errno(err, errno, "cannot remove the dataset's file");
     if (!rc && spl_file_sync_folder(path))
         rc = spl_fail_errno(err, errno, "cannot sync the folder of the dataset's file");
     free(profile);

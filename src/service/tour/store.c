@@ -28,10 +28,16 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
         return spl_fail(err, SPL_E_USAGE, "the path of the tours' folder is too long");
     char *slash = strrchr(path, '/');
     *slash = '\0';
-    if (mkdir(path, 0777) && errno != EEXIST)
+    const bool made = !mkdir(path, 0777);
+    if (!made && errno != EEXIST)
         return spl_fail_errno(err, errno, "%s: cannot be made", path);
+    if (made && spl_file_sync_folder(path))
+        return spl_fail_errno(err, errno, "%s: its folder cannot be synced", path);
     *slash = '/';
-    return spl_file_replace(path, bytes, length, err);
+    int rc = spl_file_replace(path, bytes, length, err);
+    if (!rc && spl_file_sync_folder(path))
+        rc = spl_fail_errno(err, errno, "the folder of %s cannot be synced", path);
+    return rc;
 }
 
 int spl_tour_file_open(const char *directory, const char *name, const char *file, struct spl_tour_file *out,

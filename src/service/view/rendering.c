@@ -106,7 +106,7 @@ void spl_rendering_unref(struct spl_rendering *rendering)
         return;
     spl_assert(!rendering->cached);
     *rendering->account -= rendering->bytes;
-    spl_encoded_finish(&rendering->encoded);
+    spl_free_aside(rendering->encoded.bytes, rendering->encoded.length);
     free(rendering->headers);
     free(rendering);
 }

@@ -77,7 +77,7 @@ static void release_outgoing(void *context)
 {
     struct outgoing *outgoing = context;
     outgoing->views->reply_bytes -= outgoing->bundle.length;
-    spl_encoded_finish(&outgoing->bundle);
+    spl_free_aside(outgoing->bundle.bytes, outgoing->bundle.length);
     free(outgoing);
 }
 
