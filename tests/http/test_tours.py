@@ -527,6 +527,16 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert not (folder / ".fedcba9876543210").exists() and not (folder / "00000000000000aa").exists()
         with Daemon(FAKE, "--tours", str(folder)) as d:  # done is done
             assert d.ask(tour["uri"]).json() == tour and frames_of(d, tour)[:2] == wanted[:2]
+        lost, emptied, linked = (folder / tour["name"] / f"0000{i}.png" for i in ("07", "08", "09"))
+        for path in lost, linked:
+            path.unlink()
+        emptied.write_bytes(b"")
+        linked.symlink_to("000001.png")
+        with Daemon(FAKE, "--tours", str(folder)) as d:  # but not where somebody has taken frames away
+            tour = d.ask(tour["uri"]).json()
+            assert tour["state"] == "failed" and "3 of its 60 frames are gone" in tour["error"], tour
+            assert d.ask(tour["frame"].replace("{n}", "6")).body == wanted[6]
+            assert all(d.ask(tour["frame"].replace("{n}", str(i))).status == 409 for i in (7, 8, 9))
 
 
 def test_frames_that_are_not_complete_are_named():

@@ -202,7 +202,9 @@ static int look_at_files(struct spl_tour *tour, struct spl_error *err)
         if (item->d_name[0] == '.') // what a crash left half written; the folders . and .. stay
             unlinkat(dirfd(dir), item->d_name, 0);
         bool video = spl_tour_has_ended(tour) && !strcmp(item->d_name, "video.mp4");
-        if ((frame == SIZE_MAX && !video) || fstatat(dirfd(dir), item->d_name, &status, 0))
+        if ((frame == SIZE_MAX && !video) || fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW))
+            continue;
+        if (!S_ISREG(status.st_mode) || !status.st_size) // none of ours
             continue;
         tour->bytes += (uint64_t)status.st_size;
         if (video)
@@ -265,6 +267,11 @@ static int read_tour(struct spl_tour *tour, struct spl_error *err)
     free(bytes);
     if (!rc && !(rc = look_at_files(tour, err)))
         take_parts(tour, json_object_get(json, "incomplete"));
+    if (!rc && tour->state == SPL_TOUR_DONE && tour->frames_done < tour->spec.frames) { // its path is no longer kept
+        tour->state = SPL_TOUR_FAILED;
+        spl_fail(&tour->failure, SPL_E_CORRUPT, "%zu of its %zu frames are gone from its folder: ask for it anew",
+                 tour->spec.frames - tour->frames_done, tour->spec.frames);
+    }
     json_decref(json);
     return rc;
 }
