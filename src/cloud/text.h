@@ -201,8 +201,10 @@ struct spl_text_sample {
     double apart[SPL_TEXT_FIELDS];  /* how far its values are from those of the next column, in all */
     bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
     bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
-    bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */
-    bool zero[SPL_TEXT_FIELDS];     /* likewise: some vector is zero */
+    bool large[SPL_TEXT_FIELDS];    /* some value is no class of LAS: lies outside 0 to 31 */
+    uint64_t values[SPL_TEXT_FIELDS][4]; /* whole ones that there are, of 0 to 255; larger ones modulo 256 */
+    bool crooked[SPL_TEXT_FIELDS];       /* with the next two: some vector is neither unit nor zero */
+    bool zero[SPL_TEXT_FIELDS];          /* likewise: some vector is zero */
 };
 
 /* False when the line has other than layout->fields values. */
