@@ -36,6 +36,7 @@ struct spl_cloud_colors {
     bool guessed; /* by the values of this file, since their type has room for more */
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
     bool sampled; /* white is what the first points say: spl_cloud_read() may find that it is another */
+    double dark;  /* of RGB of 16 bits none is above this, which is nearly black; 0: some are */
 };
 
 /* What a header says of its coordinates, as far as it does (crs.h). */
