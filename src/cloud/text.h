@@ -175,6 +175,8 @@ struct spl_text_look {
     bool inner[3];  /* of the three behind the first two, some are no whole numbers */
     bool near;      /* the three behind it are not a place on a map: two of six digits, and a height */
     bool fine[3];   /* of the three behind it, some are no whole numbers */
+    bool placed;    /* it is no time: too small, or those behind it are as large */
+    double begin;   /* of the first line */
     uint64_t last, second;
     double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */

@@ -55,7 +55,7 @@ void spl_info_print_scan(const json_t *json, const struct spl_scan *scan, const 
         spl_cmd_put_row("fields", info->fields);
     if (info->guessed[0])
         printf("  columns       %s by the values%s\n", info->guessed,
-               info->guessed[0] == '-' ? ": the first numbers or names the points" : "");
+               info->guessed[0] == '-' ? ": the first numbers, names or times the points" : "");
     if (info->north_first)
         printf(
             "  columns       %s, as where the north comes before the east: then y and x change places in --columns\n",

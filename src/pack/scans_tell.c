@@ -25,7 +25,7 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
                 info->colors.white < 65535;
     *out = NULL;
     if (info->guessed[0] == '-')
-        add(text, sizeof text, "columns are %s by their values, of which the first numbers or names the points",
+        add(text, sizeof text, "columns are %s by their values, of which the first numbers, names or times the points",
             info->guessed);
     else if (info->guessed[0] && strcmp(info->guessed, "x,y,z") != 0)
         add(text, sizeof text, "columns are %s by their values", info->guessed);

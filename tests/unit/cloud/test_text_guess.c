@@ -94,6 +94,15 @@ static void numbers_in_any_order_are_no_x(void **state)
         {200, 0, "%d 5000%02d 53000%02d 412\n", "-,x,y,z"},
         {200, -3, "%d 26000%02d 12000%02d 412\n", "-,x,y,z"},
         {200, 3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "-,x,y,z"}, /* times */
+        {200, 1, "171456%d.001 %d.25 %d.75 0.000 7\n", "-,x,y,z,intensity"},
+        {200, 1, "171456%d 5000%02d.25 53000%02d.5 41.5\n", "-,x,y,z"},
+        {200, 1, "171456%d000 %d %d 2500 9 8 255\n", "-,x,y,z,red,green,blue"}, /* milliseconds, millimetres */
+        {2, 1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, 0, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, -1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, 3, "32%d.5 56000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},        /* easts that are sorted, with a zone */
+        {200, 1, "320%d000.5 1560000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},  /* millimetres */
+        {200, 4000000, "17%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"}, /* no time passes as fast */
         {200, -3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
         {200, 3, "-%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
         {200, -3, "%d 5000%02d 53000%02d 41200\n", "x,y,z,intensity"},           /* millimetres */

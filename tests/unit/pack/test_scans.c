@@ -202,8 +202,8 @@ static void test_guesses_are_noted(void **state)
         {"", "%d.5 %d 3\n", ""},
         {"x y z r g b\n", "%d.5 %d 3 9 9 9\n", ""},
         {"", "%d %d.5 4 3\n",
-         "a.txt: columns are -,x,y,z by their values, of which the first numbers or names the points; --columns says "
-         "otherwise\n"},
+         "a.txt: columns are -,x,y,z by their values, of which the first numbers, names or times the points; --columns "
+         "says otherwise\n"},
         {"", "%d.5 %d 4 0 0 1\n", "a.txt: columns are x,y,z,nx,ny,nz by their values; --columns says otherwise\n"},
         {"", "53000%02d.5 5000%02d.25 3\n",
          "a.txt: x has seven digits and y six, as where the north comes before the east: then y and x change places in "
