@@ -170,13 +170,15 @@ struct spl_text_look {
     bool unnamed;           /* it is no text everywhere */
     bool varies;            /* the one behind it does */
     bool fraction;          /* not all are whole numbers */
-    bool strewn[2]; /* the first two do not rise line by line, the first before the second, or the other way round */
-    bool coarse;    /* they are no small whole numbers, or too few follow */
-    bool inner[3];  /* of the three behind the first two, some are no whole numbers */
-    bool near;      /* the three behind it are not a place on a map: two of six digits, and a height */
-    bool fine[3];   /* of the three behind it, some are no whole numbers */
-    bool placed;    /* it is no time: too small, or those behind it are as large */
-    double begin;   /* of the first line */
+    bool strewn[2];  /* the first two do not rise line by line, the first before the second, or the other way round */
+    bool coarse;     /* they are no small whole numbers, or too few follow */
+    bool inner[3];   /* of the three behind the first two, some are no whole numbers */
+    bool near;       /* the three behind it are not a place on a map: two of six digits, and a height */
+    bool fine[3];    /* of the three behind it, some are no whole numbers */
+    bool placed;     /* it is no time: too small, or those behind it are as large */
+    bool far;        /* it is no time of a week: below 100,000, or those behind it are not near */
+    double begin;    /* of the first line */
+    double steps[2]; /* from a line to the next, the least and the most */
     uint64_t last, second;
     double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */

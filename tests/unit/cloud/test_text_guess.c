@@ -100,6 +100,11 @@ static void numbers_in_any_order_are_no_x(void **state)
         {2, 1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
         {200, 0, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
         {200, -1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, 3, "300.%d %d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d %d.25 %d.75 0.125 9\n", "-,x,y,z,intensity"}, /* GPS's seconds of a week */
+        {19, 3, "300000.%d %d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d 999%02d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d %d.25 %d.75 41 9\n", "x,y,z,intensity,-"},
         {200, 3, "32%d.5 56000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},        /* easts that are sorted, with a zone */
         {200, 1, "320%d000.5 1560000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},  /* millimetres */
         {200, 4000000, "17%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"}, /* no time passes as fast */
