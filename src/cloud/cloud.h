@@ -36,6 +36,7 @@ struct spl_cloud_colors {
     bool guessed; /* by the values of this file, since their type has room for more */
     bool blank;   /* there are fields for RGB, but they hold nothing but 0 */
     bool sampled; /* white is what the first points say: spl_cloud_read() may find that it is another */
+    double dark;  /* of RGB of 16 bits none is above this, which is nearly black; 0: some are */
 };
 
 /* What a header says of its coordinates, as far as it does (crs.h). */
@@ -95,7 +96,7 @@ struct spl_cloud_info {
     uint32_t scalars;                     /* bit 1 << enum spl_scalar for each that batches have */
     uint32_t columns;                     /* bit 1 << enum spl_column (rows.h) for each that the file has */
     /* Text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "". Begins with '-' where the
-     * first numbers or names the points. */
+     * first numbers, names or times the points. */
     char guessed[192];
     /* Headings of a text whose columns fill nothing, as "Code, Dist"; of other files what is called as a colour, and
      * gives none, "rgb (a list)", or as another one, "x (again)"; "" = none */

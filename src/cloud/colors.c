@@ -112,7 +112,8 @@ static struct spl_cloud_colors find_grey(double *sample, size_t count)
     return grey.black < grey.white ? grey : (struct spl_cloud_colors){0};
 }
 
-/* Of colours of more than 8 bits: 10 or 12 of them, where the largest lies in the upper half, else 16. */
+/* Of colours of more than 8 bits: 10 or 12 of them, where the largest lies in the upper half, else 16. A type of 16
+ * bits holds all of these. */
 static double white_of_bits(double largest)
 {
     for (double white = 1023; white < 65535; white = 4 * white + 3)
@@ -121,16 +122,14 @@ static double white_of_bits(double largest)
     return 65535;
 }
 
-/* Looks for the largest colour and decides what is white by it. */
-static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, struct spl_error *err)
+/* Looks for the largest colour and decides what is white by it; `sample`: by the first ones, where those decide. */
+static int find_white(struct spl_cloud *cloud, bool sample, struct spl_cloud_colors *colors, struct spl_error *err)
 {
-    struct ranges ranges = {.colors = true, .settled = cloud->few_bits ? 4095.5 : 255.5};
-    /* of a part all points have a say, those too that are not read */
-    bool sample = cloud->slow_rows && cloud->options->sample_colors && !cloud->options->max_points;
+    struct ranges ranges = {.colors = true, .settled = 4095.5};
     int code = sample ? cloud->reader->seek(cloud, 0, PARTS, err) : SPL_OK;
     if (code == SPL_OK && sample)
         code = scan(cloud, &ranges, FIRST_ROWS, true, err);
-    bool sampled = ranges.color_max > 0 && !ranges.done;
+    bool sampled = ranges.color_max > 0 && ranges.color_max <= 255.5; /* 10, 12 or 16 bits all say together */
     if (code == SPL_OK && !sampled && !ranges.done)
         code = scan_all(cloud, &ranges, err);
     if (code < 0)
@@ -139,8 +138,10 @@ static int find_white(struct spl_cloud *cloud, struct spl_cloud_colors *colors, 
         return spl_source_fail(&cloud->source, SPL_E_INPUT, "red, green, blue", err,
                                "the largest value is %g, but colours have 16 bits at most", ranges.color_max);
     *colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .guessed = true, .white = 1, .sampled = sampled};
+    if (ranges.color_max > 255.5 && !ranges.done && white_of_bits(ranges.color_max) == 65535)
+        colors->dark = ranges.color_max;
     if (ranges.color_max > 255.5)
-        colors->white = cloud->few_bits ? white_of_bits(ranges.color_max) : 65535;
+        colors->white = white_of_bits(ranges.color_max);
     else if (ranges.color_max > 1.001 || cloud->integer_colors)
         colors->white = 255;
     if (ranges.color_max <= 0) /* colour fields that nobody filled are no colours */
@@ -175,16 +176,17 @@ void spl_cloud_set_colors(struct spl_cloud *cloud, const struct spl_cloud_colors
 
 int spl_cloud_begin_again(struct spl_cloud *cloud, struct spl_point_batch *batch, struct spl_error *err)
 {
-    struct spl_cloud_colors colors = cloud->info.colors;
-    colors.white = 65535;
-    colors.sampled = false;
+    struct spl_cloud_colors colors;
+    int code = find_white(cloud, false, &colors, err);
+    if (code < 0)
+        return code;
     spl_cloud_set_colors(cloud, &colors);
     memset(cloud->info.points_from, 0, sizeof cloud->info.points_from);
     cloud->info.points_skipped = 0;
     cloud->row = 0;
     cloud->part_sum = cloud->part_of - cloud->part;
     batch->count = 0;
-    int code = cloud->reader->seek(cloud, 0, 1, err);
+    code = cloud->reader->seek(cloud, 0, 1, err);
     return code < 0 ? code : SPL_CLOUD_AGAIN;
 }
 
@@ -201,7 +203,9 @@ int spl_cloud_find_colors(struct spl_cloud *cloud, struct spl_error *err)
         if (rgb && !cloud->scan_colors)
             colors = (struct spl_cloud_colors){.from = SPL_COLORS_RGB, .white = 255};
         else if (rgb)
-            code = find_white(cloud, &colors, err);
+            /* of a part all points have a say, those too that are not read */
+            code = find_white(cloud, cloud->slow_rows && cloud->options->sample_colors && !cloud->options->max_points,
+                              &colors, err);
         if (code == SPL_OK && intensity && colors.from == SPL_COLORS_CONSTANT)
             code = find_range(cloud, &colors, err);
         if (code < 0)

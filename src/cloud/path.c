@@ -206,6 +206,11 @@ static int load_file(struct spl_path_reader *reader, const char *file, struct sp
     if (rc)
         return rc;
     rc = spl_source_peek(&source, 16, &bytes, &available, err);
+    if (!rc && spl_json_is_marked(bytes, available)) {
+        spl_source_take(&source, SPL_JSON_MARK);
+        bytes += SPL_JSON_MARK;
+        available -= SPL_JSON_MARK;
+    }
     size_t blank = 0;
     while (!rc && blank < available && strchr(" \t\r\n", bytes[blank]) && bytes[blank])
         blank++;
@@ -213,7 +218,7 @@ static int load_file(struct spl_path_reader *reader, const char *file, struct sp
         rc = spl_path_read_tum(reader, &source, err);
     } else if (!rc) {
         json_error_t where;
-        json_t *json = json_load_file(file, JSON_REJECT_DUPLICATES, &where);
+        json_t *json = spl_json_load_file(file, &where);
         struct spl_error why = {0};
         if (!json)
             rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", file, where.line, where.column,

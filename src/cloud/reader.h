@@ -39,7 +39,6 @@ struct spl_cloud {
     enum spl_sampling sampling;
     bool scan_colors;    /* the range of the colours is not fixed by their type */
     bool integer_colors; /* 1 is then the darkest grey, not white */
-    bool few_bits;       /* no type says that colours of more than 8 bits have 16, so they may have 10 or 12 */
     bool slow_rows;      /* reading all of them twice is to be avoided */
     bool intensity;      /* wanted, whatever colours there are */
     struct spl_keep keep;

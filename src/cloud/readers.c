@@ -56,12 +56,12 @@ static bool is_pcd(const uint8_t *bytes, size_t available)
 
 static bool is_text(const uint8_t *bytes, size_t available)
 {
-    if (available > 0 && bytes[available - 1] == 0x1a) /* the end of file of old systems */
+    while (available > 0 && (bytes[available - 1] == 0x1a || bytes[available - 1] == 0)) /* what fills the end */
         available--;
     for (size_t i = 0; i < available; i++)
         if ((bytes[i] < ' ' && !memchr("\t\n\f\r", bytes[i], 4)) || bytes[i] == 0x7f)
             return false;
-    return true;
+    return available > 0;
 }
 
 /* Its first two lines are one whole number each: the columns and rows of a station. */
@@ -274,5 +274,5 @@ int spl_cloud_find_reader(struct spl_source *source, const struct spl_cloud_read
     *reader = readers[found].reader;
     if ((*reader)->text && !memchr(bytes, '\n', available) && memchr(bytes, '\r', available))
         source->newline = '\r';
-    return SPL_OK;
+    return *reader == &spl_text_reader || *reader == &spl_ptx_reader ? spl_source_cut_zeros(source, err) : SPL_OK;
 }

@@ -97,7 +97,9 @@ int spl_source_peek(struct spl_source *source, size_t want, const uint8_t **byte
         source->end -= source->begin;
         source->begin = 0;
         while (source->end < want && source->base + source->end < source->size) {
-            ssize_t got = pread(source->fd, source->buffer + source->end, SPL_SOURCE_WINDOW - source->end,
+            const uint64_t left = source->size - source->base - source->end;
+            const size_t room = SPL_SOURCE_WINDOW - source->end;
+            ssize_t got = pread(source->fd, source->buffer + source->end, left < room ? (size_t)left : room,
                                 (off_t)(source->base + source->end));
             if (got < 0 && errno == EINTR)
                 continue;
@@ -140,6 +142,29 @@ int spl_source_read_at(const struct spl_source *source, uint64_t offset, uint8_t
             return spl_source_fail_at(source, offset + done, "", err, "the file became shorter while it was read");
         done += (size_t)got;
     }
+    return SPL_OK;
+}
+
+int spl_source_cut_zeros(struct spl_source *source, struct spl_error *err)
+{
+    uint8_t tail[4096];
+    uint64_t end = source->size;
+    size_t length = 0, left = 0;
+    bool marked = false;
+    while (left == 0 && end > 0) {
+        left = length = end < sizeof tail ? (size_t)end : sizeof tail;
+        int code = spl_source_read_at(source, end - length, tail, length, err);
+        if (code < 0)
+            return code;
+        while (left > 0 && (tail[left - 1] == 0 || tail[left - 1] == 0x1a))
+            left--;
+        marked = left < length ? tail[left] == 0x1a : marked;
+        end -= length - left;
+    }
+    source->size = end > 0 ? end + marked : source->size;
+    if (source->base + source->end > source->size)
+        source->end = (size_t)(source->size - source->base);
+    source->buffer[source->end] = 0;
     return SPL_OK;
 }
 

@@ -61,6 +61,10 @@ void spl_source_seek(struct spl_source *source, uint64_t offset);
 int spl_source_read_at(const struct spl_source *source, uint64_t offset, uint8_t *out, size_t length,
                        struct spl_error *err);
 
+/* Text ends before the zeros that fill a file's last block, or all of it: `size` is less then. What ends files of old
+ * systems, a 0x1a right behind the text, stays. */
+int spl_source_cut_zeros(struct spl_source *source, struct spl_error *err);
+
 /* The next line without its ending: 1, or 0 at the end of the file, or negative. line[length] may be read and belongs
  * to no number. Valid until the next call. */
 int spl_source_line(struct spl_source *source, const char **line, size_t *length, struct spl_error *err);

@@ -41,7 +41,7 @@ static int text_open(struct spl_cloud *cloud, struct spl_error *err)
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)
         cloud->info.attributes |= SPL_CLOUD_CLASS;
     cloud->sampling = SPL_SAMPLE_ALL;
-    cloud->scan_colors = cloud->few_bits = true;
+    cloud->scan_colors = true;
     if (text->counted) {
         cloud->info.format = "PTS";
         cloud->info.points_expected = text->count;

@@ -170,11 +170,15 @@ struct spl_text_look {
     bool unnamed;           /* it is no text everywhere */
     bool varies;            /* the one behind it does */
     bool fraction;          /* not all are whole numbers */
-    bool strewn[2]; /* the first two do not rise line by line, the first before the second, or the other way round */
-    bool coarse;    /* they are no small whole numbers, or too few follow */
-    bool inner[3];  /* of the three behind the first two, some are no whole numbers */
-    bool near;      /* the three behind it are not a place on a map: two of six digits, and a height */
-    bool fine[3];   /* of the three behind it, some are no whole numbers */
+    bool strewn[2];  /* the first two do not rise line by line, the first before the second, or the other way round */
+    bool coarse;     /* they are no small whole numbers, or too few follow */
+    bool inner[3];   /* of the three behind the first two, some are no whole numbers */
+    bool near;       /* the three behind it are not a place on a map: two of six digits, and a height */
+    bool fine[3];    /* of the three behind it, some are no whole numbers */
+    bool placed;     /* it is no time: too small, or those behind it are as large */
+    bool far;        /* it is no time of a week: below 100,000, or those behind it are not near */
+    double begin;    /* of the first line */
+    double steps[2]; /* from a line to the next, the least and the most */
     uint64_t last, second;
     double first, y;                /* of the last line */
     struct spl_text_pairs pairs[2]; /* from the first column on, and from the second */
@@ -201,8 +205,10 @@ struct spl_text_sample {
     double apart[SPL_TEXT_FIELDS];  /* how far its values are from those of the next column, in all */
     bool wide[SPL_TEXT_FIELDS];     /* some value lies outside 0 to 65535 */
     bool bright[SPL_TEXT_FIELDS];   /* some value lies outside 0 to 1 */
-    bool crooked[SPL_TEXT_FIELDS];  /* with the next two: some vector is neither unit nor zero */
-    bool zero[SPL_TEXT_FIELDS];     /* likewise: some vector is zero */
+    bool large[SPL_TEXT_FIELDS];    /* some value is no class of LAS: lies outside 0 to 31 */
+    uint64_t values[SPL_TEXT_FIELDS][4]; /* whole ones that there are, of 0 to 255; larger ones modulo 256 */
+    bool crooked[SPL_TEXT_FIELDS];       /* with the next two: some vector is neither unit nor zero */
+    bool zero[SPL_TEXT_FIELDS];          /* likewise: some vector is zero */
 };
 
 /* False when the line has other than layout->fields values. */

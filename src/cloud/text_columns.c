@@ -3,6 +3,7 @@
  * there is one (text_look.c), three neighbours of unit length are a normal, three neighbours of colour-like numbers a
  * colour, what is left at the fourth place or behind the colour an intensity.
  * Pure functions. */
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -140,6 +141,9 @@ bool spl_text_sample_add(struct spl_text_sample *sample, const struct spl_layout
         sample->wide[i] |= !(v[i] >= 0 && v[i] <= 65535);
         sample->bright[i] |= !(v[i] >= 0 && v[i] <= 1);
         sample->clear[i] |= v[i] != 255;
+        sample->large[i] |= !(v[i] >= 0 && v[i] <= 31);
+        if (v[i] >= 0 && v[i] <= 65535)
+            sample->values[i][(unsigned)v[i] / 64 % 4] |= (uint64_t)1 << (unsigned)v[i] % 64;
         sample->above[i] |= i + 1 == layout->fields || !(v[i] >= 1 && v[i] <= v[i + 1] && v[i + 1] <= 15);
         if (i + 1 < layout->fields && isfinite(v[i + 1]))
             sample->apart[i] += fabs(v[i] - v[i + 1]);
@@ -193,8 +197,41 @@ static bool free3(const struct spl_layout *layout, const struct spl_text_sample 
     return is_free(layout, sample, at) && is_free(layout, sample, at + 1) && is_free(layout, sample, at + 2);
 }
 
+static unsigned count_values(const struct spl_text_sample *s, unsigned i)
+{
+    unsigned count = 0;
+    for (int k = 0; k < 4; k++)
+        count += (unsigned)__builtin_popcountll(s->values[i][k]);
+    return count;
+}
+
+enum { CLASS_LINES = 20, CLASSES = 12, ALIKE = 8 };
+
+/* Is column i a class, and the three at `color` none? Of a class there are few small numbers; the channels of a colour
+ * go beyond those, and take as many values or more, about as many as each other. */
+static bool is_class(const struct spl_text_sample *s, unsigned i, unsigned color)
+{
+    const unsigned own = count_values(s, i);
+    unsigned least = UINT_MAX, most = 0;
+    bool large = true;
+    for (unsigned k = color; k < color + 3; k++) {
+        unsigned count = count_values(s, k);
+        least = count < least ? count : least;
+        most = count > most ? count : most;
+        large &= s->large[k];
+    }
+    return s->lines >= CLASS_LINES && !s->large[i] && !s->fraction[i] && own <= CLASSES && large && own <= least &&
+           most <= ALIKE * least;
+}
+
+/* One of the three at `other` is a class beside those at `color`. */
+static bool has_class(const struct spl_text_sample *s, unsigned other, unsigned color)
+{
+    return is_class(s, other, color) || is_class(s, other + 1, color) || is_class(s, other + 2, color);
+}
+
 /* Where a colour is, or 0. Several places may look like one, as of class, intensity, red, green and blue, or with an
- * opacity behind: red, green and blue are near each other, and blue is not 255 everywhere. */
+ * opacity behind: none of red, green and blue is a class, they are near each other, and blue is not 255 everywhere. */
 static unsigned find_color(const struct spl_layout *layout, const struct spl_text_sample *s)
 {
     /* with seven columns or more, "x y z intensity r g b" (PTS) before "x y z r g b intensity" */
@@ -207,7 +244,8 @@ static unsigned find_color(const struct spl_layout *layout, const struct spl_tex
             continue;
         double own = s->apart[at] + s->apart[at + 1];
         bool opacity = best == at + 1 && !s->clear[best + 2];
-        if (!best || opacity || 1.5 * own < apart) {
+        bool nearer = 1.5 * own < apart && !has_class(s, at, best);
+        if (!best || opacity || nearer || has_class(s, best, at)) {
             best = at;
             apart = own;
         }
@@ -228,6 +266,9 @@ void spl_layout_recognise(struct spl_layout *layout, const struct spl_text_sampl
     unsigned color = find_color(layout, sample);
     if (color)
         set3(layout, color, SPL_COLUMN_RED);
+    const unsigned end = color + 3;
+    if (color && end + 1 == layout->fields && is_free(layout, sample, end) && is_class(sample, end, color))
+        layout->column[end] = SPL_COLUMN_CLASS;
     for (unsigned i = behind; i < layout->fields && i < behind + 4; i++)
         if (is_free(layout, sample, i)) {
             layout->column[i] = SPL_COLUMN_INTENSITY;

@@ -6,7 +6,9 @@
  * written alike: x is whole only where y is, and z only where both are. Where that does not decide, one that counts by
  * one numbers the points; but it may also be x along a row of a grid of whole metres, and there y stays the same. And
  * two columns of six digits before one of four are a place on a map, whatever stands before them. Two columns of small
- * whole numbers that rise as in a grid are a station's rows and columns, where the three behind them have fractions. */
+ * whole numbers that rise as in a grid are a station's rows and columns, where the three behind them have fractions.
+ * What rises from a hundred million on, by little, before three smaller ones is the time, and so is what rises
+ * evenly from a hundred thousand on before three near zero. */
 #include <math.h>
 #include <string.h>
 #include <strings.h>
@@ -15,9 +17,10 @@
 #include "cloud/text.h"
 
 /* Fewer count by chance; of nothing but whole numbers a diagonal does. */
-enum { COUNTED_LINES = 3, COUNTED_WHOLE_LINES = 100 };
+enum { COUNTED_LINES = 3, EVEN_LINES = 20, COUNTED_WHOLE_LINES = 100 };
 static const double map_least = 1e5, height_most = 1e4;
-static const uint64_t cells = 100000; /* of a side of a station's grid, at most */
+static const double time_least = 1e8, time_spread = 1e-3; /* 1973; what passes, of all */
+static const uint64_t cells = 100000;                     /* of a side of a station's grid, at most */
 
 /* The next field as a whole number, with zeros in front and a sign if need be. */
 struct whole {
@@ -179,6 +182,16 @@ bool spl_text_look_add(struct spl_text_look *look, const struct spl_layout *layo
     look->places += place;
     look->near |= place && !(fabs(of[0]) >= map_least && fabs(of[1]) >= map_least && fabs(of[2]) < height_most &&
                              n < fabs(of[1]));
+    look->placed |=
+        place && !(n >= time_least && fabs(of[0]) < time_least && fabs(of[1]) < time_least && fabs(of[2]) < time_least);
+    look->far |= place && !(n >= map_least && fabs(of[0]) < height_most && fabs(of[1]) < height_most &&
+                            fabs(of[2]) < height_most);
+    look->begin = look->lines ? look->begin : n;
+    if (look->lines) {
+        const double step = n - look->first;
+        look->steps[0] = look->lines > 1 ? fmin(look->steps[0], step) : step;
+        look->steps[1] = look->lines > 1 ? fmax(look->steps[1], step) : step;
+    }
     for (int i = 0; i < 3; i++)
         look->fine[i] |= place && !all[1 + i].is;
     bool grid = numbers && count > 4 && all[0].is && !all[0].sign && all[1].is && !all[1].sign;
@@ -208,9 +221,22 @@ bool spl_text_look_counts(const struct spl_text_look *look)
     return !look->bare && !look->unsorted && look->lines >= COUNTED_LINES;
 }
 
+/* Seconds since 1970 or 1980, or parts of them: no coordinate is as large, nor the three behind it. Or seconds of GPS's
+ * week, which pass evenly: x of a place that is far from the middle has a y that is, too. */
+static bool is_time(const struct spl_text_look *look)
+{
+    const double passed = look->first - look->begin, mean = passed / (look->lines - 1.0);
+    const bool even = look->lines >= EVEN_LINES && look->steps[0] > 0.5 * mean && look->steps[1] < 1.5 * mean;
+    const bool week = even && look->varies && !look->far && look->fine[0] && look->fine[1] && look->fine[2];
+    return look->places && (!look->placed || week) && !look->falling && look->lines >= COUNTED_LINES && passed > 0 &&
+           passed < time_spread * look->begin;
+}
+
 static bool is_numbered(const struct spl_text_look *look)
 {
     const bool *fine = look->fine;
+    if (is_time(look))
+        return true;
     if (look->places && !look->near && !(look->bare && look->falling))
         return true;
     if (fine[0] && fine[1])

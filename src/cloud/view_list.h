@@ -26,6 +26,8 @@ int spl_view_list_add_image(struct spl_view_list *list, const char *path, const 
 char *spl_view_list_find(const char *folder, const char *name, const struct spl_photograph_options *photographs,
                          struct spl_error *err);
 
+bool spl_view_list_is_file(const char *path);
+
 /* The same of a path that a JSON at `path` names: beside it unless absolute, or in the images' folder. */
 char *spl_view_list_find_beside(const char *path, const char *name, const struct spl_photograph_options *photographs,
                                 struct spl_error *err);

@@ -91,7 +91,7 @@ int spl_view_list_refuse(const struct spl_photograph_options *photographs, int r
     return SPL_OK;
 }
 
-static bool is_file(const char *path)
+bool spl_view_list_is_file(const char *path)
 {
     struct stat status;
     return !stat(path, &status) && S_ISREG(status.st_mode);
@@ -106,13 +106,13 @@ char *spl_view_list_find(const char *folder, const char *name, const struct spl_
     for (int i = 0; images && i < 2; i++) {
         free(path);
         path = spl_view_list_print(err, "%s/%s", images, i && last ? last + 1 : name);
-        if (!path || is_file(path))
+        if (!path || spl_view_list_is_file(path))
             return path;
     }
     free(path);
     for (int i = 0; i < 4 && !images; i++) {
         path = spl_view_list_print(err, "%s/%s%s", folder, places[i], name);
-        if (!path || is_file(path))
+        if (!path || spl_view_list_is_file(path))
             return path;
         free(path);
     }
@@ -147,7 +147,7 @@ done:
 static bool has(const char *folder, const char *name)
 {
     char path[4096];
-    return snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path && is_file(path);
+    return snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path && spl_view_list_is_file(path);
 }
 
 /* A COLMAP project keeps its models in sparse/0, sparse/1, …; whoever names a folder above means the first. */

@@ -132,7 +132,7 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
     json_t *document = NULL;
     json_error_t where;
     int rc = read_all(path, &text, &length, err);
-    size_t mark = length >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0; /* as editors on Windows put before UTF-8 */
+    size_t mark = spl_json_is_marked(text, length) ? SPL_JSON_MARK : 0;
     if (!rc && is_image(text, length))
         rc = spl_fail(err, SPL_E_INPUT,
                       "%s: is an image, which says no pose: name the panoramas.json that does (api/panoramas.md has "
@@ -144,7 +144,7 @@ int spl_view_list_load_json(struct spl_view_list *list, const char *path,
                       path);
     if (rc)
         goto done;
-    document = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
+    document = spl_json_load(text, length, &where);
     if (!document)
         rc = spl_fail(err, SPL_E_INPUT, "%s: broken JSON at line %d, column %d: %s", path, where.line, where.column,
                       spl_json_fault(&where));

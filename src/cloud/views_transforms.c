@@ -60,21 +60,36 @@ static int refuse_panorama(const json_t *document, const json_t *frame, struct s
                           "says how to make that of this file");
 }
 
-static int get_lens(const json_t *document, const json_t *frame, struct spl_camera *camera,
+/* instant-ngp and Blender write neither w nor h, which are the image's; nor may one that is drawn have none. */
+static int get_size(const json_t *document, const json_t *frame, const char *image,
+                    const struct spl_photograph_options *photographs, double size[2], struct spl_error *err)
+{
+    uint32_t width = 0, height = 0;
+    bool asks = !get(document, frame, "w") && !get(document, frame, "h") && photographs && photographs->get_size;
+    int rc = asks ? photographs->get_size(image, &width, &height, err) : SPL_OK;
+    if (rc || (rc = get_real(document, frame, "w", width, &size[0], err)) ||
+        (rc = get_real(document, frame, "h", height, &size[1], err)))
+        return rc;
+    for (int i = 0; i < 2; i++)
+        if (!(size[i] >= 1 && size[i] <= spl_view_list_limits.side_px && size[i] == floor(size[i])) ||
+            size[0] * size[1] > (double)spl_view_list_limits.pixels)
+            return spl_fail_field(err, SPL_E_INPUT, i ? "h" : "w", "an image of w %g and h %g pixels", size[0],
+                                  size[1]);
+    return SPL_OK;
+}
+
+static int get_lens(const json_t *document, const json_t *frame, const char *image,
+                    const struct spl_photograph_options *photographs, struct spl_camera *camera,
                     struct spl_distortion *distortion, struct spl_error *err)
 {
     static const char *const k[] = {"k1", "k2", "k3", "k4"}, *const p[] = {"p1", "p2"};
-    double w = 0, h = 0, angle = NAN;
+    double size[2] = {0}, angle = NAN;
     int rc;
-    if ((rc = refuse_panorama(document, frame, err)) || (rc = get_real(document, frame, "w", 0, &w, err)) ||
-        (rc = get_real(document, frame, "h", 0, &h, err)) ||
+    if ((rc = refuse_panorama(document, frame, err)) ||
+        (rc = get_size(document, frame, image, photographs, size, err)) ||
         (rc = get_real(document, frame, "camera_angle_x", NAN, &angle, err)))
         return rc;
-    const double limit = spl_view_list_limits.side_px, size[2] = {w, h};
-    for (int i = 0; i < 2; i++)
-        if (!(size[i] >= 1 && size[i] <= limit && size[i] == floor(size[i])) ||
-            w * h > (double)spl_view_list_limits.pixels)
-            return spl_fail_field(err, SPL_E_INPUT, i ? "h" : "w", "an image of w %g and h %g pixels", w, h);
+    const double w = size[0], h = size[1];
     camera->width = (uint32_t)w;
     camera->height = (uint32_t)h;
     if ((rc = get_real(document, frame, "fl_x", w / 2 / tan(angle / 2), &camera->fx, err)) ||
@@ -96,20 +111,52 @@ static int get_lens(const json_t *document, const json_t *frame, struct spl_came
     return rc ? rc : spl_distortion_init(distortion, err);
 }
 
-/* Blender's exporter leaves the extension out. */
-static int add_frame(struct spl_view_list *list, const char *path, const char *folder, const json_t *document,
-                     const json_t *frame, const struct spl_photograph_options *photographs, struct spl_error *err)
+/* Where a frame's image lies: beside the JSON where it is nowhere. `name` loses what says "here". NULL: no memory. */
+static char *find_image(const char *folder, char *name, const struct spl_photograph_options *photographs,
+                        struct spl_error *err)
+{
+    const bool images = photographs && photographs->images;
+    while (!strncmp(name, "./", 2))
+        memmove(name, name + 2, strlen(name) - 1);
+    if (*name == '/' && !images)
+        return spl_view_list_print(err, "%s", name);
+    char *found = spl_view_list_find(folder, name, photographs, err);
+    if (!found || images || spl_view_list_is_file(found))
+        return found;
+    free(found);
+    return spl_view_list_print(err, "%s/%s", folder, name);
+}
+
+/* Blender's exporter leaves the extension out, and on Windows slashes are others, unless a file is called so. The
+ * caller frees both. */
+static int name_image(const char *folder, const char *file, const struct spl_photograph_options *photographs,
+                      char **name, char **image, struct spl_error *err)
+{
+    const char *last = file + strlen(file) - 1;
+    while (last > file && !strchr("./\\", *last))
+        last--;
+    if (!(*name = spl_view_list_print(err, "%s%s", file, *last == '.' && last > file ? "" : ".png")) ||
+        !(*image = find_image(folder, *name, photographs, err)))
+        return SPL_E_NOMEM;
+    if (!strchr(*name, '\\') || spl_view_list_is_file(*image))
+        return SPL_OK;
+    for (char *c = *name; *c; c++)
+        *c = *c == '\\' ? '/' : *c;
+    free(*image);
+    *image = find_image(folder, *name, photographs, err);
+    return *image ? SPL_OK : SPL_E_NOMEM;
+}
+
+static int add_found(struct spl_view_list *list, const char *path, const char *name, char **image,
+                     const json_t *document, const json_t *frame, const struct spl_photograph_options *photographs,
+                     struct spl_error *err)
 {
     struct spl_camera camera = {.near = SPL_CAMERA_NEAR_DEFAULT, .far = INFINITY};
     struct spl_distortion distortion = {0};
     struct spl_error why = {0};
     double matrix[16];
-    const char *file = json_string_value(json_object_get(frame, "file_path"));
     int rc;
-    if (!file || !*file)
-        return spl_fail_field(err, SPL_E_INPUT, "file_path", "file_path must be text, not %s",
-                              file ? "empty" : spl_json_type_name(json_object_get(frame, "file_path")));
-    if ((rc = get_lens(document, frame, &camera, &distortion, err)) ||
+    if ((rc = get_lens(document, frame, *image, photographs, &camera, &distortion, err)) ||
         (rc = spl_json_get_matrix(json_object_get(frame, "transform_matrix"), "transform_matrix", 4, 4, SPL_ROW_MAJOR,
                                   matrix, err)))
         return rc;
@@ -117,13 +164,27 @@ static int add_frame(struct spl_view_list *list, const char *path, const char *f
         return spl_fail_field(err, rc, "transform_matrix", "transform_matrix: %s", why.message);
     if (!photographs && distortion.kind != SPL_DISTORTION_NONE)
         return spl_fail_field(err, SPL_E_INPUT, "k1", "the lens is distorted; only pinholes are drawn");
-    if ((rc = spl_camera_check(&camera, err)))
+    if ((rc = spl_camera_check(&camera, err)) ||
+        (rc = spl_view_list_add_image(list, path, name, &camera, &distortion, NULL, photographs, err)))
         return rc;
-    const char *slash = strrchr(file, '/'), *dot = strrchr(file, '.');
-    char *whole = spl_view_list_print(err, "%s%s", file, dot && dot > (slash ? slash : file) ? "" : ".png");
-    rc = whole ? spl_view_list_add_image(list, path, whole, &camera, &distortion, folder, photographs, err)
-               : SPL_E_NOMEM;
-    free(whole);
+    list->views[list->count - 1].photograph = *image;
+    *image = NULL;
+    return SPL_OK;
+}
+
+static int add_frame(struct spl_view_list *list, const char *path, const char *folder, const json_t *document,
+                     const json_t *frame, const struct spl_photograph_options *photographs, struct spl_error *err)
+{
+    const char *file = json_string_value(json_object_get(frame, "file_path"));
+    char *name = NULL, *image = NULL;
+    if (!file || !*file)
+        return spl_fail_field(err, SPL_E_INPUT, "file_path", "file_path must be text, not %s",
+                              file ? "empty" : spl_json_type_name(json_object_get(frame, "file_path")));
+    int rc = name_image(folder, file, photographs, &name, &image, err);
+    if (!rc)
+        rc = add_found(list, path, name, &image, document, frame, photographs, err);
+    free(name);
+    free(image);
     return rc;
 }
 

@@ -55,7 +55,7 @@ void spl_info_print_scan(const json_t *json, const struct spl_scan *scan, const 
         spl_cmd_put_row("fields", info->fields);
     if (info->guessed[0])
         printf("  columns       %s by the values%s\n", info->guessed,
-               info->guessed[0] == '-' ? ": the first numbers or names the points" : "");
+               info->guessed[0] == '-' ? ": the first numbers, names or times the points" : "");
     if (info->north_first)
         printf(
             "  columns       %s, as where the north comes before the east: then y and x change places in --columns\n",
@@ -69,9 +69,9 @@ void spl_info_print_scan(const json_t *json, const struct spl_scan *scan, const 
     if (info->unused[0])
         spl_cmd_put_row("not used", info->unused);
     if (scan->colors.from != SPL_COLORS_CONSTANT)
-        printf("  color from    %s, %g is black and %g white%s\n",
+        printf("  color from    %s, %g is black and %g white%s%s\n",
                scan->colors.from == SPL_COLORS_RGB ? "rgb" : "intensity", scan->colors.black, scan->colors.white,
-               scan->colors.guessed ? " by the values" : "");
+               scan->colors.guessed ? " by the values" : "", scan->colors.dark > 0 ? ", which are nearly black" : "");
     if (crs || name[0]) /* of a system without a number the name; --json has its text */
         spl_cmd_put_row("crs", crs && (info->coordinates.epsg || !name[0]) ? crs : name);
     spl_cmd_put_row("unit", json_string_value(json_object_get(json, "unit")));

@@ -36,7 +36,7 @@ static int read_rays(struct spl_cmd_render *a, struct spl_error *err)
     int rc;
     if (json) {
         json_error_t where;
-        json_t *list = json_loadf(file, JSON_REJECT_DUPLICATES, &where);
+        json_t *list = spl_json_load_stream(file, &where);
         rc = list ? spl_rays_from_json(list, &a->rays, err)
                   : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file,
                                    where.line, where.column, spl_json_fault(&where));

@@ -1,7 +1,58 @@
 /* JSON beyond what jansson has; see json.h. */
 #include "geom/json.h"
 
-#include <stdio.h>
+#include <errno.h>
+#include <string.h>
+
+bool spl_json_is_marked(const void *text, size_t length)
+{
+    return length >= SPL_JSON_MARK && !memcmp(text, "\xef\xbb\xbf", SPL_JSON_MARK);
+}
+
+json_t *spl_json_load(const char *text, size_t length, json_error_t *where)
+{
+    size_t mark = spl_json_is_marked(text, length) ? SPL_JSON_MARK : 0;
+    return json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, where);
+}
+
+struct stream {
+    FILE *file;
+    bool begun;
+};
+
+static size_t read_stream(void *buffer, size_t size, void *context)
+{
+    struct stream *stream = context;
+    char *bytes = buffer;
+    size_t count = fread(bytes, 1, size, stream->file);
+    if (ferror(stream->file))
+        return (size_t)-1;
+    if (!stream->begun && spl_json_is_marked(bytes, count)) {
+        count -= SPL_JSON_MARK;
+        memmove(bytes, bytes + SPL_JSON_MARK, count);
+    }
+    stream->begun = true;
+    return count;
+}
+
+json_t *spl_json_load_stream(FILE *file, json_error_t *where)
+{
+    struct stream stream = {.file = file};
+    return json_load_callback(read_stream, &stream, JSON_REJECT_DUPLICATES, where);
+}
+
+json_t *spl_json_load_file(const char *path, json_error_t *where)
+{
+    FILE *file = fopen(path, "rb");
+    if (!file) { /* as json_load_file() says it */
+        *where = (json_error_t){.line = -1, .column = -1};
+        snprintf(where->text, sizeof where->text - 1, "unable to open %s: %s", path, strerror(errno));
+        return NULL;
+    }
+    json_t *json = spl_json_load_stream(file, where);
+    fclose(file);
+    return json;
+}
 
 bool spl_json_get_numbers(const json_t *array, size_t count, double *out)
 {

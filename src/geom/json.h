@@ -3,8 +3,17 @@
 #define SPL_GEOM_JSON_H
 
 #include <stdbool.h>
+#include <stdio.h>
 
 #include <jansson.h>
+
+/* JSON that comes from outside, in which names may not be double: behind the mark of UTF-8 that editors on Windows put
+ * first. NULL: refused, as `where` says. The file of spl_json_load_stream() stands anywhere in what it read. */
+enum { SPL_JSON_MARK = 3 };
+bool spl_json_is_marked(const void *text, size_t length);
+json_t *spl_json_load(const char *text, size_t length, json_error_t *where);
+json_t *spl_json_load_stream(FILE *file, json_error_t *where);
+json_t *spl_json_load_file(const char *path, json_error_t *where);
 
 /* An array of `count` numbers. False where it is none; `out` is of no use then. */
 bool spl_json_get_numbers(const json_t *array, size_t count, double *out);

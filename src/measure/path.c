@@ -68,7 +68,7 @@ int spl_path_load(struct spl_path *path, const char *file, const char *set, stru
 {
     memset(path, 0, sizeof *path);
     json_error_t wrong;
-    json_t *root = json_load_file(file, JSON_REJECT_DUPLICATES, &wrong);
+    json_t *root = spl_json_load_file(file, &wrong);
     if (!root && wrong.line < 0)
         return spl_fail(err, SPL_E_INPUT, "%s", wrong.text); /* names the file */
     if (!root)

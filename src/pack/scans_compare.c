@@ -90,28 +90,41 @@ static void compare_endings(const struct saying *s)
             spl_names_list(&wrong));
 }
 
+enum { BITS = 4 }; /* how many there are of colours */
+
 /* Values that mean black and white where the scans do not say so themselves. */
 static void compare_ranges(const struct saying *s)
 {
     const struct spl_scan *low = NULL, *high = NULL;
-    struct spl_names bits8 = {0}, bits16 = {0};
+    static const double whites[BITS] = {255, 1023, 4095, 65535};
+    static const int bits[BITS] = {8, 10, 12, 16};
+    struct spl_names of[BITS] = {0};
+    unsigned few = 0, many = BITS - 1;
     for (size_t i = 0; i < s->scans->count; i++) {
         const struct spl_scan *scan = &s->scans->list[i];
         const struct spl_cloud_colors *colors = &scan->colors;
         if (!colors->guessed || !scan->points_from[colors->from])
             continue;
         if (colors->from == SPL_COLORS_RGB) {
-            spl_names_add(colors->white > 255 ? &bits16 : &bits8, scan->name);
+            unsigned k = 0;
+            while (k + 1 < BITS && colors->white > whites[k])
+                k++;
+            spl_names_add(&of[k], scan->name);
             continue;
         }
         low = !low || colors->white < low->colors.white ? scan : low;
         high = !high || colors->white > high->colors.white ? scan : high;
     }
-    if (bits8.count && bits16.count)
+    while (few < many && !of[few].count)
+        few++;
+    while (few < many && !of[many].count)
+        many--;
+    if (few < many)
         say(s,
-            "colours are 8 bit, none above 255, in %zu (%s) and 16 bit in %zu (%s): each was taken by its own range. "
+            "colours are %d bit, none above %g, in %zu (%s) and %d bit in %zu (%s): each was taken by its own range. "
             "If the former are only dark, write all of them with 8 bit first",
-            bits8.count, spl_names_list(&bits8), bits16.count, spl_names_list(&bits16));
+            bits[few], whites[few], of[few].count, spl_names_list(&of[few]), bits[many], of[many].count,
+            spl_names_list(&of[many]));
     if (low && (low->colors.white < high->colors.white || low->colors.black > high->colors.black))
         say(s,
             "intensities differ in range, from %g..%g in %s to %g..%g in %s: each scan was made grey by its own, and "

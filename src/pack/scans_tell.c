@@ -1,4 +1,4 @@
-/* What text scans were taken for: nothing in them says which column is which, or how many bits their colours have, so
+/* What scans were taken for: nothing in a text says which column is which, or how many bits colours have, so
  * a guess that is wrong must be seen before hours of work. The caller's thread. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
                 info->colors.white < 65535;
     *out = NULL;
     if (info->guessed[0] == '-')
-        add(text, sizeof text, "columns are %s by their values, of which the first numbers or names the points",
+        add(text, sizeof text, "columns are %s by their values, of which the first numbers, names or times the points",
             info->guessed);
     else if (info->guessed[0] && strcmp(info->guessed, "x,y,z") != 0)
         add(text, sizeof text, "columns are %s by their values", info->guessed);
@@ -44,9 +44,11 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
         add(text, sizeof text, "%s", info->footer);
     if (info->unused[0])
         add(text, sizeof text, "columns not used: %s", info->unused);
-    snprintf(white, sizeof white, "%g", info->colors.white);
+    snprintf(white, sizeof white, "%g", bits ? info->colors.white : info->colors.dark);
     if (bits)
         add(text, sizeof text, "0 is black and %s white by the largest colour", white);
+    else if (info->colors.dark > 0)
+        add(text, sizeof text, "colours are nearly black: 65535 is white, and none is above %s", white);
     if (text[0] && !(*out = strdup(text)))
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a note");
     return SPL_OK;

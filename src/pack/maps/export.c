@@ -210,7 +210,7 @@ int spl_map_edits_init(struct spl_map_edits *edits, const char *folder, struct s
     if (!rc && status.st_size > list_bytes_max)
         rc = spl_fail_field(err, SPL_E_LIMIT, "maps", "%s: %lld bytes; a list of maps has at most %ld", path,
                             (long long)status.st_size, list_bytes_max);
-    if (!rc && !(document = json_load_file(path, JSON_REJECT_DUPLICATES, &where)))
+    if (!rc && !(document = spl_json_load_file(path, &where)))
         rc = spl_fail_field(err, SPL_E_INPUT, "maps", "%s: broken JSON at line %d, column %d: %s", path, where.line,
                             where.column, spl_json_fault(&where));
     edits->list = json_incref(json_object_get(document, "maps"));

@@ -78,7 +78,7 @@ json_t *spl_body_parse(const char *body, size_t length, size_t values_max, size_
                        number_max);
         return NULL;
     }
-    json_t *document = json_loadb(length ? body : "", length, JSON_REJECT_DUPLICATES, &where);
+    json_t *document = spl_json_load(length ? body : "", length, &where);
     if (!document)
         spl_fail_field(err, SPL_E_INPUT, "body", "broken JSON at line %d, column %d: %s", where.line, where.column,
                        spl_json_fault(&where));

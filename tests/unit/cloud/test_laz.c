@@ -274,8 +274,11 @@ static void sampled_colors_are_the_same(void **state)
         uint16_t low, high;
         size_t bright;
         bool again;
-    } rows[] = {{7, 30000, 9000, true}, {7, 256, colored - 1, true}, {7, 30000, 10, false}, {7, 255, 9000, false},
-                {0, 30000, 9000, false}, {0, 9, 9000, false},        {0, 0, no_point, false}};
+    } rows[] = {{7, 30000, 9000, true},    {7, 256, colored - 1, true}, {7, 30000, 10, false},
+                {7, 255, 9000, false},     {0, 30000, 9000, false},     {0, 9, 9000, false},
+                {0, 0, no_point, false},   {7, 1000, 9000, true},       {700, 1000, 9000, false},
+                {700, 3000, 9000, false},  {300, 1000, 9000, false},    {300, 400, 9000, false},
+                {3000, 30000, 9000, false}};
     static uint8_t whole[colored][3], sampled[colored][3];
     (void)state;
     for (size_t i = 0; i < (TEST_LOOKS_FOR_RACES ? 1 : sizeof rows / sizeof *rows); i++)

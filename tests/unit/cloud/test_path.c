@@ -379,8 +379,12 @@ static void test_files(void **state)
     put(folder, "nerf.json", golden[0].text);
     put(folder, "tum.txt", TUM);
     put(folder, "bad.json", "{\"camera_path\":");
-    const char *const names[] = {"", "/nerf.json", "/tum.txt"};
-    for (int i = 0; i < 3; i++) {
+    static char marked[4000]; /* as editors on Windows write UTF-8 */
+    snprintf(marked, sizeof marked, "\xef\xbb\xbf%s", golden[0].text);
+    put(folder, "marked.json", marked);
+    put(folder, "marked.txt", "\xef\xbb\xbf" TUM);
+    const char *const names[] = {"", "/nerf.json", "/tum.txt", "/marked.json", "/marked.txt"};
+    for (int i = 0; i < 5; i++) {
         snprintf(path, sizeof path, "%s%s", folder, names[i]);
         assert_int_equal(spl_camera_path_load(path, &options, &loaded, &err), 0);
         assert_pixel(&loaded, 0, i ? fov_pixel[0] : 412.5, i ? fov_pixel[1] : 273.125);
@@ -390,8 +394,14 @@ static void test_files(void **state)
     assert_int_equal(spl_camera_path_load(path, &options, &loaded, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "bad.json: broken JSON at line 1"));
     assert_int_equal(spl_camera_path_load("/nowhere", &options, &loaded, NULL), SPL_E_NOT_FOUND);
-    const char *const all[] = {"cameras.txt", "images.txt", "nerf.json", "tum.txt", "bad.json", ""};
-    for (int i = 0; i < 6; i++) {
+    put(folder, "bad.json", "\xef\xbb\xbf{\"a\":1,\"a\":2}");
+    struct spl_error twice = {0};
+    assert_int_equal(spl_camera_path_load(path, &options, &loaded, &twice), SPL_E_INPUT);
+    assert_non_null(strstr(twice.message, "bad.json: broken JSON at line 1"));
+    assert_non_null(strstr(twice.message, "duplicate"));
+    const char *const all[] = {"cameras.txt", "images.txt", "nerf.json", "tum.txt", "bad.json", "marked.json",
+                               "marked.txt", ""};
+    for (int i = 0; i < 8; i++) {
         snprintf(path, sizeof path, "%s/%s", folder, all[i]);
         remove(path);
     }

@@ -138,7 +138,7 @@ static void binary_means_what_text_means(void **state)
         fail_msg("%s", err.message);
     remove(in_folder("cameras.bin"));
     folder_put_text("cameras.txt", "7 PINHOLE 640 480 500 510 331.25 228.5\n"
-                            "9 OPENCV 640 480 500 510 331.25 228.5 -0.2 0.05 0.001 -0.002\n");
+                                   "9 OPENCV 640 480 500 510 331.25 228.5 -0.2 0.05 0.001 -0.002\n");
     folder_put_text("images.txt",
                     "17 -0.55772847375664971 -0.76215345285486739 -0.30022022910563139 0.13389875988314353 "
                     "-0.06410832213881687 0.16613728300474614 4.6401280721795111 9 east/a.jpg\n\n");
@@ -244,11 +244,11 @@ static void transforms_give_cameras_and_lenses(void **state)
     struct spl_view_list list;
     struct spl_error err = {0};
     folder_put_text("transforms.json",
-             "{" LENS "\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"aabb_scale\":16,\"frames\":["
-             "{\"file_path\":\"./images/f_1.jpg\",\"transform_matrix\":" MATRIX ",\"sharpness\":9},"
-             "{\"file_path\":\"images/f_2\",\"transform_matrix\":" MATRIX ",\"k1\":0,\"w\":320,\"fl_x\":250},"
-             "{\"file_path\":\"f_3.png\",\"transform_matrix\":" MATRIX
-             ",\"k1\":0,\"camera_model\":\"OPENCV_FISHEYE\"}]}");
+                    "{" LENS "\"camera_model\":\"OPENCV\",\"k1\":-0.1,\"aabb_scale\":16,\"frames\":["
+                    "{\"file_path\":\"./images/f_1.jpg\",\"transform_matrix\":" MATRIX ",\"sharpness\":9},"
+                    "{\"file_path\":\"images/f_2\",\"transform_matrix\":" MATRIX ",\"k1\":0,\"w\":320,\"fl_x\":250},"
+                    "{\"file_path\":\"f_3.png\",\"transform_matrix\":" MATRIX
+                    ",\"k1\":0,\"camera_model\":\"OPENCV_FISHEYE\"}]}");
     if (load(&list, in_folder("transforms.json"), NULL, NULL, &err))
         fail_msg("%s", err.message);
     assert_int_equal(list.count, 3);
@@ -271,7 +271,8 @@ static void transforms_give_cameras_and_lenses(void **state)
     } rows[] = {
         {"{\"frames\":{}}", "frames", "an object"},
         {"{\"frames\":[3]}", "file_path", "missing"},
-        {"{\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX "}]}", "w", "frames[0]"},
+        {"{\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX "}]}", "", "a.png: there is no such file"},
+        {"{\"w\":64,\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX "}]}", "h", "frames[0]"},
         {"{\"w\":9e9,\"h\":9,\"frames\":[{\"file_path\":\"a\"}]}", "w", "9e+09"},
         {"{\"w\":64,\"h\":48,\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":" MATRIX "}]}", "fl_x", "focal"},
         {"{" LENS "\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":[[1,2],[3]]}]}", "transform_matrix", "row"},
@@ -295,6 +296,44 @@ static void transforms_give_cameras_and_lenses(void **state)
         assert_string_equal(why.field, rows[i].field);
         if (!strstr(why.message, rows[i].says))
             fail_msg("'%s' lacks '%s'", why.message, rows[i].says);
+    }
+}
+
+/* Blender and instant-ngp write a view's angle alone, and programs on Windows its slashes. */
+static void transforms_without_a_size_have_their_images(void **state)
+{
+    static const struct {
+        const char *file, *name, *photograph; /* photograph: below the folder */
+    } rows[] = {{"images/a", "images_a", "images/a.png"},      {"./images\\\\a.png", "images_a", "images/a.png"},
+                {"odd\\\\b.png", "odd\\b", "odd\\b.png"},      {"train\\\\gone.jpg", NULL, "/train/gone.jpg"},
+                {"images/gone.jpg", NULL, "/images/gone.jpg"}, {"/none/gone.jpg", NULL, "/none/gone.jpg"}};
+    char command[300], text[600];
+    (void)state;
+    snprintf(command, sizeof command, "mkdir -p %s/images", test_folder);
+    assert_int_equal(system(command), 0);
+    folder_put_text("images/a.png", "x");
+    folder_put_text("odd\\b.png", "x");
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct spl_view_list list;
+        struct spl_error err = {0};
+        snprintf(text, sizeof text,
+                 "{\"camera_angle_x\":1.2870022175866687,\"frames\":[{\"file_path\":\"%s\",\"transform_matrix\":" MATRIX
+                 "}]}",
+                 rows[i].file);
+        folder_put_text("transforms.json", text);
+        int rc = load(&list, in_folder("transforms.json"), NULL, NULL, &err);
+        assert_int_equal(rc, rows[i].name ? 0 : SPL_E_NOT_FOUND);
+        if (rc) {
+            if (!strstr(err.message, rows[i].photograph) || strstr(err.message, "images/images"))
+                fail_msg("row %zu: %s", i, err.message);
+            continue;
+        }
+        const struct spl_camera *camera = &list.views[0].camera;
+        assert_string_equal(list.views[0].name, rows[i].name);
+        assert_non_null(strstr(list.views[0].photograph, rows[i].photograph));
+        assert_true(camera->width == 640 && camera->height == 480 && camera->cx == 320 && camera->cy == 240);
+        assert_true(fabs(camera->fx - 426.6666666) < 1e-6 && camera->fy == camera->fx);
+        spl_view_list_finish(&list);
     }
 }
 
@@ -411,6 +450,7 @@ int main(void)
         cmocka_unit_test_teardown(broken_binary_models_are_refused_by_offset, clean),
         cmocka_unit_test_teardown(a_fault_of_one_photograph_is_handed_out, clean),
         cmocka_unit_test_teardown(transforms_give_cameras_and_lenses, clean),
+        cmocka_unit_test_teardown(transforms_without_a_size_have_their_images, clean),
         cmocka_unit_test_teardown(open3d_photographs_are_those_of_the_folder, clean),
         cmocka_unit_test_teardown(pose_folders_take_their_size_from_photographs, clean),
         cmocka_unit_test(lenses_have_an_end),

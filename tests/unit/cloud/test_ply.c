@@ -196,6 +196,18 @@ static void colour_range_is_found(void **state)
     assert_color(&l, 0, 1, 0, 0);
     assert_color(&l, 1, 255, 0, 1);
     loaded_finish(&l);
+    colour("ushort", "1023 4 0", "511 2 1", &l); /* 10 */
+    assert_true(l.colors.white == 1023 && l.colors.dark == 0);
+    assert_color(&l, 0, 255, 1, 0);
+    loaded_finish(&l);
+    colour("ushort", "4095 16 0", "2048 8 1", &l); /* 12 */
+    assert_true(l.colors.white == 4095 && l.colors.dark == 0);
+    assert_color(&l, 0, 255, 1, 0);
+    loaded_finish(&l);
+    colour("ushort", "1285 257 0", "3 4 5", &l); /* 16, as far as anybody knows */
+    assert_true(l.colors.white == 65535 && l.colors.dark == 1285);
+    assert_color(&l, 0, 5, 1, 0);
+    loaded_finish(&l);
     colour("float", "0 0.5 1", "-0.25 nan 0.999", &l);
     assert_color(&l, 0, 0, 128, 255);
     assert_color(&l, 1, 0, 0, 255);

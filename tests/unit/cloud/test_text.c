@@ -496,9 +496,40 @@ static void a_mark_before_it_changes_no_format(void **state)
         }
 }
 
+/* As a file system or an upload fills a file's last block; within a text they are none. */
+static void zeros_at_the_end_are_passed_over(void **state)
+{
+    static const struct {
+        const char *end;
+        size_t zeros;
+        const char *behind;
+    } rows[] = {{"\n", 1, ""},        {"\n", 5000, ""},   {"", 3, ""},         {"\n", 3, "\x1a"},
+                {"\n\x1a", 4096, ""}, {"\nEND\n", 2, ""}, {"\n", 3 * 4096, ""}};
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        b.length = 0;
+        put_text(&b, "1 2 3\n4 5 6%s", rows[i].end);
+        put_zeros(&b, rows[i].zeros);
+        put_text(&b, "%s", rows[i].behind);
+        load_bytes(&b, NULL, 7, &l);
+        assert_int_equal(l.points, 2);
+        assert_point(&l, 1, 4, 5, 6);
+        loaded_finish(&l);
+    }
+    b.length = 0;
+    put(&b, "1 2 3\n\0\0\0\n4 5 6\n", 16);
+    refused(&b, NULL, SPL_E_INPUT, "", "no point cloud");
+    b.length = 0;
+    put_zeros(&b, 6);
+    refused(&b, NULL, SPL_E_INPUT, "", "no point cloud");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(zeros_at_the_end_are_passed_over),
         cmocka_unit_test(a_mark_before_it_changes_no_format),
         cmocka_unit_test(separators_headers_and_comments),
         cmocka_unit_test(named_columns),

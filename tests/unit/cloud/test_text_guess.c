@@ -94,6 +94,20 @@ static void numbers_in_any_order_are_no_x(void **state)
         {200, 0, "%d 5000%02d 53000%02d 412\n", "-,x,y,z"},
         {200, -3, "%d 26000%02d 12000%02d 412\n", "-,x,y,z"},
         {200, 3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "-,x,y,z"}, /* times */
+        {200, 1, "171456%d.001 %d.25 %d.75 0.000 7\n", "-,x,y,z,intensity"},
+        {200, 1, "171456%d 5000%02d.25 53000%02d.5 41.5\n", "-,x,y,z"},
+        {200, 1, "171456%d000 %d %d 2500 9 8 255\n", "-,x,y,z,red,green,blue"}, /* milliseconds, millimetres */
+        {2, 1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, 0, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, -1, "171456%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"},
+        {200, 3, "300.%d %d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d %d.25 %d.75 0.125 9\n", "-,x,y,z,intensity"}, /* GPS's seconds of a week */
+        {19, 3, "300000.%d %d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d 999%02d.25 %d.75 0.125 9\n", "x,y,z,intensity,-"},
+        {200, 3, "300000.%d %d.25 %d.75 41 9\n", "x,y,z,intensity,-"},
+        {200, 3, "32%d.5 56000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},        /* easts that are sorted, with a zone */
+        {200, 1, "320%d000.5 1560000%02d.25 %d.75 0.5\n", "x,y,z,intensity"},  /* millimetres */
+        {200, 4000000, "17%d.001 %d.25 %d.75 0.000 7\n", "x,y,z,intensity,-"}, /* no time passes as fast */
         {200, -3, "%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
         {200, 3, "-%d.125 5000%02d.25 53000%02d.5 412.75\n", "x,y,z,intensity"},
         {200, -3, "%d 5000%02d 53000%02d 41200\n", "x,y,z,intensity"},           /* millimetres */
@@ -126,6 +140,47 @@ static void colors_are_near_each_other(void **state)
     };
     (void)state;
     CHECK(guesses);
+}
+
+/* Of a class there are few small numbers, wherever it stands beside a colour, and however near to its neighbour. */
+static void a_class_is_no_color(void **state)
+{
+    static const struct {
+        int lines, red, green, blue, wide; /* of a channel: its least value, and how many there are */
+        int class, classes, fourth; /* fourth: before them 1 an intensity, 2 the class, 3 an intensity, and no class */
+        const char *guessed;
+    } rows[] = {
+        {200, 90, 130, 60, 40, 2, 1, 0, "x,y,z,red,green,blue,class"},
+        {200, 150, 60, 40, 30, 6, 1, 0, "x,y,z,red,green,blue,class"}, /* a roof: green, blue and 6 are nearer */
+        {200, 40, 90, 20, 40, 3, 3, 0, "x,y,z,red,green,blue,class"},
+        {200, 150, 60, 40, 3, 2, 2, 0, "x,y,z,red,green,blue,class"}, /* few colours */
+        {200, 20, 60, 200, 40, 2, 4, 2, "x,y,z,intensity,red,green,blue"},
+        {200, 150, 60, 40, 30, 2, 3, 1, "x,y,z,intensity,red,green,blue,class"},
+        {200, 150, 100, 40, 30, 0, 31, 0, "x,y,z,intensity,red,green,blue"}, /* dark blue, of many values */
+        {200, 60, 140, 60, 1, 2, 1, 0, "x,y,z,red,green,blue,class"},        /* a meadow of one colour */
+        {200, 60, 140, 60, 1, 2, 1, 1, "x,y,z,intensity,red,green,blue,class"},
+        {200, 60, 60, 30, 1, 0, 1, 3, "x,y,z,intensity,red,green,blue"},  /* an intensity takes more values */
+        {10, 150, 60, 40, 30, 6, 1, 0, "x,y,z,intensity,red,green,blue"}, /* few lines: what is nearest */
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        static struct bytes b;
+        struct loaded l;
+        b.length = 0;
+        for (int k = 0; k < rows[i].lines; k++) {
+            const int a = rows[i].red + k % rows[i].wide, g = rows[i].green + k * 7 % rows[i].wide;
+            const int c = rows[i].blue + k * 11 % rows[i].wide, class = rows[i].class + k % rows[i].classes;
+            put_text(&b, "%d.5 %d.25 3.75", k % 9, k % 7);
+            if (rows[i].fourth)
+                put_text(&b, " %d", rows[i].fourth != 2 ? 10 + k * 13 % 240 : class);
+            put_text(&b, " %d %d %d", a, g, c);
+            put_text(&b, rows[i].fourth > 1 ? "\n" : " %d\n", class);
+        }
+        load_bytes(&b, NULL, 7, &l);
+        if (strcmp(l.guessed, rows[i].guessed) != 0)
+            fail_msg("row %zu: \"%s\" instead of \"%s\"", i, l.guessed, rows[i].guessed);
+        loaded_finish(&l);
+    }
 }
 
 /* As FARO's program writes them, before x y z; whole metres of a grid have no two fractions behind z. */
@@ -664,6 +719,14 @@ static void a_north_before_the_east_is_told(void **state)
         {"\xe2\x84\x96;X;Y;H\n1;6180000;7412000.5;120\n", zone},
         {"\xe2\x84\x96;X;Y;H\n1;6180000;12612000.5;120\n", zone},
         {"Nr;X;Y;H\n1;7412000.5;6180000;120\n", NULL},
+        {"5600009.5 5500000.2 120\n", zone},
+        {"5500000.2 5600009.5 120\n", NULL},
+        {"5580009.5 5560000.2 120\n", NULL}, /* either */
+        {"\xe2\x84\x96;X;Y;H\n1;5600009.5;6500000.2;120\n", zone},
+        {"Nr;X;Y;H\n1;6500000.2;5600009.5;120\n", NULL},
+        {"5600009.5 7380000.2 120\n", zone},
+        {"5600009.5 8619999.2 120\n", zone},
+        {"5600009.5 8620001.2 120\n", NULL},
         {"Nr;X;Y;H\n1;5333000;4468000.5;520\n", zone},
         {"1 4468000.5 5333000 520.5\n2 4468001 5333001 520\n", NULL},
         {"Nr;X;Y;H\n1;5420000;5811000;34\n", NULL}, /* Berlin in its order */
@@ -709,6 +772,7 @@ int main(void)
         cmocka_unit_test(a_first_column_that_counts_is_no_x),
         cmocka_unit_test(numbers_in_any_order_are_no_x),
         cmocka_unit_test(colors_are_near_each_other),
+        cmocka_unit_test(a_class_is_no_color),
         cmocka_unit_test(rows_and_columns_of_a_station_are_no_place),
         cmocka_unit_test(echoes_are_no_colors),
         cmocka_unit_test(echoes_before_a_class_are_no_colors),

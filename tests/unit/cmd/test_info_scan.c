@@ -111,7 +111,7 @@ static void test_columns_by_their_values(void **state)
     write_text("numbered.txt", "1 2.5 0 3\n2 2 4 3\n3 2 5 3\n");
     assert_int_equal(run("info numbered.txt", output, sizeof output), 0);
     assert_non_null(
-        strstr(output, "\n  columns       -,x,y,z by the values: the first numbers or names the points\n"));
+        strstr(output, "\n  columns       -,x,y,z by the values: the first numbers, names or times the points\n"));
     write_text("floor.xyz", "Nr Y X H Rot\nP1 1 2 3 9\n");
     assert_int_equal(run("info floor.xyz", output, sizeof output), 0);
     assert_non_null(strstr(output, "\n  columns       Y is the east and X the north"));

@@ -202,8 +202,8 @@ static void test_guesses_are_noted(void **state)
         {"", "%d.5 %d 3\n", ""},
         {"x y z r g b\n", "%d.5 %d 3 9 9 9\n", ""},
         {"", "%d %d.5 4 3\n",
-         "a.txt: columns are -,x,y,z by their values, of which the first numbers or names the points; --columns says "
-         "otherwise\n"},
+         "a.txt: columns are -,x,y,z by their values, of which the first numbers, names or times the points; --columns "
+         "says otherwise\n"},
         {"", "%d.5 %d 4 0 0 1\n", "a.txt: columns are x,y,z,nx,ny,nz by their values; --columns says otherwise\n"},
         {"", "53000%02d.5 5000%02d.25 3\n",
          "a.txt: x has seven digits and y six, as where the north comes before the east: then y and x change places in "
@@ -342,6 +342,12 @@ static void test_ranges_of_colours(void **state)
                black = {0.001, 0, 0, NULL, 0, 100};
     const char *text = pack_two(write_las("8.las", &bits8), write_las("16.las", &bits16), false, NULL);
     assert_non_null(strstr(text, "colours are 8 bit, none above 255, in 1 (8.las) and 16 bit in 1 (16.las)"));
+    struct las bits10 = {0.001, 0, 0, NULL, 10, 100}, dim = {0.001, 0, 0, NULL, 15, 100};
+    text = pack_two(write_las("10.las", &bits10), path_of("16.las"), false, NULL);
+    assert_non_null(strstr(text, "colours are 10 bit, none above 1023, in 1 (10.las) and 16 bit in 1 (16.las)"));
+    text = note_two(path_of("10.las"), write_las("dim.las", &dim));
+    assert_non_null(strstr(text, "10.las: 0 is black and 1023 white by the largest colour\n"));
+    assert_non_null(strstr(text, "dim.las: colours are nearly black: 65535 is white, and none is above 1485\n"));
     text = pack_two(path_of("16.las"), write_las("black.las", &black), false, NULL);
     assert_non_null(strstr(text, "nothing but 0 in black.las"));
     assert_non_null(strstr(text, "RGB in 1 (16.las), grey from intensity in 1 (black.las)"));

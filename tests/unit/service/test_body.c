@@ -32,7 +32,7 @@ static void values_are_counted_before_they_are_parsed(void **state)
         size_t values; /* as it is counted: exact, but for one more in each empty array or object */
     } cases[] = {
         {"[1,2,3]", 4},        {"{\"a\":1,\"b\":[true,null]}", 5}, {"[[],{}]", 5}, {"[\"a,b,[{\\\",,\",\"\\\\\",3]", 4},
-        {" [ 1 , -2e5 ] ", 3},
+        {" [ 1 , -2e5 ] ", 3}, {"\xef\xbb\xbf[1,2]", 3}, /* behind the mark of UTF-8 */
     };
     struct spl_error err;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
