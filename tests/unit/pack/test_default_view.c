@@ -345,7 +345,10 @@ static void views_along_up_are_refused_at_once(void **state)
     (void)state;
     static const struct spl_saved_view down = {.name = "plan", .eye = {0, 0, 50}, .target = {0, 0, 1}},
                                        along_y = {.name = "side", .eye = {0, 9, 0}},
-                                       turned = {.name = "map", .eye = {0, 0, 50}, .up = {0, 1, 0}};
+                                       turned = {.name = "map", .eye = {0, 0, 50}, .up = {0, 1, 0}},
+                                       plan = {.name = "plan", .eye = {0, 0, 50}, .view_height = 9},
+                                       side = {.name = "side", .eye = {0, 9, 0}, .view_height = 9},
+                                       stiff = {.name = "stiff", .eye = {0, 0, 50}, .up = {0, 0, 2}, .view_height = 9};
     const struct {
         struct spl_pack_options options;
         const char *field, *says; /* NULL: the scan is missing, which is all that is wrong */
@@ -356,6 +359,9 @@ static void views_along_up_are_refused_at_once(void **state)
         {{.views = &along_y, .view_count = 1, .up = {0, -7, 0}}, "view", "give another, such as up="},
         {{.default_view = &down, .up = {0, -7, 0}}, NULL, NULL},
         {{.default_view = &along_y, .views = &turned, .view_count = 1}, NULL, NULL},
+        {{.views = &plan, .view_count = 1}, NULL, NULL}, /* a plan's up is +y then, as in views that are asked for */
+        {{.views = &side, .view_count = 1, .up = {0, -7, 0}}, NULL, NULL},
+        {{.views = &stiff, .view_count = 1}, "view", "--view stiff: from eye 0,0,50 to target 0,0,0 with up 0,0,2: "},
     };
     const char *const gone[] = {"/nonexistent/gone.ply"};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
