@@ -129,6 +129,101 @@ static void a_room_is_seen_from_inside_lengthwise(void **state)
     free(cloud.at);
 }
 
+/* The cloud as PTX of `stations` scans, each a part of it, that say that they were all taken from `at`. */
+static struct spl_dataset *open_stations(const struct cloud *cloud, size_t stations, const double at[3])
+{
+    char ptx[80];
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0};
+    snprintf(ptx, sizeof ptx, "%s/in.ptx", folder);
+    FILE *f = fopen(ptx, "w");
+    assert_non_null(f);
+    for (size_t k = 0; k < stations; k++) {
+        fprintf(f, "%zu\n1\n%g %g %g\n1 0 0\n0 1 0\n0 0 1\n", (cloud->count - k + stations - 1) / stations, at[0],
+                at[1], at[2]);
+        fprintf(f, "1 0 0 0\n0 1 0 0\n0 0 1 0\n%g %g %g 1\n", at[0], at[1], at[2]);
+        for (size_t i = k; i < cloud->count; i += stations)
+            fprintf(f, "%.6f %.6f %.6f 0.5\n", (double)cloud->at[i][0] - at[0], (double)cloud->at[i][1] - at[1],
+                    (double)cloud->at[i][2] - at[2]);
+    }
+    assert_int_equal(fclose(f), 0);
+    const char *input = ptx;
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = &input, .input_count = 1, .output = packed, .threads = 2};
+    if (spl_pack(&options, NULL, &err) || spl_dataset_open(packed, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    unlink(ptx);
+    return dataset;
+}
+
+static void shift(struct cloud *cloud, double x, double y, double z)
+{
+    for (size_t i = 0; i < cloud->count; i++) {
+        cloud->at[i][0] += (float)x;
+        cloud->at[i][1] += (float)y;
+        cloud->at[i][2] += (float)z;
+    }
+}
+
+/* Scans that were brought into one system say that they were taken from its origin: a point of the floor, often. A
+ * scanner does not lie there, nor do several stand in one place. */
+static void an_origin_is_no_place_of_an_eye(void **state)
+{
+    (void)state;
+    static const struct {
+        double floor; /* beneath the origin */
+        size_t stations;
+        bool stood;
+    } cases[] = {{0, 1, false}, {0.25, 1, false}, {-0.05, 1, false}, {0, 3, false}, {1.2, 2, false}, {1.2, 1, true}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
+        for (int storeys = 1; storeys <= 2; storeys++) {
+            struct cloud cloud = {0};
+            add_box(&cloud, 10, 5, 3, 0.15, false);
+            shift(&cloud, -4, -2.5, 0);
+            if (storeys == 2) { /* and one beneath */
+                shift(&cloud, 4, 2.5, 3.2);
+                add_box(&cloud, 10, 5, 3, 0.15, false);
+                shift(&cloud, -4, -2.5, -3.2);
+            }
+            shift(&cloud, 0, 0, -cases[k].floor);
+            struct spl_dataset *dataset = open_stations(&cloud, cases[k].stations, (double[]){0, 0, 0});
+            const double *eye = spl_dataset_get_info(dataset)->default_eye;
+            const double over = eye[2] + cases[k].floor + (eye[2] + cases[k].floor < -0.2 ? 3.2 : 0);
+            if (cases[k].stood != (eye[0] == 0 && eye[1] == 0 && eye[2] == 0) || !(over > 1 && over < 2.2))
+                fail_msg("case %zu, %d storeys: %g,%g,%g", k, storeys, eye[0], eye[1], eye[2]);
+            assert_true(eye[0] > -3.8 && eye[0] < 5.8 && fabs(eye[1]) < 2.3);
+            spl_dataset_close(dataset);
+            free(cloud.at);
+        }
+}
+
+/* A street has no ceiling, but who stands above its origin sees all of it; of a lawn with a house, next to nothing. */
+static void one_stands_above_an_origin_or_goes_away(void **state)
+{
+    (void)state;
+    static const double none[3] = {0};
+    struct cloud street = {0}, house = {0};
+    add_sheet(&street, (double[]){-30, -5, 0}, (double[]){60, 0, 0}, (double[]){0, 10, 0}, 0.25, none);
+    add_sheet(&street, (double[]){-30, -5, 0}, (double[]){60, 0, 0}, (double[]){0, 0, 9}, 0.25, none);
+    add_sheet(&street, (double[]){-30, 5, 0}, (double[]){60, 0, 0}, (double[]){0, 0, 9}, 0.25, none);
+    struct spl_dataset *dataset = open_stations(&street, 1, none);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    assert_true(fabs(info->default_eye[0]) < 1e-9 && fabs(info->default_eye[1]) < 1e-9);
+    assert_true(info->default_eye[2] > 1.5 && info->default_eye[2] < 1.7);
+    assert_true(fabs(info->default_target[0]) > 5 && fabs(info->default_target[1]) < 2);
+    spl_dataset_close(dataset);
+
+    add_box(&house, 6, 4, 4, 0.1, false);
+    shift(&house, -3, -2, 0);
+    add_sheet(&house, (double[]){-12, -12, 0}, (double[]){24, 0, 0}, (double[]){0, 24, 0}, 0.2, none);
+    dataset = open_stations(&house, 1, none);
+    info = spl_dataset_get_info(dataset);
+    assert_true(hypot(info->default_eye[0], info->default_eye[1]) > 6 && info->default_eye[2] > 2);
+    spl_dataset_close(dataset);
+    free(street.at);
+    free(house.at);
+}
+
 /* A tray has no ceiling: one looks into it from above. */
 static void what_is_open_is_seen_from_outside(void **state)
 {
@@ -473,6 +568,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
+        cmocka_unit_test(an_origin_is_no_place_of_an_eye),
+        cmocka_unit_test(one_stands_above_an_origin_or_goes_away),
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_stands_over_is_in_it),
