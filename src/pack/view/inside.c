@@ -1,6 +1,7 @@
 /* The scene lies around a place when most rays from it meet something: all around for a place in a room, at least along
  * the ground where a scanner or a camera stood, since a court has no ceiling. Rooms without either are found by their
- * floors: a column of cells with a floor, a ceiling and somebody's height between them is a place to stand.
+ * floors: a column of cells with a floor, a ceiling and somebody's height between them is a place to stand, unless it
+ * is a thing that shows outwards all around. Where an origin lies on the ground, one may stand above it.
  *
  * Of these places and of all ways to look the one with the longest free way is taken, by the mean of its rays: it
  * stands at one end of the largest room and shows it lengthwise. What is close before the eye, and holes, count against
@@ -20,6 +21,8 @@ static const double room_least = 0.85;  /* of all rays meet something */
 static const double court_least = 0.8;  /* of those between the ground and 35 degrees above the horizon */
 static const double rooms_least = 0.25; /* of the columns that hold something are places in a room */
 static const double raised_least = 0.5; /* of the surface is seen from above where an origin is */
+static const double away_least = 0.8;   /* of the surface of a thing shows away from its middle */
+static const double level = 0.95, upright = 0.1, straight_most = 0.5; /* by how far normals show up; of it are so */
 static const double ring_low = -0.25, ring_step = 0.125; /* tangents of the rays of a way to look */
 static const double fit[2] = {58, 66};
 
@@ -84,6 +87,26 @@ static double eye_height(const struct spl_view_sample *s, double room)
 {
     double half = 0.55 * room;
     return s->metre > 0 ? fmin(1.6 * s->metre, half) : half;
+}
+
+/* Is it seen from outside, as a thing that was scanned all around: does nearly all of it show away from its middle?
+ * Where nobody knows its sides, which pack then tells by floors and ceilings (shell.c), it has neither level nor
+ * upright surfaces besides, as rooms do: those in millimetres are told from things by nothing else. */
+static bool is_thing(const struct spl_view_sample *s)
+{
+    double all = 0, away = 0, straight = 0;
+    for (size_t i = 0; s->normal && i < s->count; i++) {
+        const double area = (double)s->area[i], upward = fabs((double)s->normal[i][2]);
+        double along = 0, square = 0;
+        for (int c = 0; c < 3; c++) {
+            along += (double)s->normal[i][c] * (s->at[i][c] - 0.5 * (s->low[c] + s->high[c]));
+            square += (double)s->normal[i][c] * (double)s->normal[i][c];
+        }
+        all += square > 0 ? area : 0;
+        away += along > 0 ? area : 0;
+        straight += square > 0 && (upward > level || upward < upright) ? area : 0;
+    }
+    return away > away_least * all && (s->sides || straight < straight_most * all);
 }
 
 /* Places to stand in rooms; none where rooms are a small part of the scene. */
@@ -184,7 +207,7 @@ int spl_view_from_inside(const struct spl_view_sample *s, const struct spl_view_
         return rc;
     }
     size_t count = list_stood(&cells, stood, places);
-    if (!count)
+    if (!count && !is_thing(s))
         count = list_rooms(s, &cells, places, stand_max);
     if (!count)
         count = list_raised(s, &cells, stood, places);

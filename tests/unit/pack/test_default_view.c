@@ -224,6 +224,71 @@ static void one_stands_above_an_origin_or_goes_away(void **state)
     free(house.at);
 }
 
+/* An ellipsoid, 4 wide and 5.6 high, whose normals show outwards or, where `way` is -1, inwards. */
+static void add_egg(struct cloud *cloud, double way, double scale)
+{
+    enum { points = 12000 };
+    for (int i = 0; i < points; i++) {
+        const double z = 1 - 2 * (i + 0.5) / points, r = sqrt(1 - z * z), a = i * M_PI * (3 - sqrt(5));
+        const double n[3] = {r * cos(a) / 2, r * sin(a) / 2, z / 2.8};
+        const double length = way / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        add(cloud, scale * r * cos(a) * 2, scale * r * sin(a) * 2, scale * (z + 1) * 2.8, n[0] * length, n[1] * length,
+            n[2] * length);
+    }
+}
+
+/* Is the eye within the bounds of the points? */
+static bool seen_from_inside(const struct cloud *cloud, bool normals, const char *unit)
+{
+    struct spl_dataset *dataset = open_packed(cloud, normals, unit);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    bool inside = true;
+    for (int c = 0; c < 3; c++)
+        inside &= info->default_eye[c] > info->bounds_min[c] && info->default_eye[c] < info->bounds_max[c];
+    spl_dataset_close(dataset);
+    return inside;
+}
+
+/* Closed all around, as a room is; normals say which of both it is, and so does what has neither floor nor walls. */
+static void a_thing_is_seen_from_outside_and_a_room_from_inside(void **state)
+{
+    (void)state;
+    static const struct {
+        double egg, room, scale; /* which way normals show, 0: there is none */
+        bool normals;
+        const char *unit;
+        bool inside;
+    } cases[] = {
+        {1, 0, 1, true, "unknown", false}, {1, 0, 1, true, "m", false},       {-1, 0, 1, true, "unknown", true},
+        {-1, 0, 1, true, "m", true},       {1, 0, 1, false, "unknown", false}, {1, 0, 0.025, false, "unknown", false},
+        {1, 0, 20, false, "mm", false},    {0, 1, 1, true, "unknown", true},  {0, -1, 1, true, "unknown", false},
+        {0, -1, 1, true, "m", false},      {0, 1, 1000, false, "unknown", true}, /* no less than one in metres */
+        {0, 1, 1, false, "m", true},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct cloud cloud = {0};
+        if (cases[k].egg != 0)
+            add_egg(&cloud, cases[k].egg, cases[k].scale);
+        else
+            add_box(&cloud, 10, 5, 3, 0.15, false);
+        for (size_t i = 0; cases[k].room != 0 && i < cloud.count; i++) {
+            float *at = cloud.at[i];
+            const double size[3] = {10, 5, 3};
+            int axis = 0;
+            for (int c = 0; c < 3; c++) /* of the side that it lies on */
+                if (fmin((double)at[c], size[c] - (double)at[c]) <
+                    fmin((double)at[axis], size[axis] - (double)at[axis]))
+                    axis = c;
+            at[3 + axis] = (float)((double)at[axis] < 0.5 * size[axis] ? cases[k].room : -cases[k].room);
+            for (int c = 0; c < 3; c++)
+                at[c] *= (float)cases[k].scale;
+        }
+        if (seen_from_inside(&cloud, cases[k].normals, cases[k].unit) != cases[k].inside)
+            fail_msg("case %zu is seen from %s", k, cases[k].inside ? "outside" : "inside");
+        free(cloud.at);
+    }
+}
+
 /* A tray has no ceiling: one looks into it from above. */
 static void what_is_open_is_seen_from_outside(void **state)
 {
@@ -570,6 +635,7 @@ int main(void)
         cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
         cmocka_unit_test(an_origin_is_no_place_of_an_eye),
         cmocka_unit_test(one_stands_above_an_origin_or_goes_away),
+        cmocka_unit_test(a_thing_is_seen_from_outside_and_a_room_from_inside),
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_stands_over_is_in_it),
