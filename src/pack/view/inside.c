@@ -155,7 +155,8 @@ static size_t list_stood(const struct spl_view_cells *cells, const struct spl_vi
     return 2 * inside >= stood->taken ? stood->count : 0;
 }
 
-/* How much of the sample's surface one sees from `eye`, of a part of its points. */
+/* How much of the sample's surface one sees from `eye`, of a part of its points. Along the walls of a corridor rays go
+ * through cells of these long before they are there. */
 static double seen_from(const struct spl_view_sample *s, const struct spl_view_cells *cells, const double eye[3])
 {
     const size_t count = s->count < seen_max ? s->count : seen_max;
@@ -172,7 +173,7 @@ static double seen_from(const struct spl_view_sample *s, const struct spl_view_c
         for (int c = 0; c < 3; c++)
             way[c] /= fmax(length, DBL_MIN);
         all += (double)s->area[i];
-        seen += spl_view_cells_look(cells, eye, way, &hit) > length - 2 * cells->cell ? (double)s->area[i] : 0;
+        seen += spl_view_cells_look(cells, eye, way, &hit) > 0.5 * length - 2 * cells->cell ? (double)s->area[i] : 0;
     }
     return all > 0 ? seen / all : 0;
 }

@@ -213,6 +213,16 @@ static void one_stands_above_an_origin_or_goes_away(void **state)
     assert_true(fabs(info->default_target[0]) > 5 && fabs(info->default_target[1]) < 2);
     spl_dataset_close(dataset);
 
+    struct cloud corridor = {0};
+    add_box(&corridor, 20, 1.2, 2.4, 0.05, false);
+    shift(&corridor, -3, -0.6, 0);
+    dataset = open_stations(&corridor, 1, none);
+    info = spl_dataset_get_info(dataset);
+    assert_true(fabs(info->default_eye[0]) < 1e-9 && info->default_eye[2] > 1 && info->default_eye[2] < 1.7);
+    assert_true(info->default_target[0] > 2);
+    spl_dataset_close(dataset);
+    free(corridor.at);
+
     add_box(&house, 6, 4, 4, 0.1, false);
     shift(&house, -3, -2, 0);
     add_sheet(&house, (double[]){-12, -12, 0}, (double[]){24, 0, 0}, (double[]){0, 24, 0}, 0.2, none);
