@@ -158,7 +158,7 @@ struct spl_pack_options {
     const char *title;       /* at most 200 bytes of UTF-8 in a line; NULL = none */
     const char *description; /* at most 4000, in lines; NULL = none */
     /* Instead of the one that is found; its name does not matter. NULL = found. In this and the next, up 0, 0, 0 is
-     * what is up in the dataset, and fov 0 is 60. */
+     * what is up in the dataset (+y of an orthographic one that looks along that), and fov 0 is 60. */
     const struct spl_saved_view *default_view;
     const struct spl_saved_view *views; /* by their names, of any order */
     size_t view_count;                  /* at most SPL_SAVED_VIEWS_MAX */

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geom/camera_json.h"
 #include "geom/json.h"
 #include "geom/size.h"
 
@@ -132,7 +133,9 @@ int spl_saved_view_from_json(const json_t *json, const double up[3], bool named,
         return spl_fail_field(err, SPL_E_INPUT, "fov", "fov must be a number of degrees");
     if (fov)
         view->fov = json_number_value(fov);
-    if ((rc = get_height(json, view, err)) || (rc = get_settings(json_object_get(json, "settings"), view, err)))
+    if (!(rc = get_height(json, view, err)) && view->view_height != 0 && !json_object_get(json, "up"))
+        spl_camera_choose_up(up, view->eye, view->target, view->up);
+    if (rc || (rc = get_settings(json_object_get(json, "settings"), view, err)))
         return rc;
     return spl_saved_view_check(view, named, err);
 }

@@ -20,8 +20,9 @@ int spl_saved_view_check(const struct spl_saved_view *view, bool named, struct s
 
 /* {"eye": [3], "target": [3], "up": [3], "fov": degrees, "projection": "orthographic", "view_height": units,
  * "settings": {}}; all but the first two may be left out: `up`, 60, perspective (orthographic where view_height is
- * there), as high as the pinhole's image is where it looks, none. What settings say is the service's to know. "name" is
- * read where `named`, and must be there. Other keys are refused by name where `strict`. SPL_E_INPUT names the key. */
+ * there), as high as the pinhole's image is where it looks, none; of an orthographic one that looks along `up`, what
+ * spl_camera_choose_up() says. What settings say is the service's to know. "name" is read where `named`, and must be
+ * there. Other keys are refused by name where `strict`. SPL_E_INPUT names the key. */
 int spl_saved_view_from_json(const json_t *json, const double up[3], bool named, bool strict,
                              struct spl_saved_view *view, struct spl_error *err);
 

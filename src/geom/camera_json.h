@@ -140,6 +140,10 @@ int spl_json_get_number(const json_t *object, const char *path, double *out, str
 int spl_camera_from_values(const struct spl_value values[SPL_CAMERA_PARAMS], const struct spl_camera_defaults *defaults,
                            const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
+/* What is up in an orthographic view where nobody says so: `usual`, and of one that looks along it, as a plan does, +y,
+ * or -z where y is usual. `up` may be `usual`. */
+void spl_camera_choose_up(const double usual[3], const double eye[3], const double target[3], double up[3]);
+
 /* Of a view by its name that is orthographic, `view_height` high (0: it is not): so are the values, unless they say how
  * high, or through which lens. */
 void spl_camera_inherit_projection(struct spl_value values[SPL_CAMERA_PARAMS], double view_height);

@@ -32,20 +32,17 @@ static int get_point(const struct spl_value *v, enum spl_camera_param param, con
     return defaults->places->to_world(defaults->places, (uint32_t)v[SPL_CAMERA_crs].n[0], name, v[param].n, out, err);
 }
 
-/* What is up where nobody says so: of a plan, which looks along the default, +y, or +z where that is along it. */
-static void get_up(const struct spl_value *v, const double usual[3], const double eye[3], const double target[3],
-                   double up[3])
+void spl_camera_choose_up(const double usual[3], const double eye[3], const double target[3], double up[3])
 {
-    const double *given_up = given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual;
-    double along[3], square = 0, product = 0, length = 0;
-    memcpy(up, given_up, 3 * sizeof *up);
+    double square = 0, product = 0, length = 0;
+    memmove(up, usual, 3 * sizeof *up);
     for (int i = 0; i < 3; i++) {
-        along[i] = target[i] - eye[i];
-        square += along[i] * along[i];
+        const double along = target[i] - eye[i];
+        square += along * along;
         length += up[i] * up[i];
-        product += along[i] * up[i];
+        product += along * up[i];
     }
-    if (given(v, SPL_CAMERA_up) || !is_orthographic(v) || product * product < square * length * (1 - 1e-12))
+    if (product * product < square * length * (1 - 1e-12))
         return;
     const bool lies = fabs(up[1]) > fabs(up[2]); /* +y itself is up */
     memcpy(up, lies ? (double[]){0, 0, -1} : (double[]){0, 1, 0}, 3 * sizeof *up);
@@ -158,7 +155,10 @@ int spl_camera_resolve_pose(const struct spl_value *v, const struct spl_camera_d
         return rc;
     for (int i = 0; station && i < 3; i++)
         eye[i] = station[4 * i + 3];
-    get_up(v, usual_up, eye, target, up);
+    if (!given(v, SPL_CAMERA_up) && is_orthographic(v))
+        spl_camera_choose_up(usual_up, eye, target, up);
+    else
+        memcpy(up, given(v, SPL_CAMERA_up) ? v[SPL_CAMERA_up].n : usual_up, sizeof up);
     if (is_around(v))
         level(eye, target, up);
     *distance = hypot(hypot(target[0] - eye[0], target[1] - eye[1]), target[2] - eye[2]);

@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "dataset/saved_views.h"
+#include "geom/camera_json.h"
 
 static int check_text(const char *text, const char *field, size_t most, bool lines, struct spl_error *err)
 {
@@ -29,8 +30,11 @@ static int check_text(const char *text, const char *field, size_t most, bool lin
 static struct spl_saved_view complete(const struct spl_saved_view *given, const double up[3])
 {
     struct spl_saved_view view = *given;
-    if (view.up[0] == 0 && view.up[1] == 0 && view.up[2] == 0)
+    if (view.up[0] == 0 && view.up[1] == 0 && view.up[2] == 0) {
         memcpy(view.up, up, sizeof view.up);
+        if (view.view_height != 0)
+            spl_camera_choose_up(up, view.eye, view.target, view.up);
+    }
     if (view.fov == 0)
         view.fov = SPL_SAVED_VIEW_FOV;
     return view;

@@ -55,13 +55,17 @@ int spl_default_view_find(const struct spl_points *p, double unit_m, bool sides,
                           struct spl_default_view *view, struct spl_error *err)
 {
     struct spl_view_sample sample = {0};
+    struct spl_view_stood stood;
     bool found = view_from_camera(p, view);
     int rc = 0;
     if (!found) {
         memcpy(view->up, p->up, sizeof view->up);
         rc = spl_view_sample_init(&sample, p, unit_m, sides, err);
-        if (!rc)
-            rc = spl_view_from_inside(&sample, p, view, &found, err);
+        if (!rc) {
+            spl_view_list_stood(&sample, p, &stood);
+            sample.sides = sample.sides && !stood.origins; /* whose normals show to nobody */
+            rc = spl_view_from_inside(&sample, &stood, view, &found, err);
+        }
     }
     if (!rc && !found)
         rc = spl_view_from_outside(&sample, threads, view, err);

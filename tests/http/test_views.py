@@ -248,6 +248,12 @@ def test_a_plan_stays_a_plan():
             assert abs(reply.json()["view_height"] - 2 * math.dist(above["eye"], above["target"])) < 1e-9, reply.body
             assert put(d, "implied", {**above, "view_height": 2}).json()["projection"] == "orthographic"
             assert "projection" not in put(d, "pinhole", {**above, "projection": "perspective"}).json()
+            down = {"eye": [3, 0, 9], "target": [3, 0, 1]}  # up as in a view that is asked for
+            for height in ({"view_height": 4}, {"projection": "orthographic"}):
+                assert put(d, "down", {**down, **height}).json()["up"] == [0, 1, 0]
+            for wrong in (down, {**down, "view_height": 4, "up": [0, 0, 1]}):
+                reply = put(d, "wrong", wrong)
+                assert reply.status == 400 and reply.json()["field"] == "up", reply.body
             for wrong, field in (({"view_height": 0}, "view_height"), ({"view_height": 1e13}, "view_height"), ({"view_height": "5"}, "view_height"),
                                  ({"view_height": 5, "projection": "perspective"}, "view_height"), ({"projection": "cube"}, "projection"),
                                  ({"projection": 1}, "projection")):
@@ -255,6 +261,8 @@ def test_a_plan_stays_a_plan():
                 assert reply.status == 400 and reply.json()["field"] == field, (wrong, reply.body)
         with start() as d:  # another process reads the file
             assert views(d)["plan"]["view_height"] == 12.5 and views(d)["plan"]["projection"] == "orthographic"
+            one, other = (get(d, f"{query}&{size}").headers["ETag"] for query in ("view=down&view_height=4", "eye=3,0,9&target=3,0,1&view_height=4"))
+            assert one == other
             pose = "eye=3,0,9&target=0,0,1&up=0,0,1"
             for said, spelt in (("", "view_height=12.5"), ("&view_height=3", "view_height=3"), ("&units_per_pixel=0.5", "units_per_pixel=0.5"),
                                 ("&projection=orthographic", "view_height=12.5"), ("&fov=50", "fov=50"), ("&fx=50", "fx=50"),

@@ -1,12 +1,14 @@
 /* The scene lies around a place when most rays from it meet something: all around for a place in a room, at least along
  * the ground where a scanner or a camera stood, since a court has no ceiling. Rooms without either are found by their
- * floors: a column of cells with a floor, a ceiling and somebody's height between them is a place to stand.
+ * floors: a column of cells with a floor, a ceiling and somebody's height between them is a place to stand, unless it
+ * is a thing that shows outwards all around. Where an origin lies on the ground, one may stand above it.
  *
  * Of these places and of all ways to look the one with the longest free way is taken, by the mean of its rays: it
  * stands at one end of the largest room and shows it lengthwise. What is close before the eye, and holes, count against
  * it. One thread; the outcome depends on the points alone. */
 #include "pack/view/inside.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,24 +16,15 @@
 #include "base/memory.h"
 #include "pack/view/cells.h"
 
-enum { across = 64, sphere = 128, azimuths = 36, window = 3, rings = 5, stand_max = 512, stood_max = 64 };
+enum { across = 64, sphere = 128, azimuths = 36, window = 3, rings = 5, stand_max = 512, seen_max = 3000 };
 static const double room_least = 0.85;  /* of all rays meet something */
 static const double court_least = 0.8;  /* of those between the ground and 35 degrees above the horizon */
 static const double rooms_least = 0.25; /* of the columns that hold something are places in a room */
+static const double raised_least = 0.5; /* of the surface is seen from above where an origin is */
+static const double away_least = 0.8;   /* of the surface of a thing shows away from its middle */
+static const double level = 0.95, upright = 0.1, straight_most = 0.5; /* by how far normals show up; of it are so */
 static const double ring_low = -0.25, ring_step = 0.125; /* tangents of the rays of a way to look */
 static const double fit[2] = {58, 66};
-
-struct place {
-    double eye[3];
-};
-
-static bool in_box(const struct spl_view_sample *s, const double at[3])
-{
-    for (int a = 0; a < 3; a++)
-        if (!(at[a] >= s->low[a] && at[a] <= s->high[a]))
-            return false;
-    return true;
-}
 
 /* Of the rays from `eye` whose sine of elevation lies in [low, high], how many meet something. Even over the sphere. */
 static double enclosed(const struct spl_view_cells *cells, const double eye[3], double low, double high)
@@ -89,26 +82,6 @@ static struct look look_round(const struct spl_view_sample *s, const struct spl_
     return best;
 }
 
-/* Where scanners and cameras stood, of many at even steps, as far as the scene lies around them. */
-static size_t list_stood(const struct spl_view_sample *s, const struct spl_view_cells *cells,
-                         const struct spl_points *points, struct place *places)
-{
-    size_t stations = points->station_count, all = stations + points->eye_count, count = 0;
-    size_t taken = all < stood_max ? all : stood_max, inside = 0;
-    for (size_t k = 0; k < taken; k++) {
-        size_t i = k * all / taken;
-        double world[3];
-        for (int c = 0; c < 3; c++)
-            world[c] = i < stations ? points->stations[i][4 * c + 3] : points->eyes[i - stations][c];
-        spl_view_to_frame(s, world, places[count].eye);
-        if (!in_box(s, places[count].eye))
-            continue;
-        inside += enclosed(cells, places[count].eye, -0.1, 0.57) >= court_least;
-        count++;
-    }
-    return 2 * inside >= taken ? count : 0;
-}
-
 /* The height of an eye over the floor: somebody's, or half a room's. */
 static double eye_height(const struct spl_view_sample *s, double room)
 {
@@ -116,8 +89,28 @@ static double eye_height(const struct spl_view_sample *s, double room)
     return s->metre > 0 ? fmin(1.6 * s->metre, half) : half;
 }
 
+/* Is it seen from outside, as a thing that was scanned all around: does nearly all of it show away from its middle?
+ * Where nobody knows its sides, which pack then tells by floors and ceilings (shell.c), it has neither level nor
+ * upright surfaces besides, as rooms do: those in millimetres are told from things by nothing else. */
+static bool is_thing(const struct spl_view_sample *s)
+{
+    double all = 0, away = 0, straight = 0;
+    for (size_t i = 0; s->normal && i < s->count; i++) {
+        const double area = (double)s->area[i], upward = fabs((double)s->normal[i][2]);
+        double along = 0, square = 0;
+        for (int c = 0; c < 3; c++) {
+            along += (double)s->normal[i][c] * (s->at[i][c] - 0.5 * (s->low[c] + s->high[c]));
+            square += (double)s->normal[i][c] * (double)s->normal[i][c];
+        }
+        all += square > 0 ? area : 0;
+        away += along > 0 ? area : 0;
+        straight += square > 0 && (upward > level || upward < upright) ? area : 0;
+    }
+    return away > away_least * all && (s->sides || straight < straight_most * all);
+}
+
 /* Places to stand in rooms; none where rooms are a small part of the scene. */
-static size_t list_rooms(const struct spl_view_sample *s, const struct spl_view_cells *c, struct place *places,
+static size_t list_rooms(const struct spl_view_sample *s, const struct spl_view_cells *c, struct spl_view_place *places,
                          size_t most)
 {
     size_t columns = 0, count = 0, rooms = 0;
@@ -140,7 +133,7 @@ static size_t list_rooms(const struct spl_view_sample *s, const struct spl_view_
             if (ceiling - floor < 4 || (s->metre > 0 && (ceiling - floor) * c->cell < 1.8 * s->metre))
                 continue;
             double room = (ceiling - floor - 1) * c->cell;
-            struct place place = {{c->low[0] + (x + 0.5) * c->cell, c->low[1] + (y + 0.5) * c->cell,
+            struct spl_view_place place = {{c->low[0] + (x + 0.5) * c->cell, c->low[1] + (y + 0.5) * c->cell,
                                    c->low[2] + (floor + 1) * c->cell + eye_height(s, room)}};
             if (enclosed(c, place.eye, -1, 1) < room_least)
                 continue;
@@ -151,11 +144,61 @@ static size_t list_rooms(const struct spl_view_sample *s, const struct spl_view_
     return (double)rooms >= rooms_least * (double)columns ? count : 0;
 }
 
-int spl_view_from_inside(const struct spl_view_sample *s, const struct spl_points *points,
+/* Of the places where somebody stood those that the scene lies around, or none where it does around fewer than half. */
+static size_t list_stood(const struct spl_view_cells *cells, const struct spl_view_stood *stood,
+                         struct spl_view_place *places)
+{
+    size_t inside = 0;
+    for (size_t i = 0; i < stood->count; i++)
+        inside += enclosed(cells, stood->places[i].eye, -0.1, 0.57) >= court_least;
+    memcpy(places, stood->places, stood->count * sizeof *places);
+    return 2 * inside >= stood->taken ? stood->count : 0;
+}
+
+/* How much of the sample's surface one sees from `eye`, of a part of its points. Along the walls of a corridor rays go
+ * through cells of these long before they are there. */
+static double seen_from(const struct spl_view_sample *s, const struct spl_view_cells *cells, const double eye[3])
+{
+    const size_t count = s->count < seen_max ? s->count : seen_max;
+    double all = 0, seen = 0;
+    for (size_t k = 0; k < count; k++) {
+        const size_t i = k * s->count / count;
+        double way[3], length = 0;
+        bool hit;
+        for (int c = 0; c < 3; c++) {
+            way[c] = s->at[i][c] - eye[c];
+            length += way[c] * way[c];
+        }
+        length = sqrt(length);
+        for (int c = 0; c < 3; c++)
+            way[c] /= fmax(length, DBL_MIN);
+        all += (double)s->area[i];
+        seen += spl_view_cells_look(cells, eye, way, &hit) > 0.5 * length - 2 * cells->cell ? (double)s->area[i] : 0;
+    }
+    return all > 0 ? seen / all : 0;
+}
+
+/* Above the ground where the origin of a scan is: who stands there sees most of it, around himself. */
+static size_t list_raised(const struct spl_view_sample *s, const struct spl_view_cells *cells,
+                          const struct spl_view_stood *stood, struct spl_view_place *places)
+{
+    const double high = 1.6 * (s->metre > 0 ? s->metre : 1); /* whose origin is at its foot is in metres */
+    size_t count = 0;
+    for (size_t i = 0; i < stood->foot_count; i++) {
+        double *eye = places[count].eye;
+        bool hit;
+        memcpy(eye, stood->feet[i].eye, sizeof places->eye);
+        eye[2] += fmin(high, 0.55 * spl_view_cells_look(cells, eye, (double[]){0, 0, 1}, &hit));
+        count += enclosed(cells, eye, -0.1, 0.57) >= court_least && seen_from(s, cells, eye) >= raised_least;
+    }
+    return count;
+}
+
+int spl_view_from_inside(const struct spl_view_sample *s, const struct spl_view_stood *stood,
                          struct spl_default_view *view, bool *found, struct spl_error *err)
 {
     struct spl_view_cells cells;
-    struct place *places = spl_alloc(stand_max, sizeof *places, err);
+    struct spl_view_place *places = spl_alloc(stand_max, sizeof *places, err);
     struct look best = {.score = -1};
     double eye[3], target[3], arm[3];
     *found = false;
@@ -164,9 +207,11 @@ int spl_view_from_inside(const struct spl_view_sample *s, const struct spl_point
         free(places);
         return rc;
     }
-    size_t count = list_stood(s, &cells, points, places);
-    if (!count)
+    size_t count = list_stood(&cells, stood, places);
+    if (!count && !is_thing(s))
         count = list_rooms(s, &cells, places, stand_max);
+    if (!count)
+        count = list_raised(s, &cells, stood, places);
     for (size_t i = 0; i < count; i++) {
         struct look look = look_round(s, &cells, places[i].eye);
         if (look.score <= best.score)

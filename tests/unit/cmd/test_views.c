@@ -67,6 +67,25 @@ static void test_pack_and_collect_take_the_same_views(void **state)
     assert_null(strstr(said, "\"door\""));
 }
 
+/* Where up is not said, as in views that are asked for: up is +y. */
+static void test_a_plan_needs_no_up(void **state)
+{
+    (void)state;
+    static const char *const ways[] = {"pack courtyard.ply", "pack --parts 2 courtyard.ply", "collect tile.spld"};
+    expect("pack courtyard.ply -o tile.spld", 0, "tile.spld");
+    for (size_t w = 0; w < sizeof ways / sizeof *ways; w++) {
+        char line[300], path[96];
+        struct spl_dataset *dataset;
+        snprintf(line, sizeof line, "%s --view top=eye=0,0,50,target=0,0,1,view_height=30 -o top.spld", ways[w]);
+        expect(line, 0, "top.spld");
+        snprintf(path, sizeof path, "%s/top.spld", folder);
+        assert_int_equal(spl_dataset_open(path, true, &dataset, NULL), 0);
+        const double *up = spl_dataset_get_info(dataset)->views[0].up;
+        assert_true(up[0] == 0 && up[1] == 1 && up[2] == 0);
+        spl_dataset_close(dataset);
+    }
+}
+
 static void test_what_is_no_view_is_refused(void **state)
 {
     (void)state;
@@ -81,6 +100,8 @@ static void test_what_is_no_view_is_refused(void **state)
         {"--view 'a b=eye=1,2,3,target=0,0,0'", "--view: 'a b' is no name"},
         {"--view a=eye=1,2,3,target=0,0,0 --view a=eye=1,2,4,target=0,0,0", "--view a is given twice"},
         {"--view a=eye=0,0,50,target=0,0,1", "--view a: from eye 0,0,50 to target 0,0,1 with up 0,0,1: "},
+        {"--view a=eye=0,0,50,target=0,0,1,up=0,0,3,view_height=9",
+         "--view a: from eye 0,0,50 to target 0,0,1 with up 0,0,3: "},
     };
     static const char *const ways[] = {"pack courtyard.ply -o none.spld", "pack --parts 2 courtyard.ply -o none.spld",
                                        "collect tile.spld -o none.spld", "pack --join job -o job/none.spld"};
@@ -126,6 +147,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pack_and_collect_take_the_same_views),
+        cmocka_unit_test(test_a_plan_needs_no_up),
         cmocka_unit_test(test_what_is_no_view_is_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -129,6 +129,176 @@ static void a_room_is_seen_from_inside_lengthwise(void **state)
     free(cloud.at);
 }
 
+/* The cloud as PTX of `stations` scans, each a part of it, that say that they were all taken from `at`. */
+static struct spl_dataset *open_stations(const struct cloud *cloud, size_t stations, const double at[3])
+{
+    char ptx[80];
+    struct spl_dataset *dataset = NULL;
+    struct spl_error err = {0};
+    snprintf(ptx, sizeof ptx, "%s/in.ptx", folder);
+    FILE *f = fopen(ptx, "w");
+    assert_non_null(f);
+    for (size_t k = 0; k < stations; k++) {
+        fprintf(f, "%zu\n1\n%g %g %g\n1 0 0\n0 1 0\n0 0 1\n", (cloud->count - k + stations - 1) / stations, at[0],
+                at[1], at[2]);
+        fprintf(f, "1 0 0 0\n0 1 0 0\n0 0 1 0\n%g %g %g 1\n", at[0], at[1], at[2]);
+        for (size_t i = k; i < cloud->count; i += stations)
+            fprintf(f, "%.6f %.6f %.6f 0.5\n", (double)cloud->at[i][0] - at[0], (double)cloud->at[i][1] - at[1],
+                    (double)cloud->at[i][2] - at[2]);
+    }
+    assert_int_equal(fclose(f), 0);
+    const char *input = ptx;
+    struct spl_pack_options options = {
+        .size = sizeof options, .inputs = &input, .input_count = 1, .output = packed, .threads = 2};
+    if (spl_pack(&options, NULL, &err) || spl_dataset_open(packed, true, &dataset, &err))
+        fail_msg("%s", err.message);
+    unlink(ptx);
+    return dataset;
+}
+
+static void shift(struct cloud *cloud, double x, double y, double z)
+{
+    for (size_t i = 0; i < cloud->count; i++) {
+        cloud->at[i][0] += (float)x;
+        cloud->at[i][1] += (float)y;
+        cloud->at[i][2] += (float)z;
+    }
+}
+
+/* Scans that were brought into one system say that they were taken from its origin: a point of the floor, often. A
+ * scanner does not lie there, nor do several stand in one place. */
+static void an_origin_is_no_place_of_an_eye(void **state)
+{
+    (void)state;
+    static const struct {
+        double floor; /* beneath the origin */
+        size_t stations;
+        bool stood;
+    } cases[] = {{0, 1, false}, {0.25, 1, false}, {-0.05, 1, false}, {0, 3, false}, {1.2, 2, false}, {1.2, 1, true}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
+        for (int storeys = 1; storeys <= 2; storeys++) {
+            struct cloud cloud = {0};
+            add_box(&cloud, 10, 5, 3, 0.15, false);
+            shift(&cloud, -4, -2.5, 0);
+            if (storeys == 2) { /* and one beneath */
+                shift(&cloud, 4, 2.5, 3.2);
+                add_box(&cloud, 10, 5, 3, 0.15, false);
+                shift(&cloud, -4, -2.5, -3.2);
+            }
+            shift(&cloud, 0, 0, -cases[k].floor);
+            struct spl_dataset *dataset = open_stations(&cloud, cases[k].stations, (double[]){0, 0, 0});
+            const double *eye = spl_dataset_get_info(dataset)->default_eye;
+            const double over = eye[2] + cases[k].floor + (eye[2] + cases[k].floor < -0.2 ? 3.2 : 0);
+            if (cases[k].stood != (eye[0] == 0 && eye[1] == 0 && eye[2] == 0) || !(over > 1 && over < 2.2))
+                fail_msg("case %zu, %d storeys: %g,%g,%g", k, storeys, eye[0], eye[1], eye[2]);
+            assert_true(eye[0] > -3.8 && eye[0] < 5.8 && fabs(eye[1]) < 2.3);
+            spl_dataset_close(dataset);
+            free(cloud.at);
+        }
+}
+
+/* A street has no ceiling, but who stands above its origin sees all of it; of a lawn with a house, next to nothing. */
+static void one_stands_above_an_origin_or_goes_away(void **state)
+{
+    (void)state;
+    static const double none[3] = {0};
+    struct cloud street = {0}, house = {0};
+    add_sheet(&street, (double[]){-30, -5, 0}, (double[]){60, 0, 0}, (double[]){0, 10, 0}, 0.25, none);
+    add_sheet(&street, (double[]){-30, -5, 0}, (double[]){60, 0, 0}, (double[]){0, 0, 9}, 0.25, none);
+    add_sheet(&street, (double[]){-30, 5, 0}, (double[]){60, 0, 0}, (double[]){0, 0, 9}, 0.25, none);
+    struct spl_dataset *dataset = open_stations(&street, 1, none);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    assert_true(fabs(info->default_eye[0]) < 1e-9 && fabs(info->default_eye[1]) < 1e-9);
+    assert_true(info->default_eye[2] > 1.5 && info->default_eye[2] < 1.7);
+    assert_true(fabs(info->default_target[0]) > 5 && fabs(info->default_target[1]) < 2);
+    spl_dataset_close(dataset);
+
+    struct cloud corridor = {0};
+    add_box(&corridor, 20, 1.2, 2.4, 0.05, false);
+    shift(&corridor, -3, -0.6, 0);
+    dataset = open_stations(&corridor, 1, none);
+    info = spl_dataset_get_info(dataset);
+    assert_true(fabs(info->default_eye[0]) < 1e-9 && info->default_eye[2] > 1 && info->default_eye[2] < 1.7);
+    assert_true(info->default_target[0] > 2);
+    spl_dataset_close(dataset);
+    free(corridor.at);
+
+    add_box(&house, 6, 4, 4, 0.1, false);
+    shift(&house, -3, -2, 0);
+    add_sheet(&house, (double[]){-12, -12, 0}, (double[]){24, 0, 0}, (double[]){0, 24, 0}, 0.2, none);
+    dataset = open_stations(&house, 1, none);
+    info = spl_dataset_get_info(dataset);
+    assert_true(hypot(info->default_eye[0], info->default_eye[1]) > 6 && info->default_eye[2] > 2);
+    spl_dataset_close(dataset);
+    free(street.at);
+    free(house.at);
+}
+
+/* An ellipsoid, 4 wide and 5.6 high, whose normals show outwards or, where `way` is -1, inwards. */
+static void add_egg(struct cloud *cloud, double way, double scale)
+{
+    enum { points = 12000 };
+    for (int i = 0; i < points; i++) {
+        const double z = 1 - 2 * (i + 0.5) / points, r = sqrt(1 - z * z), a = i * M_PI * (3 - sqrt(5));
+        const double n[3] = {r * cos(a) / 2, r * sin(a) / 2, z / 2.8};
+        const double length = way / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        add(cloud, scale * r * cos(a) * 2, scale * r * sin(a) * 2, scale * (z + 1) * 2.8, n[0] * length, n[1] * length,
+            n[2] * length);
+    }
+}
+
+/* Is the eye within the bounds of the points? */
+static bool seen_from_inside(const struct cloud *cloud, bool normals, const char *unit)
+{
+    struct spl_dataset *dataset = open_packed(cloud, normals, unit);
+    const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
+    bool inside = true;
+    for (int c = 0; c < 3; c++)
+        inside &= info->default_eye[c] > info->bounds_min[c] && info->default_eye[c] < info->bounds_max[c];
+    spl_dataset_close(dataset);
+    return inside;
+}
+
+/* Closed all around, as a room is; normals say which of both it is, and so does what has neither floor nor walls. */
+static void a_thing_is_seen_from_outside_and_a_room_from_inside(void **state)
+{
+    (void)state;
+    static const struct {
+        double egg, room, scale; /* which way normals show, 0: there is none */
+        bool normals;
+        const char *unit;
+        bool inside;
+    } cases[] = {
+        {1, 0, 1, true, "unknown", false}, {1, 0, 1, true, "m", false},       {-1, 0, 1, true, "unknown", true},
+        {-1, 0, 1, true, "m", true},       {1, 0, 1, false, "unknown", false}, {1, 0, 0.025, false, "unknown", false},
+        {1, 0, 20, false, "mm", false},    {0, 1, 1, true, "unknown", true},  {0, -1, 1, true, "unknown", false},
+        {0, -1, 1, true, "m", false},      {0, 1, 1000, false, "unknown", true}, /* no less than one in metres */
+        {0, 1, 1, false, "m", true},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        struct cloud cloud = {0};
+        if (cases[k].egg != 0)
+            add_egg(&cloud, cases[k].egg, cases[k].scale);
+        else
+            add_box(&cloud, 10, 5, 3, 0.15, false);
+        for (size_t i = 0; cases[k].room != 0 && i < cloud.count; i++) {
+            float *at = cloud.at[i];
+            const double size[3] = {10, 5, 3};
+            int axis = 0;
+            for (int c = 0; c < 3; c++) /* of the side that it lies on */
+                if (fmin((double)at[c], size[c] - (double)at[c]) <
+                    fmin((double)at[axis], size[axis] - (double)at[axis]))
+                    axis = c;
+            at[3 + axis] = (float)((double)at[axis] < 0.5 * size[axis] ? cases[k].room : -cases[k].room);
+            for (int c = 0; c < 3; c++)
+                at[c] *= (float)cases[k].scale;
+        }
+        if (seen_from_inside(&cloud, cases[k].normals, cases[k].unit) != cases[k].inside)
+            fail_msg("case %zu is seen from %s", k, cases[k].inside ? "outside" : "inside");
+        free(cloud.at);
+    }
+}
+
 /* A tray has no ceiling: one looks into it from above. */
 static void what_is_open_is_seen_from_outside(void **state)
 {
@@ -345,7 +515,10 @@ static void views_along_up_are_refused_at_once(void **state)
     (void)state;
     static const struct spl_saved_view down = {.name = "plan", .eye = {0, 0, 50}, .target = {0, 0, 1}},
                                        along_y = {.name = "side", .eye = {0, 9, 0}},
-                                       turned = {.name = "map", .eye = {0, 0, 50}, .up = {0, 1, 0}};
+                                       turned = {.name = "map", .eye = {0, 0, 50}, .up = {0, 1, 0}},
+                                       plan = {.name = "plan", .eye = {0, 0, 50}, .view_height = 9},
+                                       side = {.name = "side", .eye = {0, 9, 0}, .view_height = 9},
+                                       stiff = {.name = "stiff", .eye = {0, 0, 50}, .up = {0, 0, 2}, .view_height = 9};
     const struct {
         struct spl_pack_options options;
         const char *field, *says; /* NULL: the scan is missing, which is all that is wrong */
@@ -356,6 +529,9 @@ static void views_along_up_are_refused_at_once(void **state)
         {{.views = &along_y, .view_count = 1, .up = {0, -7, 0}}, "view", "give another, such as up="},
         {{.default_view = &down, .up = {0, -7, 0}}, NULL, NULL},
         {{.default_view = &along_y, .views = &turned, .view_count = 1}, NULL, NULL},
+        {{.views = &plan, .view_count = 1}, NULL, NULL}, /* a plan's up is +y then, as in views that are asked for */
+        {{.views = &side, .view_count = 1, .up = {0, -7, 0}}, NULL, NULL},
+        {{.views = &stiff, .view_count = 1}, "view", "--view stiff: from eye 0,0,50 to target 0,0,0 with up 0,0,2: "},
     };
     const char *const gone[] = {"/nonexistent/gone.ply"};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -467,6 +643,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_room_is_seen_from_inside_lengthwise),
+        cmocka_unit_test(an_origin_is_no_place_of_an_eye),
+        cmocka_unit_test(one_stands_above_an_origin_or_goes_away),
+        cmocka_unit_test(a_thing_is_seen_from_outside_and_a_room_from_inside),
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_stands_over_is_in_it),
