@@ -28,7 +28,7 @@ void main()
         bool inside = at.x < int(below.x) && at.y < int(below.y);
         uint from = uint(min(at.y, int(below.y) - 1)) * below.x + uint(min(at.x, int(below.x) - 1));
         uint w = plane_word(frame.fill_from + from);
-        word[i] = inside && w != SPL_FILL_HOLE ? w : 0u;
+        word[i] = inside && w < SPL_FILL_HOLE ? w : 0u;
         payload[i] = FIRST != 0u ? payload_word(from, WIDE) : plane_word(frame.fill_from + frame.fill_stride + from);
         bool nearer = word[i] > nearest;
         nearest = nearer ? word[i] : nearest;

@@ -1,8 +1,8 @@
 /* Push: an empty cell becomes the bilinear mean of the four closest cells of the level above, of those that belong to
  * the nearest one's surface, or to that behind it where more of them do: an edge lies half way between the points on
- * both sides of it. The last run (constant 1) fills the holes among the samples and writes depth and payload as
- * method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a linear sample
- * stays where it is nearer than what fills its place. */
+ * both sides of it. The last run (constant 1) fills the holes among the samples, and cracks, and writes depth and
+ * payload as method points leaves them: visible samples as they are; a hole that nothing reaches keeps its sample; a
+ * linear sample stays where it is nearer than what fills its place. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/fill.glsl"
@@ -71,6 +71,35 @@ uint interpolate(ivec2 at, out uint filled)
     return weight > 0.0 ? (floatBitsToUint(average) & ~SPACING_MASK) | (nearest & SPACING_MASK) : 0u;
 }
 
+/* How far from `at` the first sample with something to see is, of the nearest `most`; else 0. */
+int look_along(ivec2 at, ivec2 way, int most)
+{
+    for (int n = 1; n <= most; n++) {
+        ivec2 c = at + n * way;
+        bool inside = uint(c.x) < frame.width && uint(c.y) < frame.height;
+        uint state = inside ? plane_word(frame.fill_to + sample_index(c)) : 0u;
+        if (state != 0u && state != SPL_FILL_MAYBE)
+            return n;
+    }
+    return 0;
+}
+
+/* Is a sample with nothing to see part of a crack: does it lie between things that are no farther apart than half of
+ * what the points of `surface` are, or two samples, on at least three of the four lines through it? By chance the reach
+ * of none around has closed it. */
+bool is_crack(ivec2 at, uint surface)
+{
+    const ivec2 lines[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
+    precise float reach = (PARALLEL != 0u ? 1.0 : inverse_depth(surface, SPACING_MASK)) *
+                          spacing_of(surface & SPACING_MASK) * (frame.fill_radius * frame.fill_reach);
+    int most = clamp(int(SPL_FILL_CRACK_REACH * min(reach, frame.fill_kernel)), 2, SPL_FILL_CRACK), open = 0;
+    for (int i = 0; i < 4 && open < 2; i++) {
+        int ahead = look_along(at, lines[i], most), behind = ahead > 0 ? most + 1 - ahead : 0;
+        open += look_along(at, -lines[i], behind) > 0 ? 0 : 1;
+    }
+    return open < 2;
+}
+
 void main()
 {
     load_frame();
@@ -90,7 +119,8 @@ void main()
     uint clean = bits == SPL_NOTHING ? SPL_NOTHING : (bits & ~SPL_FILL_DEPTH_BITS) | (SPL_FILL_DEPTH_BITS + 1u) / 2u;
     uint surface = word != 0u ? floatBitsToUint(1.0 / inverse_depth(word, SPACING_MASK)) : SPL_NOTHING;
     bool linear = bits != SPL_NOTHING && (bits & SPL_FILL_LINEAR) != 0u;
-    bool fills = own == SPL_FILL_HOLE && word != 0u && !(linear && clean <= surface);
+    bool hole = own == SPL_FILL_HOLE || (own == SPL_FILL_MAYBE && word != 0u && is_crack(place_of(i, size.x), word));
+    bool fills = hole && word != 0u && !(linear && clean <= surface);
     uint result = fills ? surface : clean, payload = fills ? filled : kept;
     if (WIDE != 0u) {
         depth[2u * i] = payload;

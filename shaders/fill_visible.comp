@@ -11,7 +11,8 @@
  * enough sectors are blocked, or where nothing in the ring or within it is nearer. Most samples need two.
  * Constant 0 = 0, constant: every sample within frame.fill_kernel, as the earlier work has it.
  *
- * The state of a sample: its word of level 0 where it is visible, SPL_FILL_HOLE, or 0 = nothing to see. */
+ * The state of a sample: its word of level 0 where it is visible, SPL_FILL_HOLE, SPL_FILL_MAYBE, or 0 = nothing to
+ * see. */
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common/fill.glsl"
@@ -161,5 +162,6 @@ void main()
         open -= sqrt(q / (q + 1.0));
     }
     bool visible = open >= frame.fill_threshold;
-    planes[frame.fill_from + i] = visible || (own != 0u && (frame.flags & SPL_FRAME_KEEP) != 0u) ? own : SPL_FILL_HOLE;
+    uint seen = own != 0u || open >= SPL_FILL_MAYBE_OPEN ? own : SPL_FILL_MAYBE;
+    planes[frame.fill_from + i] = visible || (own != 0u && (frame.flags & SPL_FRAME_KEEP) != 0u) ? seen : SPL_FILL_HOLE;
 }

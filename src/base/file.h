@@ -28,8 +28,8 @@ bool spl_file_is_same(const char *path, const char *other);
 /* Bytes that are free in the folder of `path`; UINT64_MAX: nobody says so. Any thread. */
 uint64_t spl_file_get_free(const char *path);
 
-/* Brings the names in the folder of `path` to disk, which a rename alone does not. 0, also on a file system that cannot,
- * or -1 with errno. */
+/* Brings the names in the folder of `path` to disk, which a rename alone does not. 0, also on a file system that
+ * cannot, or -1 with errno. */
 int spl_file_sync_folder(const char *path);
 
 #endif

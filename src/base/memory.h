@@ -19,8 +19,8 @@ void *spl_alloc_raw(size_t count, size_t size, struct spl_error *err);
 /* Grows `old` (may be NULL) to `count` elements; on failure returns NULL and `old` stays valid. */
 void *spl_realloc(void *old, size_t count, size_t size, struct spl_error *err);
 
-/* free() for who cannot wait: handing a GB back to the system takes 80 ms. What has many bytes is freed by a thread of its
- * own. Any thread. */
+/* free() for who cannot wait: handing a GB back to the system takes 80 ms. What has many bytes is freed by a thread of
+ * its own. Any thread. */
 void spl_free_aside(void *memory, size_t bytes);
 
 /* "4096", "2G": a whole number, with a suffix K, M, G or T of 1024; without one it counts `unit` bytes. All of the

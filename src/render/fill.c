@@ -40,10 +40,12 @@ void spl_fill_plan_init(struct spl_fill_plan *plan, struct spl_reach *reach, con
     *plan = (struct spl_fill_plan){.kernel = kernel, .rings = (uint32_t)rings};
     plan->levels = params->pyramid ? params->pyramid : plan->rings;
     uint32_t top = plan->levels > plan->rings ? plan->levels : plan->rings;
+    double crack = fmin(fmax(SPL_FILL_CRACK_REACH * kernel, 2), SPL_FILL_CRACK);
     double looks = params->visibility == SPL_VISIBILITY_CONSTANT ? kernel + 1 : 1u << plan->rings;
     reach->align = 1u << top;
     reach->guard = 1u << (uint32_t)ceil(log2(fmin(fmax(kernel, 4), around))); /* 4: of whole groups of lanes */
-    reach->apron = round_up(looks + (2u << plan->levels) + 2, reach->align);  /* 2: normals look so far */
+    /* 2: normals look so far */
+    reach->apron = round_up(looks + (2u << plan->levels) + crack + 2, reach->align);
 }
 
 void spl_fill_set_params(struct spl_tile *tile)

@@ -174,8 +174,10 @@ static void a_surrounded_piece_is_as_in_the_whole(void **state)
                          before = find_others(&whole, &alone, left, top);
             print_message("%s, %d: of %d pixels %zu differ, %zu alone\n", spl_method_name(method), samples,
                           width * height, others, before);
-            const size_t most = method == SPL_METHOD_FILL ? width * height / 20 : 2; /* its filter looks on and on */
-            if (others > most || before < 4 * others + 50)
+            /* cells of fill's pyramid lie otherwise: a sample may be a crack in one and not in the other, and what is
+               around it is shaded by its depth */
+            const size_t most = method == SPL_METHOD_FILL ? width * height / 12 : 2;
+            if (others > most || before < 3 * others + 50)
                 fail_msg("%s", spl_method_name(method));
             spl_frame_finish(&whole);
             spl_frame_finish(&alone);

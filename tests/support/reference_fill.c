@@ -17,7 +17,7 @@ struct cell {
     uint32_t x, y; /* the sample */
     uint32_t id;
     double color[3], normal[3];
-    bool hole;
+    bool hole, maybe; /* the latter: it may be a crack's */
 };
 
 struct filter {
@@ -134,7 +134,8 @@ static float coarse_reach(const struct filter *f, int x, int y)
     return fminf(angle * f->radius * f->reach, (float)f->plan->kernel);
 }
 
-static bool is_visible(const struct filter *f, int x, int y, float z)
+/* Of the eight sectors around a sample at depth z, those that are open. */
+static float find_open(const struct filter *f, int x, int y, float z)
 {
     float steep[8] = {0}, open = 0;
     bool constant = f->view->fill.visibility == SPL_VISIBILITY_CONSTANT;
@@ -165,7 +166,7 @@ static bool is_visible(const struct filter *f, int x, int y, float z)
         float s = fminf(steep[i], 1e6f);
         open += 1 - s / sqrtf(s * s + 1);
     }
-    return open >= f->threshold;
+    return open;
 }
 
 /* The nearest of the cells whose inverse depth is below `most`, NULL = there is none; and the inverse depth from which
@@ -250,6 +251,37 @@ static struct cell above(const struct filter *f, uint32_t level, int x, int y)
     return mean(f, cells, (float[]){9, 3, 3, 1}, (float)(2u << level), (float[]){5, 3, 3, 1});
 }
 
+/* How far something lies from (x, y) along (dx, dy), of `most` samples; else 0. */
+static int look_along(const struct filter *f, int x, int y, int dx, int dy, int most)
+{
+    for (int n = 1; n <= most; n++) {
+        const int cx = x + n * dx, cy = y + n * dy;
+        if (cx < 0 || cy < 0 || cx >= (int)f->width[0] || cy >= (int)f->height[0])
+            continue;
+        const struct cell *c = &f->means[0][cy * (int)f->width[0] + cx];
+        if (c->hole || c->w > 0)
+            return n;
+    }
+    return 0;
+}
+
+/* On three of the four lines through (x, y) it lies between things that are no farther apart than half of what the
+ * points of `surface` are, or two samples. */
+static bool is_crack(const struct filter *f, int x, int y, const struct cell *surface)
+{
+    static const int lines[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
+    const float reach = (f->parallel ? 1 : surface->w) * surface->spacing * (f->radius * f->reach);
+    const float share = SPL_FILL_CRACK_REACH * fminf(reach, (float)f->plan->kernel);
+    const float wide = fminf(fmaxf(share, 2), SPL_FILL_CRACK);
+    int between = 0;
+    for (int i = 0; i < 4; i++) {
+        const int ahead = look_along(f, x, y, lines[i][0], lines[i][1], (int)wide),
+                  behind = look_along(f, x, y, -lines[i][0], -lines[i][1], (int)wide);
+        between += ahead && behind && ahead + behind <= (int)wide + 1;
+    }
+    return between >= 3;
+}
+
 static void finish_sample(const struct filter *f, struct fill_sample *s, int x, int y)
 {
     const struct cell *state = &f->means[0][y * (int)f->width[0] + x];
@@ -258,7 +290,8 @@ static void finish_sample(const struct filter *f, struct fill_sample *s, int x, 
     uint32_t surface = c.w > 0 ? bits_of(1 / c.w) : SPL_NOTHING;
     bool linear = s->word != SPL_NOTHING && s->word & SPL_FILL_LINEAR;
     s->word = plain;
-    if (!state->hole || c.w <= 0 || (linear && plain <= surface))
+    const bool fills = state->hole || (state->maybe && c.w > 0 && is_crack(f, x, y, &c));
+    if (!fills || c.w <= 0 || (linear && plain <= surface))
         return;
     s->word = surface;
     s->id = c.id;
@@ -301,8 +334,9 @@ void reference_fill(struct fill_sample *samples, const struct spl_camera *camera
         const struct cell *own = &f.nearest[0][i];
         f.means[0][i] = *own;
         bool keeps = own->w > 0 && view->fill.visibility == SPL_VISIBILITY_NONE;
-        f.means[0][i].hole =
-            !keeps && !is_visible(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
+        const float open = find_open(&f, (int)(i % width), (int)(i / width), own->w > 0 ? 1 / own->w : 1e30f);
+        f.means[0][i].hole = !keeps && open < f.threshold;
+        f.means[0][i].maybe = !(own->w > 0) && !f.means[0][i].hole && open < SPL_FILL_MAYBE_OPEN;
     }
     for (uint32_t level = 1; level <= plan->levels; level++)
         gather(&f, level);

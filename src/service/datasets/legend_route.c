@@ -41,7 +41,8 @@ static void print_color(FILE *out, uint32_t color)
 static int digits_of(double low, double high)
 {
     const double most = fmax(fabs(low), fabs(high)), step = (high - low) / (ticks - 1);
-    return step > 0 && most > 0 ? (int)fmin(fmax(ceil(log10(most / step)) + 2, digits_least), digits_most) : digits_least;
+    const double digits = step > 0 && most > 0 ? ceil(log10(most / step)) + 2 : 0;
+    return (int)fmin(fmax(digits, digits_least), digits_most);
 }
 
 static void draw_ramp(FILE *out, const struct spl_paint *paint)

@@ -301,7 +301,8 @@ static void test_what_is_no_trajectory_says_so(void **state)
         {"1\n", "line 1: tx: 1 numbers"},
         {"1 2 3 4 0 0 0 1 9 9\n", "line 1: 10 numbers"},
         {"0 2 3 4 0 0 0 1\n1 2 x 4 0 0 0 1\n", "line 2: ty: 'x' is no number"},
-        {OWN("{\"camera\":{},\"blur\":4}"), "unknown field 'blur' of a view; known are camera, time, width, height, near"},
+        {OWN("{\"camera\":{},\"blur\":4}"),
+         "unknown field 'blur' of a view; known are camera, time, width, height, near"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_camera_path path;
