@@ -84,9 +84,9 @@ int look_along(ivec2 at, ivec2 way, int most)
     return 0;
 }
 
-/* Is a sample with nothing to see part of a crack: does it lie between things that are no farther apart than half of
- * what the points of `surface` are, or two samples, on at least three of the four lines through it? By chance the reach
- * of none around has closed it. */
+/* Is a sample with nothing to see part of a crack: does it lie between things that are no farther apart than three
+ * quarters of what the points of `surface` are, or two samples, on at least three of the four lines through it? By
+ * chance the reach of none around has closed it. */
 bool is_crack(ivec2 at, uint surface)
 {
     const ivec2 lines[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));

@@ -139,9 +139,9 @@
 #define SPL_FILL_MAYBE 0x80000001u /* there is nothing to see, but near by something may be on both sides */
 #define SPL_FILL_MAYBE_OPEN 6.5f   /* sectors, of eight, where that may be so */
 #define SPL_FILL_LEVELS_MAX 8
-/* What lies between things is closed whatever their reach, as far as it is no wider than this share of it, half a
- * spacing, and than so many samples. */
-#define SPL_FILL_CRACK_REACH 0.16666667f
+/* What lies between things is closed whatever their reach, as far as it is no wider than this share of it, three
+ * quarters of a spacing, and than so many samples. */
+#define SPL_FILL_CRACK_REACH 0.25f
 #define SPL_FILL_CRACK 8
 /* Samples of one surface differ in depth by their distance times this: a slant of 76 degrees. */
 #define SPL_FILL_SLOPE 4.0f

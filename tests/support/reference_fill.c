@@ -265,8 +265,8 @@ static int look_along(const struct filter *f, int x, int y, int dx, int dy, int 
     return 0;
 }
 
-/* On three of the four lines through (x, y) it lies between things that are no farther apart than half of what the
- * points of `surface` are, or two samples. */
+/* On three of the four lines through (x, y) it lies between things that are no farther apart than three quarters of
+ * what the points of `surface` are, or two samples. */
 static bool is_crack(const struct filter *f, int x, int y, const struct cell *surface)
 {
     static const int lines[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
