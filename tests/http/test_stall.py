@@ -276,7 +276,7 @@ def test_what_tours_leave_stalls_nobody():
     frame = 192 * MIB
     with tempfile.TemporaryDirectory(prefix="splatd-tours-") as folder:
         large = keep(folder, 0, 3, files=3, bytes=frame)
-        many = keep(folder, 1, 20000, files=20000, bytes=0)
+        many = keep(folder, 1, 20000, files=20000, bytes=1)
         for number in range(2, 1000):
             keep(folder, number, 10000)
         with Daemon(FAKE, "--tours", folder, "--connections", "64") as d:
