@@ -79,11 +79,14 @@ int spl_cmd_check_png(const char *option, const char *path, struct spl_error *er
 
 int spl_cmd_check_dataset(const char *command, const char *path, struct spl_error *err)
 {
+    struct stat status;
     if (!path)
         return spl_fail(err, SPL_E_USAGE, "%s needs a dataset to write: -o NAME.spld", command);
     if (strcmp(spl_cmd_ending(path), "spld"))
         return spl_fail(err, SPL_E_USAGE, "%s writes a dataset, whose name ends in .spld: -o NAME.spld, not '%.300s'",
                         command, path);
+    if (!stat(path, &status) && !S_ISREG(status.st_mode))
+        return spl_fail(err, SPL_E_USAGE, "%s writes a dataset: %.300s exists and is no file", command, path);
     return SPL_OK;
 }
 

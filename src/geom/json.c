@@ -4,6 +4,8 @@
 #include <errno.h>
 #include <string.h>
 
+#include "base/decimal.h"
+
 bool spl_json_is_marked(const void *text, size_t length)
 {
     return length >= SPL_JSON_MARK && !memcmp(text, "\xef\xbb\xbf", SPL_JSON_MARK);
@@ -52,6 +54,13 @@ json_t *spl_json_load_file(const char *path, json_error_t *where)
     json_t *json = spl_json_load_stream(file, where);
     fclose(file);
     return json;
+}
+
+char *spl_json_print(json_t *json)
+{
+    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
+    json_decref(json);
+    return text;
 }
 
 bool spl_json_get_numbers(const json_t *array, size_t count, double *out)

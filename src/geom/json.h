@@ -1,4 +1,4 @@
-/* What readers of JSON share: values, and words about them for messages. Pure functions, any thread. */
+/* What readers of JSON share, and its writer: values, and words about them for messages. Pure functions, any thread. */
 #ifndef SPL_GEOM_JSON_H
 #define SPL_GEOM_JSON_H
 
@@ -14,6 +14,10 @@ bool spl_json_is_marked(const void *text, size_t length);
 json_t *spl_json_load(const char *text, size_t length, json_error_t *where);
 json_t *spl_json_load_stream(FILE *file, json_error_t *where);
 json_t *spl_json_load_file(const char *path, json_error_t *where);
+
+/* Its text for people and programs: a line a value, numbers in as few digits as read back the same. malloc'd; NULL
+ * without memory. Takes the reference, NULL too. */
+char *spl_json_print(json_t *json);
 
 /* An array of `count` numbers. False where it is none; `out` is of no use then. */
 bool spl_json_get_numbers(const json_t *array, size_t count, double *out);

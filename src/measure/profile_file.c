@@ -12,9 +12,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/decimal.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "geom/json.h"
 
 enum { file_max = 1 << 20 };
 
@@ -85,8 +85,6 @@ int spl_profile_load(const char *path, const struct spl_dataset_info *dataset, c
 int spl_profile_save(const char *path, const struct spl_profile *profile, struct spl_error *err)
 {
     struct spl_profile copy = *profile, again = {0};
-    json_t *json = NULL;
-    char *text = NULL;
     int rc = SPL_E_NOMEM;
     if (!profile->count || profile->count > SPL_PROFILE_POINTS_MAX)
         return spl_fail_field(err, SPL_E_USAGE, "points", "a profile holds 1 to %d settings, not %zu",
@@ -102,15 +100,13 @@ int spl_profile_save(const char *path, const struct spl_profile *profile, struct
         if (isnan(profile->points[i].psnr_q05))
             copy.points[i].psnr_q05 = NAN;
     }
-    json = spl_profile_to_json(&copy);
-    text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
+    char *text = spl_json_print(spl_profile_to_json(&copy));
     if (!text)
         spl_fail(err, SPL_E_NOMEM, "out of memory for the profile '%s'", path);
     else if (!(rc = spl_profile_check(&copy, path, err)) &&
              !(rc = spl_profile_parse(text, strlen(text), path, &again, err)))
         rc = spl_file_replace(path, text, strlen(text), err);
     spl_profile_finish(&again);
-    json_decref(json);
     free(text);
     free(copy.points);
     return rc;

@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/decimal.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "geom/json.h"
 #include "service/exchange.h"
 #include "service/ops/access_log.h"
 #include "service/pages.h"
@@ -48,13 +48,6 @@ void spl_reply_empty(struct request *request)
 void spl_reply_text(struct request *request, const char *type, char *body)
 {
     set_text(request, MHD_HTTP_OK, type, body);
-}
-
-char *spl_json_print(json_t *json)
-{
-    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
-    json_decref(json);
-    return text;
 }
 
 void spl_reply_json(struct request *request, json_t *json)

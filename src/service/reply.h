@@ -13,7 +13,6 @@ struct request;
 void spl_reply_problem(struct request *request, unsigned status, const char *type, const char *field,
                        const char *detail);
 void spl_reply_error(struct request *request, const struct spl_error *err); /* status and Retry-After by its code */
-char *spl_json_print(json_t *json); /* its text, malloc'd; NULL without memory; takes the reference, NULL too */
 void spl_reply_json(struct request *request, json_t *json);                 /* takes the reference */
 void spl_reply_empty(struct request *request); /* 204 */
 void spl_reply_text(struct request *request, const char *type, char *body); /* 200; takes `body`, malloc'd or NULL */

@@ -216,6 +216,7 @@ def check_one_file(survey, top):
                         (("--parts", 3, top / "copy.spld", "-o", top / "copy.spld"), "is an input too"),
                         (("--join", top / "of copy", "--merge", "-o", top / "copy.spld"), "is an input too"),
                         (("--parts", 3, survey.scans, "-o", top / "folder.spld"), "exists and is no file"),
+                        (("--join", top / "nowhere", "--merge", "-o", top / "folder.spld"), "exists and is no file"),
                         (("--parts", 3, "--part", 1, survey.truth), "name one way"),
                         (("--parts", 3, "--prune", 9, survey.scans, "-o", merged), "cannot be split into parts"),
                         (("--parts", 3, survey.scans, "-o", survey.truth), "writes a dataset")):

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "geom/json.h"
 #include "service/access/access.h"
 #include "service/datasets/library.h"
 #include "service/exchange.h"

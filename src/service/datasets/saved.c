@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "dataset/saved_views.h"
+#include "geom/json.h"
 
 enum { file_bytes_max = 1 << 20 };
 
@@ -192,9 +193,7 @@ int spl_saved_prepare(struct spl_saved *saved, const char *name, const struct sp
         return spl_fail_field(err, SPL_E_LIMIT, "name", "the dataset has %d saved views, as many as it may",
                               SPL_SAVED_VIEWS_MAX);
     change(views, &count, name, view);
-    json_t *json = json_pack("{s:o}", "views", spl_saved_views_to_json(views, count));
-    *text = json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    json_decref(json);
+    *text = spl_json_print(json_pack("{s:o}", "views", spl_saved_views_to_json(views, count)));
     return *text ? SPL_OK : spl_fail(err, SPL_E_NOMEM, "out of memory for the dataset's views");
 }
 

@@ -10,9 +10,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/decimal.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "geom/json.h"
 #include "image/load.h"
 #include "image/video.h"
 #include "service/state.h"
@@ -75,7 +75,8 @@ static void write_frame(uv_work_t *uv)
 static void write_state(uv_work_t *uv)
 {
     struct work *work = uv->data;
-    char *text = spl_decimal_shorten(json_dumps(work->state, JSON_INDENT(1) | JSON_REAL_PRECISION(17)));
+    char *text = spl_json_print(work->state);
+    work->state = NULL;
     if (!text) {
         spl_fail(&work->err, SPL_E_NOMEM, "out of memory for the tour's state");
         return;

@@ -7,9 +7,9 @@
 
 #include <splatd/dataset.h>
 
-#include "base/decimal.h"
 #include "base/error.h"
 #include "dataset/dataset.h"
+#include "geom/json.h"
 #include "render/pick.h"
 
 static const double most_whole = 0x1p53; /* that doubles count to */
@@ -119,8 +119,7 @@ int spl_pick_encode(const struct spl_view_request *request, const struct spl_fra
         json_decref(json);
         return rc;
     }
-    char *text = spl_decimal_shorten(json ? json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL);
-    json_decref(json);
+    char *text = spl_json_print(json);
     if (!text)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for what was picked");
     out->bytes = (uint8_t *)text;
