@@ -20,8 +20,8 @@ uint64_t spl_frame_count_work(const struct spl_tile *tile);
  * several times as long as it was to: tile->until_ns. */
 bool spl_frame_is_too_much(const struct spl_frame_job *job, struct spl_tile *tile);
 
-/* What a unit of work takes, a mean of the last few tiles: this one was drawn (0), given up (SPL_FRAME_TOO_MUCH: nothing
- * is known again) or failed. Small tiles tell little. */
+/* What a unit of work takes, a mean of the last few tiles: this one was drawn (0), given up (SPL_FRAME_TOO_MUCH:
+ * nothing is known again) or failed. Small tiles tell little. */
 void spl_frame_learn_pace(const struct spl_frame_job *job, const struct spl_tile *tile, int drawn, uint64_t took_ns);
 
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */

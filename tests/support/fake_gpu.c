@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
+
 struct fake_gpu fake;
 
 static void fake_close(struct spl_gpu *gpu)
@@ -93,6 +95,9 @@ static int fake_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, 
     (void)gpu;
     fake.waits++;
     fake.last_timeout_ns = timeout_ns;
+    const uint64_t begun = spl_processor_ns();
+    while (spl_processor_ns() - begun < fake.works_ns)
+        ;
     return ticket <= fake.ended ? 0 : spl_fail(err, SPL_E_TIMEOUT, "not yet");
 }
 

@@ -14,6 +14,7 @@ extern struct fake_gpu {
     uint64_t upload_bytes_max; /* larger buffers to be mapped are refused; 0 = none are */
     uint64_t ended; /* tickets up to this one have ended */
     uint64_t last_timeout_ns;
+    uint64_t works_ns; /* of processor time, in each wait */
 } fake;
 
 /* A GPU of these limits; what was counted and demanded before is forgotten. */

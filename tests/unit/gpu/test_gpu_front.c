@@ -124,6 +124,31 @@ static void missed_deadline_loses_the_device(void **state)
     assert_int_equal(fake.closes, 1);
 }
 
+/* Software is late once it has had its time of the processors, which others may keep from it; a GPU by the clock. */
+static void software_is_late_by_its_own_time(void **state)
+{
+    (void)state;
+    static const struct {
+        bool software;
+        uint64_t works_ns, patience_ns;
+        int waits;
+    } cases[] = {{false, 0, 60 * SPL_NS_PER_S, 1},
+                 {true, 0, 60 * SPL_NS_PER_S, 6},
+                 {true, SPL_NS_PER_S / 4, SPL_NS_PER_S / 4, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_gpu gpu = make();
+        struct spl_error err = {0};
+        gpu.info.software = cases[i].software;
+        uint64_t ticket = submit(&gpu);
+        fake.works_ns = cases[i].works_ns;
+        assert_int_equal(spl_gpu_wait(&gpu, ticket, spl_now_ns() + cases[i].patience_ns, &err), SPL_E_TIMEOUT);
+        assert_string_equal(err.message, "not yet");
+        assert_int_equal(fake.waits, cases[i].waits);
+        fake.ended = 1;
+        spl_gpu_close(&gpu);
+    }
+}
+
 static void past_deadline_is_no_loss_once_it_ended(void **state)
 {
     (void)state;
@@ -359,6 +384,7 @@ int main(void)
         cmocka_unit_test(unknown_kernel_is_not_found),
         cmocka_unit_test(next_list_waits_for_the_one_before),
         cmocka_unit_test(missed_deadline_loses_the_device),
+        cmocka_unit_test(software_is_late_by_its_own_time),
         cmocka_unit_test(past_deadline_is_no_loss_once_it_ended),
         cmocka_unit_test(work_without_end_keeps_its_memory),
         cmocka_unit_test(injected_and_real_losses_stick),
