@@ -48,10 +48,10 @@ void spl_gpu_complain(const char *backend, bool error, const char *message)
 }
 
 /* Waits for `ticket`. A software driver's work is done by this process, which others may keep from the processors: it is
- * late once it has had `timeout_ns` of them, or after six times as long. */
+ * late once it has had `timeout_ns` of them, or after twelve times as long. */
 static int wait_fairly(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
 {
-    enum { longest = 6 };
+    enum { longest = 12 };
     const uint64_t begun = spl_processor_ns();
     struct spl_error why = {0};
     int code = gpu->backend->wait(gpu, ticket, timeout_ns, &why);

@@ -106,7 +106,7 @@ int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err);
 /* Ends recording and starts it; the next begin waits for its end. */
 int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);
 /* SPL_E_TIMEOUT once deadline_ns has passed, which also marks the device lost. What is software has until then of
- * processor time, within six times as long: others may keep the processors from it. */
+ * processor time, within twelve times as long: others may keep the processors from it. */
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err);
 /* Nanoseconds of slot `slot` in the last list that was waited for, on the device's own clock; 0 where it was not
  * written. */
