@@ -475,6 +475,7 @@ static void servers_that_hang_take_nothing_from_a_disk(void **state)
     struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .bytes = quarter, .owner = &files[0],
                                .get_moved_ns = never_moved, .at_once = 4};
     const struct spl_io_rank rank = {.awaited = true, .walk = 1};
+    stop_clock();
     what.source = &files[0];
     for (what.index = 0; what.index < 5; what.index++)
         assert_non_null(spl_io_try_begin(io, &what, rank));
@@ -493,9 +494,13 @@ static void servers_that_hang_take_nothing_from_a_disk(void **state)
         what.source = &files[f];
         for (what.index = 0; what.index < SPL_IO_READS; what.index++)
             spl_io_try_begin(io, &what, rank);
-        while (spl_io_count_hanging(io) < 4 * (size_t)(f + 1))
-            usleep(10000);
+        assert_int_equal(get_asked(&files[f]), 0);
+        move_clock_on(SPL_NS_PER_S);
+        assert_int_equal(spl_io_count_hanging(io), 4 * f);
+        await_asked(&files[f], 4);
     }
+    move_clock_on(SPL_NS_PER_S);
+    assert_int_equal(spl_io_count_hanging(io), 16);
     what.source = &files[4];
     what.index = 0;
     assert_null(spl_io_try_begin(io, &what, rank)); // three quarters of all places are from afar
