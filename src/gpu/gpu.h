@@ -99,9 +99,14 @@ void spl_gpu_fill(struct spl_gpu *gpu, struct spl_gpu_buffer *buffer, uint64_t o
 enum { SPL_GPU_TIMESTAMPS_MAX = 32 };
 void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot); /* no effect without limits.timestamps */
 
-/* Runs what was recorded so far, waits for its end (10 s at most) and goes on recording: a list that would take long is
- * cut by it into some that do not. After SPL_E_DEVICE_LOST, its only error, what is recorded of the list until its
- * submit goes nowhere. */
+/* How long work may take before the device counts as lost: 10 s. A software driver has a minute: it works on processors
+ * that others use, too, and compiles kernels on them while it runs them, so that on a busy machine it is slow where a
+ * GPU hangs. */
+uint64_t spl_gpu_get_patience_ns(const struct spl_gpu *gpu);
+
+/* Runs what was recorded so far, waits for its end, as long as it may take, and goes on recording: a list that would
+ * take long is cut by it into some that do not. After SPL_E_DEVICE_LOST, its only error, what is recorded of the list
+ * until its submit goes nowhere. */
 int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err);
 /* Ends recording and starts it; the next begin waits for its end. */
 int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);

@@ -12,8 +12,6 @@
 #include "render/soft/pass.h"
 #include "render/soft_params.h"
 
-#define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
-
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
 static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_COLOR] = SPL_SUMS_COLOR,   [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
@@ -439,7 +437,7 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     int ended = spl_gpu_submit(gpu, &ticket, &why);
     /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
     if (!ended)
-        ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + FRAME_DEADLINE_NS, &why);
+        ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + spl_gpu_get_patience_ns(gpu), &why);
     if (!ended)
         return rc;
     if (err)

@@ -12,7 +12,6 @@
 #include "render/hold.h"
 #include "render/slot.h"
 
-#define UPLOAD_DEADLINE_NS (10 * SPL_NS_PER_S)
 static const uint64_t errors_last_ns = SPL_NS_PER_S;
 
 enum {
@@ -240,7 +239,9 @@ static int fill(struct spl_residency *residency, struct spl_resident_page *page,
     spl_gpu_copy(residency->gpu, residency->staging, 0, page->buffer, 0, bytes);
     spl_gpu_barrier(residency->gpu);
     rc = spl_gpu_submit(residency->gpu, &ticket, err);
-    return rc ? rc : spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + UPLOAD_DEADLINE_NS, err);
+    if (rc)
+        return rc;
+    return spl_gpu_wait(residency->gpu, ticket, spl_now_ns() + spl_gpu_get_patience_ns(residency->gpu), err);
 }
 
 /* The dataset remembers why; the read's place is for others, of which there may be as many as tiles. */

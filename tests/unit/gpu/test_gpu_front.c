@@ -107,6 +107,23 @@ static void next_list_waits_for_the_one_before(void **state)
     spl_gpu_close(&gpu);
 }
 
+/* On a busy machine it is slow where a GPU hangs. */
+static void a_software_driver_has_more_time(void **state)
+{
+    (void)state;
+    for (int software = 0; software < 2; software++) {
+        struct spl_gpu gpu = make();
+        gpu.info.software = software;
+        submit(&gpu);
+        assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_TIMEOUT);
+        assert_int_equal(fake.last_timeout_ns, software ? SPL_GPU_SOFTWARE_PATIENCE_NS : SPL_GPU_PATIENCE_NS);
+        assert_int_equal(fake.last_timeout_ns, spl_gpu_get_patience_ns(&gpu));
+        fake.ended = 1;
+        spl_gpu_close(&gpu);
+    }
+    assert_true(SPL_GPU_SOFTWARE_PATIENCE_NS > SPL_GPU_PATIENCE_NS);
+}
+
 static void missed_deadline_loses_the_device(void **state)
 {
     (void)state;
@@ -358,6 +375,7 @@ int main(void)
         cmocka_unit_test(refusal_by_the_driver_leaves_the_account),
         cmocka_unit_test(unknown_kernel_is_not_found),
         cmocka_unit_test(next_list_waits_for_the_one_before),
+        cmocka_unit_test(a_software_driver_has_more_time),
         cmocka_unit_test(missed_deadline_loses_the_device),
         cmocka_unit_test(past_deadline_is_no_loss_once_it_ended),
         cmocka_unit_test(work_without_end_keeps_its_memory),
