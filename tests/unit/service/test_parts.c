@@ -196,7 +196,7 @@ static void who_leaves_ends_all_parts(void **state)
     (void)state;
     hold_frames(true); // it has no other end
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 9);
-    struct spl_job *job = make_large(600000);
+    struct spl_job *job = make_large(60000);
     submit(fleet, job);
     await_at_least(&fake_frames.drawing, 3);
     spl_cancel_set(&job->dropped);

@@ -204,7 +204,7 @@ static void a_view_ends_within_its_tile_when_nobody_waits(void **state)
 {
     (void)state;
     struct spl_pipeline *pipeline = start(8);
-    struct spl_job *left = make_job(600000);
+    struct spl_job *left = make_job(60000);
     hold_frames(true); // it has no other end
     assert_int_equal(spl_pipeline_submit(pipeline, left, NULL), 0);
     await_at_least(&fake_frames.drawing, 1);
