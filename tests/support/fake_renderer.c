@@ -5,10 +5,13 @@
  * frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it takes
  * to put them on the device, and FAKE_HANG_MS that the first frame ignores its deadline for, as a hanging driver does;
  * FAKE_LOSE_LOADING pages of one dataset in which the device is lost; FAKE_LOSE_FRAME, while which every frame loses
- * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. TSan sees all of it, which it
- * cannot with a driver that compiles its own code. */
+ * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. Tests in the same process hold
+ * frames, too (fake_renderer.h). TSan sees all of it, which it cannot with a driver that compiles its own code. */
+#include "fake_renderer.h"
+
 #include <splatd/render.h>
 
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -27,10 +30,31 @@ struct spl_renderer {
     long uploads;
 };
 
+struct fake_frames fake_frames;
+
+static pthread_mutex_t environment = PTHREAD_MUTEX_INITIALIZER;
+
+void fake_setenv(const char *name, const char *value)
+{
+    pthread_mutex_lock(&environment);
+    setenv(name, value, 1);
+    pthread_mutex_unlock(&environment);
+}
+
+void fake_unsetenv(const char *name)
+{
+    pthread_mutex_lock(&environment);
+    unsetenv(name);
+    pthread_mutex_unlock(&environment);
+}
+
 static long setting(const char *name, long otherwise)
 {
+    pthread_mutex_lock(&environment);
     const char *text = getenv(name);
-    return text ? strtol(text, NULL, 10) : otherwise;
+    const long value = text ? strtol(text, NULL, 10) : otherwise;
+    pthread_mutex_unlock(&environment);
+    return value;
 }
 
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
@@ -39,6 +63,8 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     if (options->require_gpu || opened++ >= setting("FAKE_OPEN_LIMIT", 1000))
         return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
     usleep((useconds_t)setting("FAKE_OPEN_MS", 0) * 1000);
+    while (atomic_load(&fake_frames.closed))
+        usleep(500);
     if (!(*out = spl_alloc(1, sizeof **out, err)))
         return SPL_E_NOMEM;
     (*out)->device =
@@ -302,6 +328,33 @@ static int lose(struct spl_renderer *renderer, struct spl_error *err)
     return spl_fail(err, SPL_E_DEVICE_LOST, "the fake device was told to be lost");
 }
 
+/* Until `until_ns`, and as long as frames are held. The step ends before where it gives way: then it is paused. */
+static int take_time(struct spl_frame_steps *steps, uint64_t began_ns, uint64_t until_ns, uint64_t deadline_ns,
+                     struct spl_error *err)
+{
+    int rc = 0;
+    steps->paused = false;
+    atomic_fetch_add(&fake_frames.drawing, 1);
+    while (!rc && !steps->paused && (atomic_load(&fake_frames.held) || spl_remaining_ns(until_ns))) {
+        if ((steps->paused = gives_way(steps, began_ns)))
+            steps->drawn_ns += spl_now_ns() - began_ns;
+        else if (!spl_remaining_ns(deadline_ns))
+            rc = spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
+        else if (spl_cancel_is_set(steps->cancel))
+            rc = spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
+        else
+            usleep(500);
+    }
+    atomic_fetch_sub(&fake_frames.drawing, 1);
+    return rc;
+}
+
+static bool is_endless(const struct spl_frame_steps *steps)
+{
+    const uint64_t endless_px = atomic_load(&fake_frames.endless_px);
+    return endless_px && spl_view_get_samples(&steps->view) >= endless_px;
+}
+
 int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *more, struct spl_error *err)
 {
     struct spl_renderer *renderer = steps->renderer;
@@ -319,27 +372,25 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
         usleep((useconds_t)setting("FAKE_KERNELS_MS", 0) * 1000);
         steps->frame.stats.kernels_ms = (double)setting("FAKE_KERNELS_MS", 0);
+        atomic_fetch_add(&fake_frames.hanging, 1);
+        while (atomic_load(&fake_frames.hang))
+            usleep(500);
+        atomic_fetch_sub(&fake_frames.hanging, 1);
         if (setting("FAKE_LOSE_FRAME", 0))
             return lose(renderer, err);
     }
     const uint64_t began = spl_now_ns(), whole = (uint64_t)((double)frame_ns(&steps->view) * share);
     const uint64_t until = began + (whole > steps->drawn_ns ? whole - steps->drawn_ns : 0);
-    steps->paused = false;
-    while (spl_remaining_ns(until)) {
-        if ((steps->paused = gives_way(steps, began))) {
-            steps->drawn_ns += spl_now_ns() - began;
-            *more = true;
-            return 0;
-        }
-        if (!spl_remaining_ns(deadline_ns))
-            return spl_fail(err, SPL_E_TIMEOUT, "the deadline passed before the frame was rendered");
-        if (spl_cancel_is_set(steps->cancel))
-            return spl_fail(err, SPL_E_CANCELLED, "the frame was cancelled");
-        usleep(500);
+    int rc = take_time(steps, began, until, deadline_ns, err);
+    if (rc)
+        return rc;
+    if (steps->paused || is_endless(steps)) {
+        *more = true;
+        return 0;
     }
     steps->drawn_ns = 0;
     if (steps->spread) {
-        int rc = tile ? finish_piece(steps, err) : 0;
+        rc = tile ? finish_piece(steps, err) : 0;
         *more = !rc && spl_spread_get_left(steps->spread);
         return rc;
     }

@@ -23,6 +23,7 @@ static int begin(void **state)
     if (pipe2(ends, O_CLOEXEC | O_NONBLOCK))
         return -1;
     fcntl(ends[1], F_SETFL, 0); // stderr blocks, as it does in real life
+    fcntl(ends[1], F_SETPIPE_SZ, 1 << 16); // some systems have others
     saved = dup(STDERR_FILENO);
     dup2(ends[1], STDERR_FILENO);
     close(ends[1]);
@@ -105,7 +106,7 @@ static void json_lines_are_json(void **state)
 static void a_reader_that_sleeps_holds_nobody_up(void **state)
 {
     (void)state;
-    for (int i = 0; i < 5000; i++) // far beyond the 64 KiB of a pipe; a write that blocks would hang here
+    for (int i = 0; i < 5000; i++) // far beyond the 64 KiB of the pipe; a write that blocks would hang here
         spl_log_info("line %d of many that nobody reads for a while", i);
     char *text = take();
     size_t through = count_lines(text);

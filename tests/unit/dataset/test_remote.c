@@ -28,6 +28,7 @@ enum { BLOCK = SPL_REMOTE_BLOCK_BYTES, SIZE = 40 * BLOCK + 12345, SMALL = 12 * B
 /* What the server does with its next requests; each counts down to nothing special. */
 struct server {
     pthread_mutex_t mutex;
+    pthread_cond_t more; // requests at once
     char *bytes; // guarded by: mutex, as all below
     uint64_t size;
     char etag[32], modified[32];
@@ -37,6 +38,8 @@ struct server {
     uint64_t retry_after_s;
     bool lies_about_range, packs, ignores_conditions, ignores_range, trickles;
     uint64_t until_joined; /* it answers once so many blocks were joined in all */
+    int until_at_once;     /* and so many requests at once */
+    uint64_t asked_ns;     /* the last time */
     int asks, closed, at_once, at_once_most;
     struct {
         uint64_t first;
@@ -85,9 +88,13 @@ static void ask(void *context, const struct spl_remote_ask *ask, struct spl_remo
     struct server *s = context;
     pthread_mutex_lock(&s->mutex);
     size_t bytes = answer(s, ask, reply), sent = 0;
+    s->asked_ns = spl_now_ns();
     bool cut = bytes > 1 && s->cutting && s->cutting--, flip = bytes && s->flipping && s->flipping--;
     s->at_once_most = ++s->at_once > s->at_once_most ? s->at_once : s->at_once_most;
     uint64_t until_joined = s->until_joined;
+    while (s->at_once_most < s->until_at_once && pthread_cond_wait(&s->more, &s->mutex) == 0)
+        ;
+    pthread_cond_broadcast(&s->more);
     pthread_mutex_unlock(&s->mutex);
     while (atomic_load(&spl_remote_counts.joined) < until_joined)
         usleep(1000);
@@ -120,6 +127,7 @@ static void start(struct server *s, uint64_t size)
 {
     *s = (struct server){.size = size, .etag = "\"one\"", .modified = "Sat, 28 Nov 2026 00:00:00 GMT"};
     pthread_mutex_init(&s->mutex, NULL);
+    pthread_cond_init(&s->more, NULL);
     s->bytes = malloc(size + 1);
     for (uint64_t i = 0; i < size; i++)
         s->bytes[i] = (char)(i ^ i >> 8 ^ i >> 17);
@@ -127,6 +135,7 @@ static void start(struct server *s, uint64_t size)
 
 static void stop(struct server *s)
 {
+    pthread_cond_destroy(&s->more);
     pthread_mutex_destroy(&s->mutex);
     free(s->bytes);
 }
@@ -148,7 +157,7 @@ static struct spl_dataset_source open_with(struct server *s, const struct spl_re
     return source;
 }
 
-static const struct spl_remote_how patient = {.deadline_ms = 5000}, hasty = {.deadline_ms = 1500};
+static const struct spl_remote_how patient = {.deadline_ms = 60000}, hasty = {.deadline_ms = 1500};
 
 static int read_range(struct spl_dataset_source *source, const struct server *s, uint64_t offset, size_t bytes,
                       struct spl_error *err)
@@ -254,21 +263,27 @@ static void test_a_server_that_stays_away(void **state)
     assert_int_equal(read_range(&source, &s, BLOCK, 10, &err), SPL_E_TIMEOUT);
     assert_null(strstr(err.message, "https")); // clients are told the id
     assert_non_null(strstr(err.message, "cannot read hall: "));
-    const int asks = s.asks; // nobody else is at it
-    err = (struct spl_error){0};
-    // nobody waits for it once more so soon
-    assert_int_equal(read_range(&source, &s, 2 * BLOCK, 10, &err), SPL_E_TIMEOUT);
-    assert_true(s.asks == asks && strstr(err.message, "a moment ago"));
+    for (bool soon = false; !soon;) { // unless the machine was away for as long as it rests
+        const uint64_t asked_ns = s.asked_ns;
+        const int asks = s.asks; // nobody else is at it
+        err = (struct spl_error){0};
+        assert_int_equal(read_range(&source, &s, 2 * BLOCK, 10, &err), SPL_E_TIMEOUT);
+        soon = spl_now_ns() - asked_ns < hasty.deadline_ms * SPL_NS_PER_MS;
+        // nobody waits for it once more so soon
+        assert_true(!soon || (s.asks == asks && strstr(err.message, "a moment ago")));
+    }
     s.failing = 0;
     usleep((unsigned)hasty.deadline_ms * 1000);
     expect_range(&source, &s, BLOCK, 10); // nothing of a failure stays
+    spl_dataset_source_close(&source);
+    source = open_with(&s, &patient);
     s.failing = 1;
     s.status = 503;
     s.retry_after_s = 3600; // longer than anybody waits: told at once
     err = (struct spl_error){0};
     uint64_t began_ns = spl_now_ns();
     assert_int_equal(read_range(&source, &s, 9 * BLOCK, 10, &err), SPL_E_TIMEOUT);
-    assert_true(spl_now_ns() - began_ns < SPL_NS_PER_S && strstr(err.message, "503"));
+    assert_true(spl_now_ns() - began_ns < patient.deadline_ms * SPL_NS_PER_MS / 2 && strstr(err.message, "503"));
     spl_dataset_source_close(&source);
     stop(&s);
 }
@@ -429,6 +444,7 @@ static void test_crowd(void **state)
     struct server s;
     start(&s, SIZE);
     struct spl_dataset_source source = open_with(&s, &patient);
+    s.until_at_once = 2;
     for (int round = 0; round < rounds; round++) {
         struct reader all[readers];
         s.failing = round % 2;
@@ -469,7 +485,7 @@ static void test_cancelling(void **state)
     pthread_create(&thread, NULL, cancel_soon, &cancelled);
     uint64_t began_ns = spl_now_ns();
     assert_int_equal(read_range(&source, &s, BLOCK, 1, &err), SPL_E_CANCELLED);
-    assert_true(spl_now_ns() - began_ns < 10 * SPL_NS_PER_S);
+    assert_true(spl_now_ns() - began_ns < 30 * SPL_NS_PER_S);
     pthread_join(thread, NULL);
     spl_dataset_source_close(&source);
     stop(&s);

@@ -16,25 +16,21 @@
 #include "support/make_dataset.h"
 #include "support/make_knot.h"
 
-static char folder[256], path[300];
+static char folder[256], path[300], other_path[300];
 
 enum { knot_points = 40000 };
 
-/* Processor time of the cheapest of several openings. */
-static double cost_of_opening(void)
+/* Processor time of an opening, if it is less than that. */
+static double cost_of_opening(const char *of, double least)
 {
-    double least = INFINITY;
-    for (int i = 0; i < 9; i++) {
-        struct spl_dataset *dataset;
-        struct timespec begin, end;
-        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begin);
-        assert_int_equal(spl_dataset_open(path, false, &dataset, NULL), SPL_OK);
-        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
-        spl_dataset_close(dataset);
-        double seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
-        least = seconds < least ? seconds : least;
-    }
-    return least;
+    struct spl_dataset *dataset;
+    struct timespec begin, end;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begin);
+    assert_int_equal(spl_dataset_open(of, false, &dataset, NULL), SPL_OK);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
+    spl_dataset_close(dataset);
+    double seconds = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+    return seconds < least ? seconds : least;
 }
 
 /* A knot of points that all claim to lie on wires, with radii as wide as it is, opens as an honest file of as many
@@ -42,15 +38,19 @@ static double cost_of_opening(void)
 static void a_knot_opens_like_any_other_file(void **state)
 {
     (void)state;
+    double knot = INFINITY, other = INFINITY; // the cheapest of several, by turns: whatever slows one slows both
     make_knot_file(path, knot_points);
-    double knot = cost_of_opening();
     struct make_splat *splats = calloc(knot_points, sizeof *splats);
     for (int i = 0; i < knot_points; i++)
         splats[i] = (struct make_splat){
             .position = {0.02 * (i % 200), 0.02 * (i / 200), 0}, .normal = {0, 0, 1}, .radius = 0.01f};
-    make_dataset_file(path, splats, knot_points, 1);
+    make_dataset_file(other_path, splats, knot_points, 1);
     free(splats);
-    double other = cost_of_opening();
+    for (int i = 0; i < 15; i++) {
+        knot = cost_of_opening(path, knot);
+        other = cost_of_opening(other_path, other);
+    }
+    unlink(other_path);
     if (knot > 5 * other)
         fail_msg("the knot took %.3f ms to open, another file %.3f", 1e3 * knot, 1e3 * other);
 }
@@ -89,6 +89,7 @@ int main(void)
     };
     make_folder(folder);
     snprintf(path, sizeof path, "%s/knot.spld", folder);
+    snprintf(other_path, sizeof other_path, "%s/other.spld", folder);
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     unlink(path);
     rmdir(folder);

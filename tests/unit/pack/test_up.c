@@ -16,6 +16,7 @@
 #include "dataset/chunk.h"
 #include "dataset/dataset.h"
 #include "pack/up.h"
+#include "support/make_dataset.h"
 
 enum { cameras_max = 64 };
 static struct spl_named_view views[cameras_max];
@@ -148,7 +149,10 @@ static void write_floor(const char *path, const double up[3])
 static void datasets_follow_it(void **state)
 {
     (void)state;
-    static const char input[] = "/tmp/splatd-up-test.xyz", output[] = "/tmp/splatd-up-test.spld";
+    char folder[256], input[300], output[300];
+    make_folder(folder);
+    snprintf(input, sizeof input, "%s/up.xyz", folder);
+    snprintf(output, sizeof output, "%s/up.spld", folder);
     const char *inputs[1] = {input};
     for (size_t w = 0; w < 1 + sizeof worlds / sizeof *worlds; w++) {
         const double z[3] = {0, 0, 1}, *up = w ? worlds[w - 1] : z;
@@ -186,6 +190,7 @@ static void datasets_follow_it(void **state)
     assert_string_equal(err.field, "up");
     unlink(input);
     unlink(output);
+    assert_int_equal(rmdir(folder), 0);
 }
 
 int main(void)

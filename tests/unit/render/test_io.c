@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "render/io.h"
+#include "support/own_clock.h"
 
 enum { reads_max = 1024, broken = 77 };
 
@@ -112,6 +113,7 @@ static void on_read(void *context)
 static struct spl_io *start(void)
 {
     struct spl_io *io = NULL;
+    let_clock_go();
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         await_let_go(&files[i]); // what the test before left behind
         files[i].may_pass = files[i].asked = 0;
@@ -137,7 +139,7 @@ static struct spl_io_read *begin(struct spl_io *io, struct file *file, uint32_t 
 
 static struct spl_io_read *take(struct spl_io *io)
 {
-    assert_true(spl_io_wait(io, spl_now_ns() + 30 * SPL_NS_PER_S));
+    assert_true(spl_io_wait(io, spl_now_ns() + 600 * SPL_NS_PER_S)); // of the kernel's clock, which goes on
     return spl_io_take(io);
 }
 
@@ -394,12 +396,13 @@ static void a_file_from_afar_is_read_by_several(void **state)
                                .owner = &files[0],
                                .get_moved_ns = get_sign_ns,
                                .at_once = at_once};
+    stop_clock();
     atomic_store(&sign_ns, spl_now_ns());
     for (what.index = 0; what.index < count; what.index++)
         assert_non_null(spl_io_try_begin(io, &what, (struct spl_io_rank){.awaited = true, .walk = 1}));
     await_asked(&files[0], at_once);
     for (int i = 0; i < 12; i++) { // for longer than what hangs
-        usleep(100000);
+        move_clock_on(100 * SPL_NS_PER_MS);
         atomic_store(&sign_ns, spl_now_ns());
         assert_false(spl_io_hangs(io, &files[0]) || spl_io_count_hanging(io));
     }
@@ -407,8 +410,8 @@ static void a_file_from_afar_is_read_by_several(void **state)
     assert_true(spl_now_ns() - spl_io_get_moved_ns(io, &files[0]) < SPL_NS_PER_S);
     let_pass(&files[0], 1, false);
     await_asked(&files[0], at_once + 1);
-    while (!spl_io_hangs(io, &files[0]))
-        usleep(10000);
+    move_clock_on(SPL_NS_PER_S);
+    assert_true(spl_io_hangs(io, &files[0]));
     let_pass(&files[0], 1, false);
     spl_io_end(io, take(io));
     spl_io_end(io, take(io));
@@ -437,10 +440,12 @@ static void a_part_that_hangs_holds_up_no_other(void **state)
     const struct spl_io_rank rank = {.awaited = true, .walk = 1};
     struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .source = &files[0], .bytes = 8,
                                .owner = &files[0], .get_moved_ns = never_moved, .at_once = at_once, .part = 1};
+    stop_clock();
     assert_non_null(spl_io_try_begin(io, &what, rank));
     await_asked(&files[0], 1);
-    while (!spl_io_part_hangs(io, &files[0], 1))
-        usleep(10000);
+    assert_false(spl_io_part_hangs(io, &files[0], 1));
+    move_clock_on(SPL_NS_PER_S);
+    assert_true(spl_io_part_hangs(io, &files[0], 1));
     assert_true(spl_io_hangs(io, &files[0]) && !spl_io_part_hangs(io, &files[0], 2));
     what.index = 1;
     assert_non_null(spl_io_try_begin(io, &what, rank)); // no more of that part
@@ -449,8 +454,8 @@ static void a_part_that_hangs_holds_up_no_other(void **state)
     await_asked(&files[0], 1 + at_once);
     assert_true(spl_now_ns() - spl_io_get_moved_ns(io, &files[0]) < SPL_NS_PER_S); // who waits for the other goes on
     assert_true(files[0].order[1] >= 2 && files[0].order[2] >= 2);
-    while (!spl_io_part_hangs(io, &files[0], 2))
-        usleep(10000);
+    move_clock_on(SPL_NS_PER_S);
+    assert_true(spl_io_part_hangs(io, &files[0], 2));
     what.part = 3;
     assert_non_null(spl_io_try_begin(io, &what, rank));
     usleep(50000);
@@ -470,6 +475,7 @@ static void servers_that_hang_take_nothing_from_a_disk(void **state)
     struct spl_io_what what = {.read = read_gated, .hold = hold, .let_go = let_go, .bytes = quarter, .owner = &files[0],
                                .get_moved_ns = never_moved, .at_once = 4};
     const struct spl_io_rank rank = {.awaited = true, .walk = 1};
+    stop_clock();
     what.source = &files[0];
     for (what.index = 0; what.index < 5; what.index++)
         assert_non_null(spl_io_try_begin(io, &what, rank));
@@ -488,9 +494,13 @@ static void servers_that_hang_take_nothing_from_a_disk(void **state)
         what.source = &files[f];
         for (what.index = 0; what.index < SPL_IO_READS; what.index++)
             spl_io_try_begin(io, &what, rank);
-        while (spl_io_count_hanging(io) < 4 * (size_t)(f + 1))
-            usleep(10000);
+        assert_int_equal(get_asked(&files[f]), 0);
+        move_clock_on(SPL_NS_PER_S);
+        assert_int_equal(spl_io_count_hanging(io), 4 * f);
+        await_asked(&files[f], 4);
     }
+    move_clock_on(SPL_NS_PER_S);
+    assert_int_equal(spl_io_count_hanging(io), 16);
     what.source = &files[4];
     what.index = 0;
     assert_null(spl_io_try_begin(io, &what, rank)); // three quarters of all places are from afar

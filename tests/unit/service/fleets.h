@@ -18,6 +18,14 @@ static struct spl_fleet *start_fleet(const char *devices, size_t queue)
     return fleet;
 }
 
+/* From then on a pipeline says that it is rebuilt, which it may not yet when the view comes back in which it was
+ * lost. */
+static void await_losses(uint64_t losses)
+{
+    while (counters.device_losses < losses)
+        usleep(500);
+}
+
 static struct spl_job *take_job(struct spl_fleet *fleet)
 {
     struct spl_job *job;

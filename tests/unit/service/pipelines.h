@@ -14,12 +14,25 @@
 
 #include "base/clock.h"
 #include "service/view/pipeline.h"
+#include "support/fake_renderer.h"
 
 static struct spl_counters counters; /* of the pipeline that was started last */
 
 static inline void no_wake(void *context)
 {
     (void)context;
+}
+
+/* Frames begin and go on, or end; those that are inside at once. */
+static inline void hold_frames(bool held)
+{
+    atomic_store(&fake_frames.held, held);
+}
+
+static inline void await_at_least(atomic_int *count, int least)
+{
+    while (atomic_load(count) < least)
+        usleep(500);
 }
 
 /* Ready, with two encoders; the options' other members are the caller's. */

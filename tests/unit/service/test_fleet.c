@@ -48,14 +48,15 @@ static struct spl_catalog_entry *take_change(struct spl_fleet *fleet)
 
 static void wait_until_ready(struct spl_fleet *fleet, uint64_t losses)
 {
-    while (counters.device_losses < losses || spl_fleet_get_state(fleet) != SPL_PIPELINE_READY)
+    await_losses(losses);
+    while (spl_fleet_get_state(fleet) != SPL_PIPELINE_READY)
         usleep(500);
 }
 
 /* A view of the entry, or of none. */
 static int view_of(struct spl_fleet *fleet, struct spl_catalog_entry *entry)
 {
-    struct spl_job *job = make_job(10000);
+    struct spl_job *job = make_job(600000);
     job->entry = entry ? spl_catalog_entry_ref(entry) : NULL;
     job->dataset = entry ? entry->dataset : NULL;
     assert_int_equal(spl_fleet_submit(fleet, job, NULL), 0);
@@ -69,7 +70,7 @@ static int view_of(struct spl_fleet *fleet, struct spl_catalog_entry *entry)
 static void what_costs_the_device_twice_is_put_aside(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x4", 1);
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "1x4");
     struct spl_fleet *fleet = start(8);
     struct spl_catalog_entry *entry = open_entry(), *other = open_entry();
     spl_fleet_add(fleet, entry);
@@ -100,7 +101,7 @@ static void what_costs_the_device_twice_is_put_aside(void **state)
     assert_int_equal(entry->state, SPL_ENTRY_GONE);
     spl_catalog_entry_destroy(entry);
     spl_catalog_entry_unref(other);
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 }
 
@@ -113,7 +114,7 @@ static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
     spl_fleet_add(fleet, other);
     assert_ptr_equal(take_change(fleet), other);
     const uint64_t losses = counters.device_losses;
-    setenv("FAKE_LOSE_LOADING", "10", 1);
+    fake_setenv("FAKE_LOSE_LOADING", "10");
     spl_fleet_add(fleet, entry);
     assert_ptr_equal(take_change(fleet), entry);
     assert_int_equal(entry->state, SPL_ENTRY_REFUSED);
@@ -121,7 +122,7 @@ static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
     wait_until_ready(fleet, losses + 2);
     assert_int_equal(view_of(fleet, other), 0);
     assert_int_equal(counters.device_losses - losses, 2);
-    unsetenv("FAKE_LOSE_LOADING");
+    fake_unsetenv("FAKE_LOSE_LOADING");
     spl_catalog_entry_unref(entry);
     spl_catalog_entry_unref(other);
     spl_fleet_destroy(fleet);
@@ -130,12 +131,12 @@ static void what_costs_the_device_while_it_is_loaded_is_refused(void **state)
 static void versions_come_and_go_while_the_device_is_lost(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x3", 1);
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "1x3");
     struct spl_fleet *fleet = start(8);
     for (int i = 0; i < 20; i++) {
         struct spl_catalog_entry *entry = open_entry();
         spl_fleet_add(fleet, entry);
-        struct spl_job *job = make_job(10000), *back;
+        struct spl_job *job = make_job(600000), *back;
         if (i % 4 == 0 && !spl_fleet_submit(fleet, job, NULL))
             job = NULL;
         assert_ptr_equal(take_change(fleet), entry);
@@ -143,7 +144,7 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
         if (!job)
             spl_job_destroy(take_job(fleet));
         spl_job_destroy(job);
-        job = make_job(10000);
+        job = make_job(600000);
         job->entry = spl_catalog_entry_ref(entry);
         job->dataset = entry->dataset;
         spl_catalog_entry_unref(entry); // the job's reference is the last
@@ -157,7 +158,7 @@ static void versions_come_and_go_while_the_device_is_lost(void **state)
         assert_int_equal(entry->state, SPL_ENTRY_GONE);
         spl_catalog_entry_destroy(entry);
     }
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 }
 
@@ -180,16 +181,16 @@ static void a_fleet_ends_with_versions_in_every_state(void **state)
         spl_fleet_destroy(fleet); // leak checkers see what is left
     }
     struct spl_catalog_entry *entry = open_entry();
-    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    fake_setenv("FAKE_OPEN_LIMIT", "0");
     struct spl_fleet *fleet = start(8);
     spl_fleet_add(fleet, entry); // nobody will ever take it up
-    unsetenv("FAKE_OPEN_LIMIT");
+    fake_unsetenv("FAKE_OPEN_LIMIT");
     spl_fleet_destroy(fleet);
 }
 
 static struct spl_job *make_job_of(struct spl_catalog_entry *entry)
 {
-    struct spl_job *job = make_job(60000);
+    struct spl_job *job = make_job(600000);
     job->entry = spl_catalog_entry_ref(entry);
     job->dataset = entry->dataset;
     return job;
@@ -215,7 +216,7 @@ static void finish_all(struct spl_fleet *fleet, int jobs)
 static void views_go_where_the_least_waits(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "300", 1);
+    fake_setenv("FAKE_FRAME_MS", "300");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entries[2] = {open_entry(), open_entry()};
     for (int i = 0; i < 2; i++) {
@@ -242,7 +243,7 @@ static void views_go_where_the_least_waits(void **state)
     assert_int_equal(counters.frames, 8);
     for (int i = 0; i < 2; i++)
         spl_catalog_entry_unref(entries[i]);
-    unsetenv("FAKE_FRAME_MS");
+    fake_unsetenv("FAKE_FRAME_MS");
     spl_fleet_destroy(fleet);
 }
 
@@ -250,7 +251,7 @@ static void views_go_where_the_least_waits(void **state)
 static void places_of_a_dataset_have_homes(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "50", 1);
+    fake_setenv("FAKE_FRAME_MS", "50");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 9);
     struct spl_catalog_entry *before = open_entry(), *entry = open_splats(2);
     spl_fleet_add(fleet, before); // whose home is the first
@@ -270,30 +271,30 @@ static void places_of_a_dataset_have_homes(void **state)
     }
     spl_catalog_entry_unref(before);
     spl_catalog_entry_unref(entry);
-    unsetenv("FAKE_FRAME_MS");
+    fake_unsetenv("FAKE_FRAME_MS");
     spl_fleet_destroy(fleet);
 }
 
 static void all_queues_are_full_before_a_view_is_refused(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "500", 1);
     struct spl_fleet *fleet = start_fleet("fake,fake,fake", 6);
     struct spl_job *job;
     struct spl_error err = {0};
     int accepted = 0, rc;
-    while (!(rc = spl_fleet_submit(fleet, job = make_job(60000), &err)))
+    hold_frames(true);
+    while (!(rc = spl_fleet_submit(fleet, job = make_job(600000), &err)))
         accepted++;
     assert_int_equal(rc, SPL_E_BUSY);
     assert_in_range(accepted, 6, 9); // two in each queue, and one that is drawn
     assert_in_range(spl_fleet_get_retry_after(fleet, false), 1, 60);
     spl_job_destroy(job);
-    unsetenv("FAKE_FRAME_MS");
+    hold_frames(false);
     spl_fleet_destroy(fleet);
     assert_int_equal(counters.frames, accepted);
 }
 
-/* While one is reopened, which takes a minute, the other serves; and the fleet is ready. */
+/* While one is reopened, however long that takes, the other serves; and the fleet is ready. */
 static void a_lost_device_leaves_the_others(void **state)
 {
     (void)state;
@@ -303,18 +304,19 @@ static void a_lost_device_leaves_the_others(void **state)
     assert_ptr_equal(take_change(fleet), entry);
     spl_catalog_entry_ref(entry);
     spl_catalog_entry_unref(entry);
-    setenv("FAKE_OPEN_MS", "1500", 1);
-    setenv("FAKE_LOSE_FRAME", "1", 1);
+    atomic_store(&fake_frames.closed, true);
+    fake_setenv("FAKE_LOSE_FRAME", "1");
     assert_int_equal(view_of(fleet, entry), SPL_E_DEVICE_LOST);
-    unsetenv("FAKE_LOSE_FRAME");
+    fake_unsetenv("FAKE_LOSE_FRAME");
+    await_losses(1); // the view came back before
     for (int i = 0; i < 4; i++) {
         assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_READY);
         assert_int_equal(view_of(fleet, entry), 0);
     }
     assert_int_equal(spl_pipeline_get_state(spl_fleet_get(fleet, 0)), SPL_PIPELINE_REBUILDING);
+    atomic_store(&fake_frames.closed, false);
     while (spl_pipeline_get_state(spl_fleet_get(fleet, 0)) != SPL_PIPELINE_READY)
         usleep(1000);
-    unsetenv("FAKE_OPEN_MS");
     assert_int_equal(view_of(fleet, entry), 0);
     spl_catalog_entry_unref(entry);
     spl_fleet_destroy(fleet);
@@ -324,14 +326,16 @@ static void a_lost_device_leaves_the_others(void **state)
 static void a_device_that_is_gone_is_given_up(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "10x100", 1); // the second after twenty
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "10x100"); // the second after twenty
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entry = open_entry(), *later = open_entry();
     spl_fleet_add(fleet, entry);
     assert_ptr_equal(take_change(fleet), entry);
-    setenv("FAKE_OPEN_LIMIT", "0", 1);
+    fake_setenv("FAKE_OPEN_LIMIT", "0");
+    while (view_of(fleet, entry) != SPL_E_DEVICE_LOST)
+        ;
     while (spl_pipeline_get_state(spl_fleet_get(fleet, 0)) != SPL_PIPELINE_FAILED)
-        view_of(fleet, entry);
+        usleep(500);
     assert_int_equal(spl_fleet_get_state(fleet), SPL_PIPELINE_READY);
     spl_fleet_add(fleet, later);
     assert_ptr_equal(take_change(fleet), later);
@@ -349,8 +353,8 @@ static void a_device_that_is_gone_is_given_up(void **state)
     }
     assert_int_equal(spl_fleet_get_failure(fleet)->code, SPL_E_DEVICE_LOST);
     spl_catalog_entry_unref(later);
-    unsetenv("FAKE_OPEN_LIMIT");
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("FAKE_OPEN_LIMIT");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 }
 
@@ -360,7 +364,7 @@ static void a_dataset_has_room_on_some_devices(void **state)
     (void)state;
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_catalog_entry *entry = open_entry(), *large = open_entry();
-    setenv("FAKE_REFUSE", "1", 1);
+    fake_setenv("FAKE_REFUSE", "1");
     spl_fleet_add(fleet, entry);
     assert_ptr_equal(take_change(fleet), entry);
     assert_int_equal(entry->state, SPL_ENTRY_RESIDENT);
@@ -368,12 +372,12 @@ static void a_dataset_has_room_on_some_devices(void **state)
     assert_int_equal(entry->err.code, 0);
     for (int i = 0; i < 4; i++)
         assert_int_equal(view_of(fleet, entry), 0);
-    setenv("FAKE_REFUSE", "3", 1);
+    fake_setenv("FAKE_REFUSE", "3");
     spl_fleet_add(fleet, large);
     assert_ptr_equal(take_change(fleet), large);
     assert_int_equal(large->state, SPL_ENTRY_REFUSED);
     assert_int_equal(large->err.code, SPL_E_LIMIT);
-    unsetenv("FAKE_REFUSE");
+    fake_unsetenv("FAKE_REFUSE");
     spl_catalog_entry_unref(large);
     spl_catalog_entry_unref(entry);
     assert_ptr_equal(take_change(fleet), entry); // of the one device that had it
@@ -426,7 +430,7 @@ static void lists_of_devices_are_checked(void **state)
 static void devices_are_lost_while_all_goes_on(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "7x2", 1);
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "7x2");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 32);
     int back = 0, sent = 0;
     for (int i = 0; i < 12; i++) {
@@ -454,7 +458,7 @@ static void devices_are_lost_while_all_goes_on(void **state)
         spl_catalog_entry_destroy(entry);
     }
     assert_int_equal(back, sent);
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 }
 

@@ -14,6 +14,7 @@
 #include "service/state.h"
 #include "service/view/flights.h"
 #include "service/view/views.h"
+#include "support/fake_renderer.h"
 
 static struct spl_counters counters;
 static struct spl_views views;
@@ -25,16 +26,17 @@ static void wake(void *context)
     (void)context;
 }
 
-static void start(const char *frame_ms)
+/* Frames are held until land(). */
+static void start(void)
 {
-    setenv("FAKE_FRAME_MS", frame_ms, 1);
+    atomic_store(&fake_frames.held, true);
     counters = (struct spl_counters){0};
     views = (struct spl_views){0};
     struct spl_fleet_options options = {
         .devices = "fake", .pipeline = {.queue = 8, .encoders = 1, .counters = &counters, .wake = wake}};
     assert_int_equal(spl_cache_create(1 << 20, &views.cache, NULL), 0);
     assert_int_equal(spl_fleet_create(&options, &views.fleet, NULL), 0);
-    for (int ms = 0; ms < 20000 && spl_fleet_get_state(views.fleet) != SPL_PIPELINE_READY; ms++)
+    for (int ms = 0; ms < 60000 && spl_fleet_get_state(views.fleet) != SPL_PIPELINE_READY; ms++)
         usleep(1000);
 }
 
@@ -44,7 +46,6 @@ static void stop(void)
     spl_fleet_destroy(views.fleet);
     spl_cache_destroy(views.cache);
     assert_int_equal(views.reply_bytes, 0);
-    unsetenv("FAKE_FRAME_MS");
 }
 
 struct passenger {
@@ -75,6 +76,7 @@ static int ask(struct passenger *passenger, uint64_t n, uint64_t deadline_ms)
 
 static void land(const struct passenger *until)
 {
+    atomic_store(&fake_frames.held, false);
     for (int ms = 0; ms < 60000 && !until->answers; ms++) {
         for (struct spl_job *job; (job = spl_fleet_take(views.fleet));)
             job->done(job);
@@ -86,13 +88,13 @@ static void land(const struct passenger *until)
 static void equal_views_share_a_frame(void **state)
 {
     (void)state;
-    start("50");
+    start();
     struct passenger p[5], other;
     for (int i = 0; i < 5; i++) {
-        assert_int_equal(ask(&p[i], 1, 60000), 0);
+        assert_int_equal(ask(&p[i], 1, 600000), 0);
         assert_int_equal(p[i].ticket.shared, i > 0);
     }
-    assert_int_equal(ask(&other, 2, 60000), 0);
+    assert_int_equal(ask(&other, 2, 600000), 0);
     assert_false(other.ticket.shared);
     land(&other);
     for (int i = 0; i < 5; i++) {
@@ -108,13 +110,13 @@ static void equal_views_share_a_frame(void **state)
 static void who_leaves_takes_nobody_along(void **state)
 {
     (void)state;
-    start("50");
+    start();
     struct passenger first, second, third;
-    ask(&first, 1, 60000);
-    ask(&second, 1, 60000);
+    ask(&first, 1, 600000);
+    ask(&second, 1, 600000);
     spl_ticket_drop(&first.ticket);
     spl_ticket_drop(&first.ticket); // harmless
-    ask(&third, 1, 60000);
+    ask(&third, 1, 600000);
     assert_true(third.ticket.shared);
     land(&third);
     assert_int_equal(first.answers, 0);
@@ -126,12 +128,12 @@ static void who_leaves_takes_nobody_along(void **state)
 static void the_last_to_leave_ends_the_flight(void **state)
 {
     (void)state;
-    start("100");
+    start();
     struct passenger busy, p, again;
-    ask(&busy, 1, 60000);
-    ask(&p, 2, 60000);
+    ask(&busy, 1, 600000);
+    ask(&p, 2, 600000);
     spl_ticket_drop(&p.ticket);
-    ask(&again, 2, 60000);
+    ask(&again, 2, 600000);
     assert_false(again.ticket.shared);
     land(&again);
     assert_int_equal(again.code, 0);
@@ -144,12 +146,14 @@ static void the_last_to_leave_ends_the_flight(void **state)
 static void a_late_passenger_raises_the_deadline(void **state)
 {
     (void)state;
-    start("300");
+    start();
     struct passenger busy, early, late;
-    ask(&busy, 1, 60000);
+    ask(&busy, 1, 600000);
     ask(&early, 2, 1);
-    ask(&late, 2, 60000);
+    ask(&late, 2, 600000);
     assert_true(late.ticket.shared);
+    while (spl_remaining_ns(early.ticket.deadline_ns))
+        usleep(500);
     land(&late);
     assert_int_equal(late.code, 0);
     assert_true(early.answers == 1 && early.code == 0); /* of one flight that landed, not of one that was cut short */
@@ -161,11 +165,14 @@ static void a_late_passenger_raises_the_deadline(void **state)
 static void a_frame_that_was_cut_short_is_launched_again(void **state)
 {
     (void)state;
-    start("400");
+    start();
     struct passenger early, late;
     ask(&early, 1, 200);
-    usleep(100000);
-    ask(&late, 1, 60000);
+    while (!atomic_load(&fake_frames.drawing) && spl_remaining_ns(early.ticket.deadline_ns))
+        usleep(500);
+    while (spl_remaining_ns(early.ticket.deadline_ns) || atomic_load(&fake_frames.drawing))
+        usleep(500);
+    ask(&late, 1, 600000); // it is not known here yet
     assert_true(late.ticket.shared);
     land(&late);
     assert_int_equal(late.code, 0);
@@ -176,11 +183,11 @@ static void a_frame_that_was_cut_short_is_launched_again(void **state)
 static void a_full_queue_refuses_and_keeps_nothing(void **state)
 {
     (void)state;
-    start("200");
+    start();
     struct passenger p[40];
     int boarded = 0, last = 0;
     for (int i = 0; i < 40; i++)
-        if (!ask(&p[i], (uint64_t)i + 1, 60000))
+        if (!ask(&p[i], (uint64_t)i + 1, 600000))
             last = i, boarded++;
         else
             assert_null(p[i].ticket.flight);

@@ -11,7 +11,7 @@ static struct spl_job *make_large(unsigned deadline_ms)
 
 static struct spl_job *make_small(void)
 {
-    return make_view("width=8&height=4&format=raw", 60000);
+    return make_view("width=8&height=4&format=raw", 600000);
 }
 
 static void submit(struct spl_fleet *fleet, struct spl_job *job)
@@ -56,26 +56,24 @@ static void wait_until_ready(struct spl_fleet *fleet)
             usleep(500);
 }
 
-/* In less time than one takes, as one frame that counts once, and each device has half of it inside. */
+/* At the same time, as one frame that counts once, and each device has half of it inside. */
 static void idle_devices_draw_it_together(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "800", 1);
     struct spl_fleet *one = start_fleet("fake:0", 8);
-    struct spl_job *job = make_large(60000), *alone;
-    uint64_t began = spl_now_ns();
+    struct spl_job *job = make_large(600000), *alone;
     submit(one, job);
     alone = take_job(one);
-    uint64_t took_alone = spl_now_ns() - began;
     spl_fleet_destroy(one);
     struct spl_fleet *two = start_fleet("fake:0,fake:1", 8);
-    job = make_large(60000);
-    began = spl_now_ns();
+    job = make_large(600000);
+    hold_frames(true);
     submit(two, job);
     assert_int_equal(look(two, 0).samples_inside, 1280 * 1024 / 2);
     assert_int_equal(look(two, 1).samples_inside, 1280 * 1024 / 2);
+    await_at_least(&fake_frames.drawing, 2); // pieces of it, while neither has ended
+    hold_frames(false);
     assert_ptr_equal(take_job(two), job);
-    assert_true(spl_now_ns() - began < took_alone * 3 / 4);
     assert_int_equal(job->err.code, 0);
     assert_int_equal(job->encoded.length, alone->encoded.length);
     assert_memory_equal(job->encoded.bytes, alone->encoded.bytes, alone->encoded.length);
@@ -85,17 +83,16 @@ static void idle_devices_draw_it_together(void **state)
     spl_job_destroy(job);
     spl_job_destroy(alone);
     spl_fleet_destroy(two);
-    unsetenv("FAKE_FRAME_MS");
 }
 
 /* Small views, those of a plan and tours' frames have one device; so has a large one where no two are idle. */
 static void others_have_one_device(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "300", 1);
+    fake_setenv("FAKE_FRAME_MS", "300");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
-    struct spl_job *jobs[4] = {make_view("width=1280&height=720&format=raw", 60000), make_large(60000),
-                               make_large(60000), make_large(60000)};
+    struct spl_job *jobs[4] = {make_view("width=1280&height=720&format=raw", 600000), make_large(600000),
+                               make_large(600000), make_large(600000)};
     jobs[1]->behind = true;
     jobs[2]->request.planned = true;
     for (int i = 0; i < 3; i++) {
@@ -111,42 +108,47 @@ static void others_have_one_device(void **state)
     for (int i = 0; i < 2; i++)
         spl_job_destroy(take_job(fleet));
     spl_fleet_destroy(fleet);
-    unsetenv("FAKE_FRAME_MS");
+    fake_unsetenv("FAKE_FRAME_MS");
 }
 
 /* Before it has drawn anything; and in the middle of a piece, when all others are drawn. */
 static void what_a_lost_device_had_others_draw(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "1x1", 1);
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "1x1");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_job *job = make_small();
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0); // by the first device, which is lost in its next frame
-    job = make_large(60000);
+    job = make_large(600000);
+    hold_frames(true); // until it has come to its loss
     submit(fleet, job);
     assert_non_null(job->spread.frame);
+    await_losses(1);
+    hold_frames(false);
     assert_int_equal(finish(fleet, job), 0);
     assert_int_equal(counters.device_losses, 1);
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 
-    setenv("FAKE_HANG_MS", "700", 1);
     fleet = start_fleet("fake:0,fake:1", 8);
     job = make_small();
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0);
-    job = make_large(60000);
+    job = make_large(600000);
+    hold_frames(true);
+    atomic_store(&fake_frames.hang, true);
     submit(fleet, job);
+    await_at_least(&fake_frames.hanging, 1); // with its first piece
+    hold_frames(false);
     while (look(fleet, 0).samples_inside) { // the first has drawn all but what the second hangs in
         assert_null(spl_fleet_take(fleet));
         usleep(1000);
     }
-    setenv("FAKE_LOSE_FRAME", "1", 1);
-    while (!counters.device_losses)
-        usleep(1000);
-    unsetenv("FAKE_LOSE_FRAME");
-    unsetenv("FAKE_HANG_MS");
+    fake_setenv("FAKE_LOSE_FRAME", "1");
+    atomic_store(&fake_frames.hang, false);
+    await_losses(1);
+    fake_unsetenv("FAKE_LOSE_FRAME");
     assert_int_equal(finish(fleet, job), 0);
     assert_int_equal(counters.device_losses, 1);
     spl_fleet_destroy(fleet);
@@ -157,14 +159,15 @@ static void all_may_be_lost(void **state)
 {
     (void)state;
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
-    setenv("FAKE_LOSE_FRAME", "1", 1);
-    struct spl_job *job = make_large(60000);
+    fake_setenv("FAKE_LOSE_FRAME", "1");
+    struct spl_job *job = make_large(600000);
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), SPL_E_DEVICE_LOST);
-    unsetenv("FAKE_LOSE_FRAME");
+    await_losses(2);
+    fake_unsetenv("FAKE_LOSE_FRAME");
     assert_idle(fleet);
     wait_until_ready(fleet);
-    job = make_large(60000);
+    job = make_large(600000);
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0);
     spl_fleet_destroy(fleet);
@@ -174,15 +177,15 @@ static void all_may_be_lost(void **state)
 static void its_deadline_is_that_of_its_parts(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "4000", 1);
+    hold_frames(true);
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
     struct spl_job *job = make_large(150);
     submit(fleet, job);
     job->deadline_ns += 150 * SPL_NS_PER_MS; // the loop may
     assert_int_equal(finish(fleet, job), SPL_E_TIMEOUT);
     assert_idle(fleet);
-    unsetenv("FAKE_FRAME_MS");
-    job = make_large(60000);
+    hold_frames(false);
+    job = make_large(600000);
     submit(fleet, job);
     assert_int_equal(finish(fleet, job), 0);
     spl_fleet_destroy(fleet);
@@ -191,45 +194,43 @@ static void its_deadline_is_that_of_its_parts(void **state)
 static void who_leaves_ends_all_parts(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "60000", 1);
+    hold_frames(true); // it has no other end
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 9);
     struct spl_job *job = make_large(60000);
     submit(fleet, job);
-    usleep(20000);
-    const uint64_t began = spl_now_ns();
+    await_at_least(&fake_frames.drawing, 3);
     spl_cancel_set(&job->dropped);
     assert_int_equal(finish(fleet, job), SPL_E_CANCELLED);
     assert_idle(fleet);
-    assert_true(spl_now_ns() - began < 10 * SPL_NS_PER_S);
+    hold_frames(false);
     spl_fleet_destroy(fleet);
-    unsetenv("FAKE_FRAME_MS");
 }
 
 /* Leak checkers see what is left. */
 static void a_fleet_ends_with_parts_inside(void **state)
 {
     (void)state;
-    setenv("FAKE_FRAME_MS", "30", 1);
+    fake_setenv("FAKE_FRAME_MS", "30");
     for (int taken = 0; taken < 3; taken++) {
         struct spl_fleet *fleet = start_fleet("fake:0,fake:1", 8);
         for (int i = 0; i < 3; i++)
-            submit(fleet, make_large(60000));
+            submit(fleet, make_large(600000));
         for (int i = 0; i < taken; i++)
             spl_job_destroy(take_job(fleet));
         spl_fleet_destroy(fleet);
     }
-    unsetenv("FAKE_FRAME_MS");
+    fake_unsetenv("FAKE_FRAME_MS");
 }
 
 /* What parts count for is let out with them, and a full queue refuses the view, not half of it. */
 static void many_come_and_go(void **state)
 {
     (void)state;
-    setenv("SPLATD_INJECT_LOSS_AFTER", "5x3", 1);
+    fake_setenv("SPLATD_INJECT_LOSS_AFTER", "5x3");
     struct spl_fleet *fleet = start_fleet("fake:0,fake:1,fake:2", 6);
     int inside = 0, good = 0;
     for (int i = 0; i < 200 || good <= 20 || inside; i++) { /* how many find room is a matter of the machine */
-        struct spl_job *job = i % 3 ? make_large(60000) : make_small();
+        struct spl_job *job = i % 3 ? make_large(600000) : make_small();
         const bool more = i < 200 || good <= 20;
         if (!more || spl_fleet_submit(fleet, job, NULL))
             spl_job_destroy(job);
@@ -247,7 +248,7 @@ static void many_come_and_go(void **state)
     assert_int_equal(counters.frames, good);
     for (size_t i = 0; i < 3; i++)
         assert_int_equal(look(fleet, i).large_length, 0);
-    unsetenv("SPLATD_INJECT_LOSS_AFTER");
+    fake_unsetenv("SPLATD_INJECT_LOSS_AFTER");
     spl_fleet_destroy(fleet);
 }
 
