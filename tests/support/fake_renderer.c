@@ -5,10 +5,13 @@
  * frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it takes
  * to put them on the device, and FAKE_HANG_MS that the first frame ignores its deadline for, as a hanging driver does;
  * FAKE_LOSE_LOADING pages of one dataset in which the device is lost; FAKE_LOSE_FRAME, while which every frame loses
- * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. TSan sees all of it, which it
- * cannot with a driver that compiles its own code. */
+ * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. What a test holds up until it has
+ * seen what it came for it names by a file: while that of FAKE_STEPS is there, only as many steps end as the number in it
+ * says; while those of FAKE_OPENING, FAKE_PAGES and FAKE_HANG are there, no device is opened, no page has come, and the
+ * first frame hangs. TSan sees all of it, which it cannot with a driver that compiles its own code. */
 #include <splatd/render.h>
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -33,12 +36,45 @@ static long setting(const char *name, long otherwise)
     return text ? strtol(text, NULL, 10) : otherwise;
 }
 
+static bool is_held(const char *name)
+{
+    const char *path = getenv(name);
+    return path && !access(path, F_OK);
+}
+
+static void wait_while_held(const char *name)
+{
+    while (is_held(name))
+        usleep(1000);
+}
+
+/* Whether one more step may end; it is counted then. */
+static bool may_end(void)
+{
+    static _Atomic long ended; /* since the file is there */
+    const char *path = getenv("FAKE_STEPS");
+    FILE *file = path ? fopen(path, "r") : NULL;
+    long allowed = 0;
+    if (!file) {
+        ended = 0;
+        return true;
+    }
+    if (fscanf(file, "%ld", &allowed) != 1)
+        allowed = 0;
+    fclose(file);
+    if (ended++ < allowed)
+        return true;
+    ended--;
+    return false;
+}
+
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
 {
     static _Atomic long opened;
     if (options->require_gpu || opened++ >= setting("FAKE_OPEN_LIMIT", 1000))
         return spl_fail(err, SPL_E_NO_DEVICE, "no usable device: the fake one is software");
     usleep((useconds_t)setting("FAKE_OPEN_MS", 0) * 1000);
+    wait_while_held("FAKE_OPENING");
     if (!(*out = spl_alloc(1, sizeof **out, err)))
         return SPL_E_NOMEM;
     (*out)->device =
@@ -279,7 +315,7 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
     if (fill_all(&steps->frame, &steps->view, err))
         return SPL_E_NOMEM;
     steps->frame.stats.soft_ms = soft_ms(&steps->view);
-    steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
+    steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns) && !is_held("FAKE_PAGES");
     steps->frame.stats.pending = !steps->frame.stats.complete;
     return 0;
 }
@@ -287,7 +323,7 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
 bool spl_frame_is_waiting(struct spl_frame_steps *steps)
 {
     return !steps->view.partial &&
-           (spl_remaining_ns(steps->there_ns) || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
+           (spl_remaining_ns(steps->there_ns) || is_held("FAKE_PAGES") || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
 uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps)
@@ -317,6 +353,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     if (!renderer->hung) {
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
+        wait_while_held("FAKE_HANG");
         usleep((useconds_t)setting("FAKE_KERNELS_MS", 0) * 1000);
         steps->frame.stats.kernels_ms = (double)setting("FAKE_KERNELS_MS", 0);
         if (setting("FAKE_LOSE_FRAME", 0))
@@ -325,7 +362,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     const uint64_t began = spl_now_ns(), whole = (uint64_t)((double)frame_ns(&steps->view) * share);
     const uint64_t until = began + (whole > steps->drawn_ns ? whole - steps->drawn_ns : 0);
     steps->paused = false;
-    while (spl_remaining_ns(until)) {
+    while (spl_remaining_ns(until) || !may_end()) {
         if ((steps->paused = gives_way(steps, began))) {
             steps->drawn_ns += spl_now_ns() - began;
             *more = true;
