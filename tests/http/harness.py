@@ -9,6 +9,7 @@ import os
 import queue
 import re
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -179,6 +180,19 @@ def npy(rows, kind="f", order="False"):
     header += " " * (117 - len(header)) + "\n"
     flat = [x for row in rows for x in row] if order == "False" else [row[k] for k in range(3) for row in rows]
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack(f"<{len(flat)}{kind}", *flat)
+
+
+class Port:
+    """A listening socket for a server of others, so that nobody takes its port before it has begun: nginx finds it by
+    `environment`; pass_fds=[port.fd]."""
+
+    def __init__(self):
+        self.socket = socket.create_server(("127.0.0.1", 0), backlog=511)
+        self.number, self.fd = self.socket.getsockname()[1], self.socket.fileno()
+
+    @staticmethod
+    def environment(*ports):
+        return {**os.environ, "NGINX": "".join(f"{port.fd};" for port in ports)}
 
 
 class Hold:
