@@ -5,10 +5,10 @@
  * frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it takes
  * to put them on the device, and FAKE_HANG_MS that the first frame ignores its deadline for, as a hanging driver does;
  * FAKE_LOSE_LOADING pages of one dataset in which the device is lost; FAKE_LOSE_FRAME, while which every frame loses
- * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. What a test holds up until it has
- * seen what it came for it names by a file: while that of FAKE_STEPS is there, only as many steps end as the number in it
- * says; while those of FAKE_OPENING, FAKE_PAGES and FAKE_HANG are there, no device is opened, no page has come, and the
- * first frame hangs. TSan sees all of it, which it cannot with a driver that compiles its own code. */
+ * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. What a test holds up until it
+ * has seen what it came for it names by a file: while that of FAKE_STEPS is there, only as many steps end as the
+ * number in it says; while those of FAKE_OPENING, FAKE_PAGES and FAKE_HANG are there, no device is opened, no page
+ * has come, and the first frame hangs. TSan sees it all, which it cannot with a driver that compiles its own code. */
 #include <splatd/render.h>
 
 #include <stdio.h>
@@ -323,7 +323,8 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
 bool spl_frame_is_waiting(struct spl_frame_steps *steps)
 {
     return !steps->view.partial &&
-           (spl_remaining_ns(steps->there_ns) || is_held("FAKE_PAGES") || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
+           (spl_remaining_ns(steps->there_ns) || is_held("FAKE_PAGES") ||
+            steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
 uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps)
