@@ -56,8 +56,11 @@ static void on_drain_timer(uv_timer_t *timer)
         spl_waiting_refuse_all(service);
         spl_change_refuse_all(service);
         uv_stop(&service->loop);
-    } else if (elapsed_ms >= drain_least_ms && !service->http->requests_open) {
-        uv_stop(&service->loop);
+    } else if (elapsed_ms >= drain_least_ms) {
+        // twice, with all that had come read in between: we may not have been run since the signal
+        if (service->drain_idle && !service->http->requests_open)
+            uv_stop(&service->loop);
+        service->drain_idle = !service->http->requests_open;
     }
 }
 

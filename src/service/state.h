@@ -27,6 +27,7 @@ struct spl_service {
     bool leaving;           /* asked to stop: /readyz says no */
     bool draining;          /* nothing more is accepted */
     uint64_t drain_began_ns;
+    bool drain_idle; /* nothing was open at the last look: what has come since was read after that */
     struct spl_error failure;
 };
 

@@ -18,9 +18,10 @@ class File:
     request; there "drip", too (four bytes a second of it come)."""
 
     def __init__(self, data, etag='"1"', faults=(), always=None, ranges=True, conditions=True, delay_s=0, gzip=False,
-                 account=None):
+                 account=None, gate=None):
         self.data, self.etag, self.faults, self.always = data, etag, list(faults), always
         self.ranges, self.conditions, self.delay_s, self.gzip, self.account = ranges, conditions, delay_s, gzip, account
+        self.gate = gate  # an event: until it is set, nothing is answered
         self.requests, self.lock = [], threading.Lock()  # (first, last) of each, or None
 
 
@@ -83,6 +84,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             file.requests.append((int(found[1]), int(found[2])) if found else None)
             data, etag = file.data, file.etag
         time.sleep(file.delay_s)
+        if file.gate:
+            file.gate.wait()
         if file.account and not self.is_signed(file.account):
             return self.refuse(403, b"<Error><Code>SignatureDoesNotMatch</Code></Error>")
         if fault == "reset":  # RST, not FIN
@@ -125,7 +128,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.wfile.write(body[:len(body) * 2 // 3])
             self.wfile.flush()
             if fault == "stall":
-                time.sleep(6)
+                time.sleep(60)
             self.close_connection = True
             self.connection.shutdown(socket.SHUT_RDWR)
             return None

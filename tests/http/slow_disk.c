@@ -1,7 +1,7 @@
 /* Preloaded into a daemon: until the file that SLOW_DISK_GATE names is there, a dataset's file cannot be opened, and no
  * file gets a name that ends in SLOW_DISK_NAME; while the one that SLOW_DISK_READS names is there, only as many reads
  * end as the number in it says; as on a disk that is slow or a share that does not answer. Names of hosts that end in
- * .slow take 30 s. */
+ * .slow take ten minutes. */
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -71,7 +71,7 @@ __attribute__((visibility("default"))) int getaddrinfo(const char *name, const c
     size_t length = name ? strlen(name) : 0;
     memcpy(&next, &symbol, sizeof next);
     if (length > 5 && !strcmp(name + length - 5, ".slow")) {
-        sleep(30);
+        sleep(600);
         return EAI_AGAIN;
     }
     return next(name, service, hints, out);

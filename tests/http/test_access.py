@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import tempfile
+import threading
 import time
 
 from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, run, together
@@ -46,7 +47,7 @@ def bearer(token, **more):
 
 def sign(d, url, expires="1h"):
     return subprocess.run([REAL, "sign", url, "--key", d.key, "--expires", expires], capture_output=True, text=True,
-                          check=True, timeout=30).stdout.strip()
+                          check=True, timeout=150).stdout.strip()
 
 
 def test_without_a_token_only_the_page_is_there():
@@ -152,11 +153,13 @@ def test_a_signed_map_shows_all_its_tiles_and_nothing_else():
             assert "clip=z%3C1.2&v=" in url and "/{z}/{x}/{y}.png?" in url, url
             grant = url.partition("?")[2]
             for tile in ("0/0/0.png", "3/7/2.png", "3/7/2@2x.png", "30/1073741823/0.png"):
+                before = time.time()
                 reply = d.ask(f"{TILES}/{tile}?{grant}")
                 assert reply.status == 200 and d.ask(f"{TILES}/{tile}?{grant}", "HEAD").status == 200, (tile, reply.body)
                 kept = reply.headers["Cache-Control"]
                 left = int(kept.removeprefix("private, max-age=").removesuffix(", immutable"))
-                assert 3500 < left <= 3600, kept  # as long as the signature holds
+                expires = int(re.search(r"exp=(\d+)", grant)[1])
+                assert expires - time.time() - 2 < left < expires - before + 2, kept  # as long as the signature holds
                 again = d.ask(f"{TILES}/{tile}?{grant}", headers={"If-None-Match": reply.headers["ETag"]})
                 assert again.status == 304 and again.headers["Cache-Control"].startswith("private, max-age=3"), again.headers
                 assert d.ask(f"{TILES}/{tile}?clip=z%3C1.2&v={version}", headers=bearer(VIEWER)).headers["ETag"] == reply.headers["ETag"]
@@ -276,10 +279,10 @@ def test_splatd_sign_refuses_what_nobody_could_use():
                      "/v1/datasets/a/b/view", "/V1/datasets/a", "/embed/", "/embed/a/b", "/embed", "/embed/a?width=16",
                      "/embed/a%2", "/viewer/main.js", "/v1/datasets/a/tiles/", "/v1/datasets/a/view#x", "/x/embed/a"):
             for url in (path, "https://scans.example" + path):
-                done = subprocess.run([REAL, "sign", url, "--key", key], capture_output=True, text=True, timeout=30)
+                done = subprocess.run([REAL, "sign", url, "--key", key], capture_output=True, text=True, timeout=150)
                 assert done.returncode == 2 and not done.stdout and path in done.stderr, (url, done)
                 assert "/embed/" in done.stderr, done.stderr  # it says what can be signed
-        shown = subprocess.run([REAL, "sign", "--help"], capture_output=True, text=True, timeout=30).stdout
+        shown = subprocess.run([REAL, "sign", "--help"], capture_output=True, text=True, timeout=150).stdout
         assert "/embed/vault" in shown and "iframe" in shown
 
 
@@ -295,7 +298,7 @@ def test_splatd_sign_refuses_bad_arguments():
             (["v1", "--key", key], "'v1'"), (["/a#b", "--key", key], "'/a#b'"),
             *[(["/embed/x", "--key", key, "--expires", e], f"'{e}'") for e in ("1", "h", "-1h", "0s", "1w", "1hh", "99999d", "")],
         ]:
-            done = subprocess.run([REAL, "sign", *arguments], capture_output=True, text=True, timeout=30)
+            done = subprocess.run([REAL, "sign", *arguments], capture_output=True, text=True, timeout=150)
             assert done.returncode == 2 and said in done.stderr and not done.stdout, (arguments, done)
             assert "secret" not in done.stderr
 
@@ -334,7 +337,7 @@ def test_what_others_reach_needs_a_word():
             said += line
             if line.endswith(" ready\n"):
                 process.send_signal(signal.SIGTERM)
-        return process.wait(30), said
+        return process.wait(150), said
     with tempfile.TemporaryDirectory() as home:
         file = pathlib.Path(home, "tokens")
         file.write_text(lines())
@@ -378,15 +381,17 @@ def test_pages_of_listed_origins_may_read():
 def test_who_asks_too_often_waits():
     for flag, said in (("--rate-limit", "this address"), ("--rate-limit-total", "all clients")):
         with Daemon(FAKE, flag, "5", FAKE_FRAME_MS=0) as d:
-            connection = d.connect()
-            replies = [d.ask(SMALL, connection=connection) for _ in range(60)]
+            connection, replies = d.connect(), []
+            while len(replies) < 60 or {reply.status for reply in replies} == {200} and len(replies) < 2000:
+                replies.append(d.ask(SMALL, connection=connection))
             statuses = [reply.status for reply in replies]
             assert set(statuses) == {200, 429} and statuses[:10] == [200] * 10, statuses
             refused = [reply for reply in replies if reply.status == 429]
             assert all(reply.headers["Retry-After"] == "1" for reply in refused)
             assert said in refused[0].json()["detail"] and refused[0].json()["type"] == "urn:splatd:error:rate"
-            time.sleep(1.1)
-            status = d.ask("/v1/status")
+            while (status := d.ask("/v1/status")).status == 429:
+                refused.append(status)
+                time.sleep(0.3)
             assert status.status == 200 and status.json()["counters"]["refused_rate"] == len(refused)
 
 
@@ -403,13 +408,17 @@ def test_each_view_of_a_batch_counts():
 def test_connections_are_capped():
     import socket
     with Daemon(FAKE, "--connections", "40", "--connections-per-address", "20") as d:
+        all_know = threading.Barrier(30)
+
         def outcome(i):
-            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            with socket.create_connection(("127.0.0.1", d.port), 150) as s:
                 try:
                     s.sendall(b"GET /v1/openapi.yaml HTTP/1.1\r\nHost: localhost\r\n\r\n")
-                    return s.recv(12) and bool(time.sleep(1)) is False
+                    answer = s.recv(12)
                 except OSError:
-                    return b""
+                    answer = b""
+                all_know.wait(150)
+                return answer
         served = [bool(result) for result in together(30, outcome)]
         assert 1 <= served.count(False) <= 29, served
         eventually(lambda: b"\nsplatd_connections 0\n" in d.ops("/metrics").body)  # whose listener has no such cap

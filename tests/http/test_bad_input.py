@@ -133,7 +133,7 @@ def test_sizes_are_capped():
         assert reply.status == 400 and reply.json()["field"] == "background"
 
 
-def raw(d, data, timeout=10):
+def raw(d, data, timeout=150):
     with socket.create_connection(("127.0.0.1", d.port), timeout) as s:
         s.sendall(data)
         answer = b""
@@ -185,7 +185,7 @@ def test_broken_http_is_survived():
                      b"GET /v1/status?" + b"a&" * 4000 + b" HTTP/1.1\r\n\r\n",
                      b"GET /\x01 HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"]:
             try:
-                with socket.create_connection(("127.0.0.1", d.port), 15) as s:  # half a request is cut after 10 s
+                with socket.create_connection(("127.0.0.1", d.port), 150) as s:  # half a request is cut after 10 s
                     s.sendall(data)
                     s.shutdown(socket.SHUT_WR)
                     answer = s.recv(65536)  # a reply or a close, never silence
@@ -196,7 +196,8 @@ def test_broken_http_is_survived():
 
 
 def refused(*arguments, binary=(FAKE,)):
-    done = subprocess.run([*binary, *arguments], capture_output=True, text=True, timeout=30)
+    done = subprocess.run([*binary, *arguments], capture_output=True, text=True, timeout=150,
+                          env={**os.environ, "RES_OPTIONS": "timeout:1 attempts:1"})  # a name that is looked up in vain
     assert done.stdout == "", done.stdout
     return done.returncode, done.stderr
 
@@ -313,7 +314,7 @@ def test_what_the_device_has_no_room_for_is_no_body_too_large():
 def test_the_least_memory_limit_is_said_and_works():
     def start(limit):
         done = subprocess.run([REAL, "serve", "--log-format", "json", "--memory-limit", str(limit), "--listen",
-                               "127.0.0.1:0", "--ops-listen", "127.0.0.1:0", WALL], capture_output=True, text=True, timeout=60)
+                               "127.0.0.1:0", "--ops-listen", "127.0.0.1:0", WALL], capture_output=True, text=True, timeout=150)
         last = lines_of_json(done.stderr)[-1]["message"]
         assert done.returncode == 2 and "memory-limit" in last and str(limit) in last, done.stderr
         assert "largest that device" not in last, last

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 
-from harness import FAKE, REAL, WALL, Daemon, eventually, run
+from harness import FAKE, REAL, WALL, Daemon, Port, eventually, run
 
 HAPROXY, NGINX, OPENSSL = (shutil.which(name, path=os.environ["PATH"] + ":/usr/sbin") for name in
                            ("haproxy", "nginx", "openssl"))
@@ -24,12 +24,6 @@ if not (HAPROXY and NGINX and OPENSSL):
     sys.exit(77)
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
-
-
 def changed(text, *pairs):
     for pattern, new in pairs:
         text, count = re.subn(pattern, new, text, flags=re.M)
@@ -37,14 +31,15 @@ def changed(text, *pairs):
     return text
 
 
-def configuration(port, daemons):
+def configuration(fd, daemons):
     """The shipped one: other addresses, checks that do not take seconds, no overflow to other daemons at a load of one."""
     text = (SHIPPED / "haproxy.cfg").read_text()
     for address, d in zip(("10.0.0.11", "10.0.0.12", "10.0.0.13"), daemons):
         text = changed(text, (rf"^( +server \w+) {re.escape(address)}:8080$",
                               rf"\1 127.0.0.1:{d.port} port {d.ops_port}"))
-    return changed(text, (r"bind 0\.0\.0\.0:80$", f"bind 127.0.0.1:{port}"), (r"slowstart 10s", "slowstart 1s"),
-                   (r"inter 1s fall 2 rise 2 port 8081", "inter 100ms fall 2 rise 2"), (r"gt 2000", "gt 1000000"),
+    return changed(text, (r"bind 0\.0\.0\.0:80$", f"bind fd@{fd}"), (r"slowstart 10s", "slowstart 1s"),
+                   (r"inter 1s fall 2 rise 2 port 8081", "inter 100ms fall 2 rise 2"),
+                   (r"^( +timeout (connect|check|queue|http-request)) \d+s$", r"\1 60s"), (r"gt 2000", "gt 1000000"),
                    (r"^ +hash-balance-factor 150\n", ""))
 
 
@@ -55,10 +50,11 @@ def balanced(ids, drain_ms=0):
             shutil.copy(WALL, os.path.join(home, f"{name}.spld"))
         daemons = [stack.enter_context(Daemon(FAKE, "--drain-delay", str(drain_ms), "--cache", "0", datasets=[home],
                                               FAKE_FRAME_MS=3)) for _ in range(3)]
-        port, file = free_port(), pathlib.Path(home, "haproxy.cfg")
-        file.write_text(configuration(port, daemons))
+        listens, file = Port(), pathlib.Path(home, "haproxy.cfg")
+        port = listens.number
+        file.write_text(configuration(listens.fd, daemons))
         process = subprocess.Popen([HAPROXY, "-db", "-f", str(file)], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL)
+                                   stderr=subprocess.DEVNULL, pass_fds=[listens.fd])
         try:
             def answers():
                 try:
@@ -69,11 +65,11 @@ def balanced(ids, drain_ms=0):
             yield port, daemons
         finally:
             process.terminate()
-            process.wait(30)
+            process.wait(150)
 
 
 def ask(port, path, connection=None):
-    own = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    own = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=150)
     own.request("GET", path)
     answer = own.getresponse()
     body = answer.read()
@@ -99,13 +95,13 @@ def test_a_dataset_stays_with_its_daemon():
 
 
 def test_one_is_killed_and_one_is_drained_under_load():
-    with balanced([f"scan-{i}" for i in range(8)], 1500) as (port, daemons):
+    with balanced([f"scan-{i}" for i in range(8)], 8000) as (port, daemons):
         stop, failures, served = threading.Event(), [], [0] * 6
 
         def work(i):
             connection, n = None, 0
             while not stop.is_set():
-                connection = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+                connection = connection or http.client.HTTPConnection("127.0.0.1", port, timeout=150)
                 try:
                     status, body = ask(port, f"/v1/datasets/scan-{n % 8}/view?width=16&height=16&near={1e-6 * n + 0.1}",
                                        connection)
@@ -122,7 +118,7 @@ def test_one_is_killed_and_one_is_drained_under_load():
 
         def progress(count):
             target = sum(served) + count
-            eventually(lambda: sum(served) >= target, 60)
+            eventually(lambda: sum(served) >= target)
         progress(200)
         daemons[0].process.send_signal(signal.SIGKILL)
         daemons[0].wait_exit()
@@ -152,7 +148,8 @@ def test_nginx_speaks_tls_for_it():
                         "subjectAltName=DNS:scans.example"], check=True, capture_output=True)
         with Daemon(FAKE, "--tokens", str(top / "tokens"), "--url-key", str(top / "url.key"),
                     datasets=[str(top / "home")]) as d:
-            port, plain = free_port(), free_port()
+            ports = Port(), Port()
+            port, plain = (port.number for port in ports)
             site = changed((SHIPPED / "nginx.conf").read_text(), (r"127\.0\.0\.1:8080", f"127.0.0.1:{d.port}"),
                            (r"listen 80;", f"listen 127.0.0.1:{plain};"), (r"listen 443", f"listen 127.0.0.1:{port}"),
                            (r"/etc/letsencrypt\S+fullchain\.pem", str(top / "cert.pem")),
@@ -163,13 +160,13 @@ def test_nginx_speaks_tls_for_it():
             (top / "nginx.conf").write_text(f"pid {top}/pid; error_log {top}/error.log; daemon off; events {{}}"
                                             f"http {{ {folders} include {top}/site.conf; }}")
             process = subprocess.Popen([NGINX, "-c", str(top / "nginx.conf"), "-p", str(top)],
-                                       stderr=subprocess.DEVNULL)
+                                       stderr=subprocess.DEVNULL, env=Port.environment(*ports), pass_fds=[port.fd for port in ports])
             try:
                 trusted = ssl.create_default_context(cafile=str(top / "cert.pem"))
 
                 def https(method, path, body=None, headers={}):
-                    connection = http.client.HTTPSConnection("127.0.0.1", port, timeout=60, context=trusted)
-                    connection.sock = trusted.wrap_socket(socket.create_connection(("127.0.0.1", port), 60),
+                    connection = http.client.HTTPSConnection("127.0.0.1", port, timeout=150, context=trusted)
+                    connection.sock = trusted.wrap_socket(socket.create_connection(("127.0.0.1", port), 150),
                                                           server_hostname="scans.example")
                     connection.request(method, path, body, {"Host": "scans.example", **headers})
                     answer = connection.getresponse()
@@ -193,7 +190,7 @@ def test_nginx_speaks_tls_for_it():
                 signed = subprocess.run([REAL, "sign", "https://scans.example/v1/datasets/a/view?eye=1,2,3&width=16",
                                          "--key", top / "url.key"], capture_output=True, text=True, check=True).stdout
                 assert https("GET", signed.strip().removeprefix("https://scans.example"))[0] == 200
-                connection = http.client.HTTPConnection("127.0.0.1", plain, timeout=60)
+                connection = http.client.HTTPConnection("127.0.0.1", plain, timeout=150)
                 connection.request("GET", "/v1/status?x=1", headers={"Host": "scans.example"})
                 answer = connection.getresponse()
                 assert answer.status == 301 and answer.headers["Location"] == "https://scans.example/v1/status?x=1"
@@ -202,7 +199,7 @@ def test_nginx_speaks_tls_for_it():
                 assert "/v1/datasets/a/view" in log and "sig=" not in log and admin not in log, log
             finally:
                 process.send_signal(signal.SIGQUIT)
-                process.wait(30)
+                process.wait(150)
 
 
 run(globals())

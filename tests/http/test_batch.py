@@ -4,10 +4,9 @@ import io
 import json
 import socket
 import threading
-import time
 import zipfile
 
-from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, parts, run
+from harness import FAKE, PATIENT, REAL, VIEW, Daemon, Hold, eventually, fresh, parts, run, together
 
 BATCH = VIEW.replace("/view", "/views")
 SMALL = VIEW + "?width=16&height=16"
@@ -49,7 +48,7 @@ def test_views_in_common_are_rendered_once_and_planned_ones_are_planned():
         reply = d.post({"width": 8, "height": 8, "views": [{}] * 100}, BATCH)
         assert len({body for _, _, body in parts(reply)}) == 1 and len(list(parts(reply))) == 100
         assert d.status()["counters"]["frames"] == 1
-        [(_, headers, _)] = parts(d.post({"views": [{"budget": "500ms"}], "width": 8, "height": 8}, BATCH))
+        [(_, headers, _)] = parts(d.post({"views": [{"budget": "9s"}], "width": 8, "height": 8}, BATCH))
         assert headers["Splatd-Chosen"] and headers["Splatd-Demand"] == "met"
 
 
@@ -98,18 +97,27 @@ def test_a_part_that_fails_is_a_problem_in_its_place():
             assert problem["status"] == 503 and problem["detail"] and problem["title"] and problem["instance"]
 
 
+def in_flight(d, count):
+    """Waits until so many views were asked for, of which the device has the first."""
+    eventually(lambda: d.status()["counters"]["cache_misses"] >= count and d.status()["queues"]["render"]["length"] < count)
+
+
 def test_others_get_between():
-    with Daemon(FAKE, FAKE_FRAME_MS=40) as d:
+    hold = Hold()
+    with Daemon(FAKE, *PATIENT, **hold.environment) as d:
         done = []
         batch = threading.Thread(target=lambda: done.append(d.post(views(25), BATCH)))
         batch.start()
-        eventually(lambda: d.status()["counters"]["frames"] >= 1)
-        for _ in range(3):
-            assert d.ask(fresh(SMALL)).status == 200
-        frames = d.status()["counters"]["frames"]
-        assert frames <= 20, (frames, "a view waited for the batch")
+        eventually(lambda: d.status()["counters"]["cache_misses"] == 2)  # as many at a time
+        others = threading.Thread(target=lambda: done.extend(together(3, lambda i: d.ask(fresh(SMALL)))))
+        others.start()
+        eventually(lambda: d.status()["counters"]["cache_misses"] == 2 + 3)
+        hold.allow(10)  # which the batch alone would take
+        others.join()
+        assert [reply.status for reply in done] == [200] * 3 and d.status()["counters"]["frames"] <= 10, done
+        hold.allow_all()
         batch.join()
-        assert done[0].status == 200 and len(list(parts(done[0]))) == 25
+        assert done[3].status == 200 and len(list(parts(done[3]))) == 25
         assert d.status()["counters"]["frames"] == 28
 
 
@@ -117,39 +125,46 @@ def test_a_batch_is_larger_than_the_queue():
     with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=10) as d:
         reply = d.post(views(12), BATCH)
         assert reply.status == 200 and reply.headers["Splatd-Failed"] == "0"
-    with Daemon(FAKE, "--queue", "1", FAKE_FRAME_MS=1000) as d:
+    hold = Hold()
+    with Daemon(FAKE, "--queue", "1", *PATIENT, **hold.environment) as d:
         busy = [threading.Thread(target=lambda: d.ask(fresh(SMALL))) for _ in range(2)]
         busy[0].start()
-        eventually(lambda: d.status()["counters"]["cache_misses"] == 1 and not d.status()["queues"]["render"]["length"])
+        in_flight(d, 1)
         busy[1].start()
         eventually(lambda: d.status()["queues"]["render"]["length"] == 1)
         reply = d.post(views(3), BATCH)
         assert reply.status == 503 and reply.json()["type"] == "urn:splatd:error:busy", reply.body
+        hold.allow_all()
         for thread in busy:
             thread.join()
 
 
 def test_a_batch_whose_client_left_is_given_up():
-    with Daemon(FAKE, FAKE_FRAME_MS=100) as d:
+    hold = Hold(allowed=2)
+    with Daemon(FAKE, *PATIENT, **hold.environment) as d:
         body = json.dumps(views(50)).encode()
         with socket.create_connection(("127.0.0.1", d.port)) as s:
             s.sendall(f"POST {BATCH} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
-            eventually(lambda: d.status()["counters"]["frames"] >= 2)
+            eventually(lambda: d.status()["counters"]["frames"] == 2)
         eventually(lambda: d.status()["counters"]["clients_left"] == 1)
-        assert d.ask(fresh(SMALL)).status == 200
-        frames = d.status()["counters"]["frames"]
-        time.sleep(0.3)
-        assert d.status()["counters"]["frames"] == frames < 40, "frames for nobody"
-        assert d.status()["memory"]["reply_bytes"] == 0
+        hold.allow_all()
+        for _ in range(10):  # each would come after one of the batch
+            assert d.ask(fresh(SMALL)).status == 200
+        assert d.status()["counters"]["frames"] <= 2 + 1 + 10, "frames for nobody"
+        eventually(lambda: d.status()["memory"]["reply_bytes"] == 0)
 
 
 def test_sigterm_finishes_a_batch():
-    d = Daemon(FAKE, FAKE_FRAME_MS=100)
+    hold = Hold(allowed=1)
+    d = Daemon(FAKE, *PATIENT, **hold.environment)
     replies = []
     asking = threading.Thread(target=lambda: replies.append(d.post(views(6), BATCH)))
     asking.start()
     eventually(lambda: d.status()["counters"]["frames"] >= 1)
-    assert d.stop() == 0
+    d.process.terminate()
+    eventually(lambda: d.ops("/readyz").status == 503)
+    hold.allow_all()
+    assert d.wait_exit() == 0
     asking.join()
     assert replies[0].status == 200 and replies[0].headers["Splatd-Failed"] == "0"
 

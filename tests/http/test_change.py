@@ -148,7 +148,7 @@ def test_bodies_in_chunks_of_any_size():
 def test_whoever_leaves_in_a_chunk_leaves_nothing():
     with serving() as d:
         for cut in (1 << 20, (1 << 20) + 1, 1500000, 2 << 20):
-            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            with socket.create_connection(("127.0.0.1", d.port), 150) as s:
                 s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n"
                           f"Authorization: Bearer {ADMIN}\r\n\r\n".encode())
                 s.sendall(b"".join(b"3e8\r\n" + LARGE[at:at + 1000] + b"\r\n" for at in range(0, cut, 1000)))
@@ -159,16 +159,20 @@ def test_whoever_leaves_in_a_chunk_leaves_nothing():
 
 def test_what_a_crash_leaves_is_swept_at_the_next_start():
     with serving() as d:
-        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+        with socket.create_connection(("127.0.0.1", d.port), 150) as s:
             s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999999\r\n"
                       f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + b"x" * 2_000_000)
             eventually(lambda: left_over(d))
-            time.sleep(2.1)
+            past = time.time() - 60  # a folder that nobody has touched for a while, and a lock all the same
+            for name in left_over(d):
+                os.utime(d.home / name, (past, past))
             with Daemon(FAKE, datasets=[str(d.home)]) as other:  # a second service on the folder leaves it alone
                 assert left_over(d) and other.ask("/v1/datasets").status == 200
             d.process.kill()
             d.wait_exit()
             assert left_over(d)
+        for name in left_over(d):
+            os.utime(d.home / name, (past, past))
         with Daemon(FAKE, datasets=[str(d.home)]):
             assert left_over(d) == []
 
@@ -245,7 +249,7 @@ def test_sizes_are_capped_and_large_bodies_only_go_here():
         assert reply.status == 413
         head = (f"PUT /v1/datasets/b HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\nExpect: 100-continue\r\n"
                 f"Authorization: Bearer {VIEWER}\r\n\r\n").encode()
-        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+        with socket.create_connection(("127.0.0.1", d.port), 150) as s:
             s.sendall(head)
             assert b" 403 " in s.recv(4096)
 
@@ -278,7 +282,7 @@ def test_large_bodies_go_to_disk_while_views_go_on():
 def test_clients_that_leave_leave_nothing():
     with serving() as d:
         for sent in (0, 1000, 1_500_000, 3_000_000):
-            with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+            with socket.create_connection(("127.0.0.1", d.port), 150) as s:
                 s.sendall(f"PUT /v1/datasets/gone HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999999\r\n"
                           f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + b"x" * sent)
                 eventually(lambda: "gone" in listed(d))
@@ -291,7 +295,7 @@ def test_clients_that_leave_leave_nothing():
 
 def test_one_change_of_a_dataset_at_a_time():
     with serving() as d:
-        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+        with socket.create_connection(("127.0.0.1", d.port), 150) as s:
             s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
                       f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
             eventually(lambda: listed(d).get("a", {}).get("state") == "loading")
@@ -352,12 +356,12 @@ def test_a_full_disk_is_said():
 
 def test_sigterm_waits_for_an_upload():
     with serving() as d:
-        with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+        with socket.create_connection(("127.0.0.1", d.port), 150) as s:
             s.sendall(f"PUT /v1/datasets/a HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
                       f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
             eventually(lambda: "a" in listed(d))
             d.process.terminate()
-            time.sleep(0.3)
+            eventually(lambda: d.ops("/readyz").body == b"no: stopping\n")
             s.sendall(WALL_1[1000:])
             assert b" 201 " in s.recv(4096)
         assert d.wait_exit() == 0

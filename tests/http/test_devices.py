@@ -3,9 +3,8 @@ leaves the others serving."""
 import pathlib
 import shutil
 import tempfile
-import time
 
-from harness import FAKE, REAL, VIEW, WALL, Daemon, eventually, fresh, run, together
+from harness import FAKE, PATIENT, REAL, VIEW, WALL, Daemon, Hold, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 
@@ -27,12 +26,16 @@ def test_the_bytes_are_those_of_one_device():
         assert [device["state"] for device in devices] == ["ready", "ready"]
         assert all(d.status()["device"].items() <= device.items() for device in devices), devices
         assert 0 < sum(device["device_limit_bytes"] for device in devices) <= device["device_limit_bytes"] + 1, devices
-        for _ in range(2):
+        def all_draw():
+            return all(device["frames"] > 0 for device in d.status()["devices"])
+        for turn in range(20):  # which of them is at hand is not ours to say
+            if turn > 1 and all_draw():
+                break
             two = together(len(views), lambda i: d.ask(VIEW + views[i]))
             for view, a, b in zip(views, one, two):
                 assert (b.status, b.body == a.body, b.headers["ETag"] == a.headers["ETag"]) == (200, True, True), view
         status = d.status()
-        assert all(device["frames"] > 0 for device in status["devices"]), "one drew everything"
+        assert all_draw(), "one drew everything"
         assert sum(device["frames"] for device in status["devices"]) == status["counters"]["frames"]
         assert sum("rendering on " in line for line in d.lines) == 2
 
@@ -67,10 +70,14 @@ def test_a_large_view_of_all_devices_has_the_bytes_of_one():
 
 
 def test_views_are_drawn_side_by_side():
-    with Daemon(FAKE, "--device", "fake:0,fake:1,fake:2", FAKE_FRAME_MS=600) as d:
-        began = time.monotonic()
-        assert [reply.status for reply in together(3, lambda i: d.ask(fresh(SMALL)))] == [200] * 3
-        assert time.monotonic() - began < 1.6, "they waited for each other"
+    hold = Hold()
+    with Daemon(FAKE, "--device", "fake:0,fake:1,fake:2", *PATIENT, **hold.environment) as d:
+        def go_on():
+            eventually(lambda: d.status()["counters"]["cache_misses"] == 3)
+            eventually(lambda: d.status()["queues"]["render"]["length"] == 0)  # or they wait for each other
+            hold.allow_all()
+        *replies, _ = together(4, lambda i: d.ask(fresh(SMALL)) if i < 3 else go_on())
+        assert [reply.status for reply in replies] == [200] * 3
 
 
 def test_datasets_come_and_go_on_all_devices():
@@ -90,26 +97,35 @@ def test_datasets_come_and_go_on_all_devices():
 
 
 def test_a_lost_device_leaves_the_others_and_comes_back():
-    with Daemon(FAKE, "--device", "fake:0,fake:1", FAKE_FRAME_MS=10, FAKE_OPEN_MS=150,
-                SPLATD_INJECT_LOSS_AFTER="40x1") as d:  # the second after 80
-        seen, codes = set(), []
-        while d.status()["counters"]["device_losses"] < 2:
-            codes += [reply.status for reply in together(2, lambda i: d.ask(fresh(SMALL)))]
-            seen.add(tuple(states(d)))
-            assert d.ops("/readyz").status == 200
-            assert len(codes) < 1000
-        assert codes.count(503) <= 4 and set(codes) == {200, 503}, codes
-        assert ("rebuilding", "ready") in seen, seen
+    hold = Hold("FAKE_OPENING", allowed=None)
+    with Daemon(FAKE, "--device", "fake:0,fake:1", SPLATD_INJECT_LOSS_AFTER="40x1", **hold.environment) as d:  # the second after 80
+        codes = []
+
+        def lose(count):
+            while d.status()["counters"]["device_losses"] < count:
+                codes.extend(reply.status for reply in together(2, lambda i: d.ask(fresh(SMALL))))
+                assert len(codes) < 1000
+        hold.allow(0)
+        lose(1)
+        assert sorted(states(d)) == ["ready", "rebuilding"] and d.ops("/readyz").status == 200
+        other = states(d).index("ready")
+        left = min(10, 40 * (other + 1) - 1 - d.status()["devices"][other]["frames"])  # before it is lost, too
+        assert [d.ask(fresh(SMALL)).status for _ in range(left)] == [200] * left
+        hold.allow_all()
         eventually(lambda: states(d) == ["ready", "ready"])
-        assert any("device 2 of 2 lost" in line for line in d.lines)
+        lose(2)
+        assert codes.count(503) <= 4 and set(codes) == {200, 503}, codes
+        eventually(lambda: states(d) == ["ready", "ready"])
+        assert d.log("device 1 of 2 lost") and d.log("device 2 of 2 lost")
 
 
 def test_a_device_that_stays_away_is_given_up():
     d = Daemon(FAKE, "--device", "fake:0,fake:1", FAKE_FRAME_MS=5, FAKE_OPEN_LIMIT=2, SPLATD_INJECT_LOSS_AFTER="5x9")
     codes = []
-    while "failed" not in states(d):
+    while d.status()["counters"]["device_losses"] < 1:
         codes.append(d.ask(fresh(SMALL)).status)
         assert len(codes) < 50
+    eventually(lambda: "failed" in states(d))
     assert d.ops("/readyz").status == 200 and d.status()["state"] == "ready"
     gauges = d.ops("/metrics").body.decode()
     assert 'splatd_devices{state="failed"} 1\n' in gauges and 'splatd_devices{state="ready"} 1\n' in gauges

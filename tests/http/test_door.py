@@ -19,7 +19,7 @@ PLAIN, JSON, FORM = "text/plain;charset=UTF-8", "application/json", "multipart/f
 
 def raw(d, text):
     """What is sent byte for byte; the status, and the problem where there is one."""
-    with socket.create_connection(("127.0.0.1", d.port), 20) as s:
+    with socket.create_connection(("127.0.0.1", d.port), 150) as s:
         s.sendall(text)
         reply = http.client.HTTPResponse(s)
         reply.begin()

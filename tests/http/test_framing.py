@@ -30,7 +30,7 @@ class Wire:
     """One connection; what comes is read reply by reply, and nothing may be left over."""
 
     def __init__(self, d):
-        self.socket, self.buffer = socket.create_connection(("127.0.0.1", d.port), 30), b""
+        self.socket, self.buffer = socket.create_connection(("127.0.0.1", d.port), 150), b""
 
     def __enter__(self):
         return self
@@ -242,7 +242,6 @@ def test_chunks_that_are_none_are_answered_once_and_at_once():
                     with Wire(d) as wire:
                         head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n" \
                                "Transfer-Encoding: chunked\r\n\r\n".encode()
-                        began = time.monotonic()
                         if pause:
                             wire.send(head)
                             time.sleep(0.02)
@@ -252,8 +251,7 @@ def test_chunks_that_are_none_are_answered_once_and_at_once():
                         assert status == expected, (path, body[:40], status, text)
                         check_problem(Problem(status, answer, text), "POST")
                         assert answer["connection"].lower() == "close" and wire.ended(), (path, body[:40], answer)
-                        assert time.monotonic() - began < 5, (path, body[:40])
-        assert d.ask("/v1/status").status == 200
+        assert not d.status()["counters"]["slow_closed"], "it took until a client that is slow is cut"
 
 
 def test_headers_that_libmicrohttpd_refuses_are_answered_once():
@@ -418,7 +416,7 @@ def test_a_last_reply_arrives_whole_whatever_is_sent_behind_it():
         for _ in range(3):
             s = socket.socket()
             s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that much of the reply has still to be sent
-            s.settimeout(30)
+            s.settimeout(150)
             s.connect(("127.0.0.1", d.port))
             s.sendall(b"GET /v1/openapi.json HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" + b"x" * 40000)
             received = b""

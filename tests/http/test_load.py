@@ -1,14 +1,16 @@
 """More than the device can do, clients that leave or dawdle, a device that is lost, a daemon that is told to stop:
 every reply is 200 or says when to come back, and none is dropped."""
+import http.client
 import os
 import pathlib
 import re
 import signal
 import socket
+import subprocess
 import threading
 import time
 
-from harness import FAKE, REAL, VIEW, Daemon, eventually, fresh, run, together
+from harness import FAKE, PATIENT, REAL, VIEW, WALL, Daemon, Hold, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 
@@ -26,56 +28,79 @@ def statuses(replies):
     return [reply.status for reply in replies]
 
 
-def test_a_full_queue_is_said_at_once():
-    with Daemon(FAKE, "--queue", "2", FAKE_FRAME_MS=200) as d:
-        assert d.ask(fresh(SMALL)).status == 200  # so that the service knows how long a frame takes
-        times = {}
+def begin(d, count, path=SMALL):
+    """Asks for so many views beside the test, the first of which the device has before the others come: threads and replies."""
+    replies, asked = [], d.status()["counters"]["cache_misses"]
+    threads = [threading.Thread(target=lambda: replies.append(d.ask(fresh(path)))) for _ in range(count)]
+    for i, thread in enumerate(threads):
+        thread.start()
+        if not i:
+            eventually(lambda: d.status()["counters"]["cache_misses"] == asked + 1 and not d.status()["queues"]["render"]["length"])
+    eventually(lambda: d.status()["counters"]["cache_misses"] == asked + count)
+    return threads, replies
 
-        def ask(i):
-            began = time.monotonic()
-            reply = d.ask(fresh(SMALL))
-            times.setdefault(reply.status, []).append(time.monotonic() - began)
-            return reply
-        got = statuses(together(12, ask))
-        assert set(got) == {200, 503} and 3 <= got.count(200) <= 5, got
-        assert max(times[503]) < max(times[200]), times  # 200 waited for two frames before it, 503 for none
+
+def test_a_full_queue_is_said_at_once():
+    hold = Hold(allowed=1)
+    with Daemon(FAKE, "--queue", "2", *PATIENT, **hold.environment) as d:
+        assert d.ask(fresh(SMALL)).status == 200  # so that the service knows how long a frame takes
+        threads, replies = begin(d, 3)
+        assert statuses(together(9, lambda i: d.ask(fresh(SMALL)))) == [503] * 9 and not replies  # while nothing goes on
+        hold.allow_all()
+        for thread in threads:
+            thread.join()
+        assert [reply.status for reply in replies] == [200] * 3
         counters = d.status()["counters"]
-        assert counters["refused_full"] == got.count(503) and counters["frames"] == got.count(200) + 1
+        assert counters["refused_full"] == 9 and counters["frames"] == 4
 
 
 def test_who_asks_again_finds_no_queue_full_of_what_nobody_waits_for():
     """Behind a frame that takes longer than the deadline: clients with their timeout ask again, and so do others."""
-    with Daemon(FAKE, "--queue", "4", "--deadline", "1500", "--cache", "0", FAKE_HANG_MS=8000, FAKE_FRAME_MS=0) as d:
+    hold = Hold("FAKE_HANG")
+    with Daemon(FAKE, "--queue", "4", "--deadline", "3000", "--stall", "600000", "--cache", "0", FAKE_FRAME_MS=0, **hold.environment) as d:
+        def length():
+            return d.status()["queues"]["render"]["length"]
         hangs = threading.Thread(target=lambda: d.ask(fresh(SMALL)))
         hangs.start()
-        eventually(lambda: d.status()["queues"]["render"]["length"] == 0 and d.status()["counters"]["requests"] > 1)
+        eventually(lambda: length() == 0 and d.status()["counters"]["cache_misses"] == 1)
         for _ in range(2):
             replies = together(4, lambda i: d.ask(fresh(SMALL)))
             assert [reply.json()["type"] for reply in replies] == ["urn:splatd:error:timeout"] * 4, [r.body for r in replies]
-        left = [d.connect() for _ in range(4)]
-        for connection in left:
-            connection.request("GET", fresh(SMALL))
-        eventually(lambda: d.status()["queues"]["render"]["length"] == 4)
-        assert d.ask(fresh(SMALL)).json()["type"] == "urn:splatd:error:busy"  # these are waited for
-        for connection in left:
-            connection.close()
-        eventually(lambda: d.status()["counters"]["clients_left"] == 4)
-        assert d.ask(fresh(SMALL)).status in (200, 503) and d.status()["counters"]["refused_full"] == 1
+        assert not d.status()["counters"]["refused_full"]
+        for _ in range(20):  # these are waited for; where we are slow, they are not any more when we have looked
+            before, left = d.status()["counters"], [d.connect() for _ in range(4)]
+            for connection in left:
+                connection.request("GET", fresh(SMALL))
+            reply = d.ask(fresh(SMALL)) if length() == 4 else None
+            for connection in left:
+                connection.close()
+            after = d.status()["counters"]
+            if reply and reply.json()["type"] == "urn:splatd:error:busy":
+                break
+            eventually(lambda: d.status()["counters"]["deadline_missed"] + d.status()["counters"]["clients_left"] >=
+                       before["deadline_missed"] + before["clients_left"] + 4)
+        assert after["refused_full"] == before["refused_full"] + 1, (before, after)
+        eventually(lambda: d.status()["counters"]["deadline_missed"] + d.status()["counters"]["clients_left"] >=
+                   before["deadline_missed"] + before["clients_left"] + 4)
+        assert d.ask(fresh(SMALL)).json()["type"] == "urn:splatd:error:timeout" and d.status()["counters"]["refused_full"] == after["refused_full"]
+        hold.allow_all()
         hangs.join()
 
 
 def test_the_deadline_ends_a_wait():
-    with Daemon(FAKE, "--deadline", "300", FAKE_FRAME_MS=200) as d:
+    hold = Hold(allowed=1)
+    with Daemon(FAKE, "--deadline", "3000", **hold.environment) as d:
         got = statuses(together(6, lambda i: d.ask(fresh(SMALL))))
         assert got.count(200) == 1 and got.count(503) == 5, got
         eventually(lambda: d.status()["queues"]["render"]["length"] == 0)
         status = d.status()
         assert status["counters"]["deadline_missed"] == 5 and status["counters"]["frames"] == 1, status
+        hold.allow_all()
         assert d.ask(fresh(SMALL)).status == 200
 
 
 def test_a_frame_slower_than_the_deadline_ends_too():
-    with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=5000) as d:
+    with Daemon(FAKE, "--deadline", "100", FAKE_FRAME_MS=500000) as d:
         assert d.post({"width": 16, "height": 16}).status == 503
         reply = d.ask(fresh(SMALL))
         assert reply.status == 503 and reply.json()["type"] == "urn:splatd:error:timeout", reply.body
@@ -83,20 +108,21 @@ def test_a_frame_slower_than_the_deadline_ends_too():
 
 
 def test_work_of_clients_that_left_is_dropped():
-    with Daemon(FAKE, FAKE_FRAME_MS=300) as d:
-        first = threading.Thread(target=lambda: d.ask(fresh(SMALL)))
-        first.start()
-        eventually(lambda: d.status()["counters"]["requests"] >= 2)
+    hold = Hold()
+    with Daemon(FAKE, *PATIENT, **hold.environment) as d:
+        first, _ = begin(d, 1)
         gone = []
         for _ in range(8):
             s = socket.create_connection(("127.0.0.1", d.port))
             s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             gone.append(s)
-        eventually(lambda: d.status()["queues"]["render"]["length"] >= 7)
+        eventually(lambda: d.status()["queues"]["render"]["length"] == 8)
         for s in gone:
             s.close()
+        eventually(lambda: d.status()["counters"]["clients_left"] == 8)
+        hold.allow_all()
         assert d.ask(fresh(SMALL)).status == 200
-        first.join()
+        first[0].join()
         counters = d.status()["counters"]
         assert counters["clients_left"] == 8 and counters["frames"] == 2, (counters, "frames were rendered for nobody")
 
@@ -145,16 +171,14 @@ def test_too_many_losses_end_the_daemon():
 
 
 def test_nobody_waits_for_a_device_that_is_gone():
-    d = Daemon(FAKE, FAKE_FRAME_MS=1, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
+    d = Daemon(FAKE, *PATIENT, FAKE_FRAME_MS=1, FAKE_OPEN_LIMIT=1, SPLATD_INJECT_LOSS_AFTER="1")
     views = {"views": [{"camera": {"eye": [3 + i, 2, 3], "target": [0, 0, 0]}, "width": 8, "height": 6}
                        for i in range(12)]}
-    began = time.monotonic()
     try:
         assert d.post(views, "/v1/datasets/wall/views").status in (200, 503)
     except OSError:
         pass  # it has ended
-    assert d.wait_exit() == 1
-    assert time.monotonic() - began < 6, "the batch waited for its deadline"
+    assert d.wait_exit() == 1, "the batch waited for its deadline"
 
 
 def test_a_device_that_stays_away_ends_the_daemon():
@@ -166,57 +190,64 @@ def test_a_device_that_stays_away_ends_the_daemon():
 def test_sigterm_under_load_drops_no_reply():
     for number in (signal.SIGTERM, signal.SIGINT):
         d = Daemon(FAKE, FAKE_FRAME_MS=20)
-        stopping = threading.Event()
+        stopping, served = threading.Event(), [0] * 8
 
         def work(i):
-            connection, good = d.connect(), 0
+            connection, sent_before = d.connect(), False
             while True:
-                asked = stopping.is_set()
                 try:
-                    reply = d.ask(fresh(SMALL), connection=connection)
-                except OSError:
-                    assert asked, "a request sent before the signal was dropped"
-                    return good
+                    sent_before = False
+                    connection.request("GET", fresh(SMALL))
+                    sent_before = not stopping.is_set()  # looked at once it is sent: then all of it was
+                    reply = connection.getresponse()
+                    reply.read()
+                except (OSError, http.client.HTTPException):
+                    assert stopping.is_set() and not sent_before, "a request sent before the signal was dropped"
+                    return
                 assert reply.status == 200, reply.status
-                good += 1
+                served[i] += 1
                 if reply.headers["Connection"] == "close":
-                    return good
-        timer = threading.Timer(0.5, lambda: (stopping.set(), d.process.send_signal(number)))
-        timer.start()
-        for result in together(8, work):
-            if isinstance(result, Exception):
+                    return
+
+        def signal_it():
+            eventually(lambda: min(served) >= 3)
+            stopping.set()
+            d.process.send_signal(number)
+        for result in together(9, lambda i: signal_it() if i == 8 else work(i)):
+            if result:
                 raise result
-            assert result >= 1
-        timer.join()
         assert d.wait_exit() == 0
         assert not any("bug" in line for line in d.lines)
 
 
-def test_sigterm_finishes_a_long_frame():
-    d = Daemon(FAKE, FAKE_FRAME_MS=1500)
-    replies = []
-    asking = threading.Thread(target=lambda: replies.append(d.ask(fresh(SMALL))))
-    asking.start()
-    eventually(lambda: d.status()["counters"]["requests"] >= 2)
-    d.process.send_signal(signal.SIGTERM)
-    time.sleep(0.3)
+def accepts(d):
     try:
-        socket.create_connection(("127.0.0.1", d.port), 1).close()
-        raise AssertionError("still accepts")
+        socket.create_connection(("127.0.0.1", d.port), 60).close()
+        return True
     except ConnectionRefusedError:
-        pass
+        return False
+
+
+def test_sigterm_finishes_a_long_frame():
+    hold = Hold()
+    d = Daemon(FAKE, *PATIENT, **hold.environment)
+    threads, replies = begin(d, 1)
+    d.process.send_signal(signal.SIGTERM)
+    eventually(lambda: not accepts(d))
+    assert not replies
+    hold.allow_all()
     assert d.wait_exit() == 0
-    asking.join()
+    threads[0].join()
     assert replies[0].status == 200 and replies[0].headers["Connection"] == "close"
 
 
 def test_a_second_signal_ends_at_once():
-    d = Daemon(FAKE, "--deadline", "600000", FAKE_FRAME_MS=500000)  # far longer than wait_exit() is patient
+    d = Daemon(FAKE, *PATIENT, FAKE_FRAME_MS=500000)  # far longer than wait_exit() is patient
     s = socket.create_connection(("127.0.0.1", d.port))
     s.sendall(f"GET {fresh(SMALL)} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-    eventually(lambda: d.status()["counters"]["requests"] >= 2)
+    eventually(lambda: d.status()["counters"]["cache_misses"] == 1)
     d.process.send_signal(signal.SIGTERM)
-    time.sleep(0.2)
+    eventually(lambda: d.ops("/readyz").body == b"no: stopping\n")  # two that come together are one
     d.process.send_signal(signal.SIGTERM)
     assert d.wait_exit() == 1
     s.close()
@@ -281,35 +312,41 @@ def test_memory_is_flat():
     with Daemon(FAKE, "--cache", "0", FAKE_FRAME_MS=0, ASAN_OPTIONS=asan) as d:
         for _ in range(100):
             d.ask(VIEW)
-        before = resident()
-        for i in range(400):
-            d.ask(VIEW if i % 4 else VIEW + "?width=0")
-        assert resident() - before < 4 << 20, (before, resident())
+        grown = []
+        while not grown or min(grown) >= 4 << 20:  # once may be a thread that had nothing to do before; a leak is every time
+            before = resident()
+            for i in range(400):
+                d.ask(VIEW if i % 4 else VIEW + "?width=0")
+            grown.append(resident() - before)
+            assert len(grown) < 4 or min(grown) < 4 << 20, grown
 
 
 def test_ipv6_and_quiet():
-    import http.client
-    import subprocess
-    from harness import WALL
-    with socket.socket(socket.AF_INET6) as probe:
-        try:
+    try:
+        with socket.socket(socket.AF_INET6) as probe:
             probe.bind(("::1", 0))
-        except OSError:
-            return  # a machine without IPv6
-        port = probe.getsockname()[1]
-    process = subprocess.Popen([FAKE, "--quiet", "--ops-listen", "", "--listen", f"[::1]:{port}", WALL],
-                               stderr=subprocess.PIPE, text=True)
+    except OSError:
+        return  # a machine without IPv6
 
-    def up():
+    def up(port):
         try:
-            connection = http.client.HTTPConnection("::1", port, timeout=5)
+            connection = http.client.HTTPConnection("::1", port, timeout=60)
             connection.request("GET", "/v1/status")
             return connection.getresponse().status == 200
         except OSError:
             return False
-    eventually(up)
+    for _ in range(20):
+        with socket.socket(socket.AF_INET6) as probe:
+            probe.bind(("::1", 0))
+            port = probe.getsockname()[1]
+        process = subprocess.Popen([FAKE, "--quiet", "--ops-listen", "", "--listen", f"[::1]:{port}", WALL],
+                                   stderr=subprocess.PIPE, text=True)
+        eventually(lambda: up(port) or process.poll() is not None)
+        if process.poll() is None:
+            break  # else somebody has taken the port meanwhile
+        assert str(port) in process.communicate()[1]
     process.send_signal(signal.SIGTERM)
-    assert process.wait(10) == 0 and process.stderr.read() == ""
+    assert process.wait(150) == 0 and process.stderr.read() == ""
 
 
 run(globals())

@@ -16,14 +16,22 @@ if os.environ["SPLATD_SANITIZED"] == "0":  # nothing of ours is built for it: on
         assert wrong_server.self_test() == 0
 
 
-def test_spoiled_requests():
-    said = mutate.attack(FAKE, SECONDS * 0.8, SEED)
+def attack(binary, seconds, **more):
+    """A turn of the loop that takes long is a fault where it does so again and again: others may have had the core."""
+    for left in 2, 1, 0:
+        said = mutate.attack(binary, seconds, SEED, **more)
+        if not said or "a turn of the loop took" not in said.splitlines()[0] or not left:
+            break
+        print(f"     again: {said.splitlines()[0]}")
     assert not said, said
+
+
+def test_spoiled_requests():
+    attack(FAKE, SECONDS * 0.8)
 
 
 def test_spoiled_requests_where_frames_are_rendered():
-    said = mutate.attack(REAL, SECONDS * 0.2, SEED, first=1_000_000)
-    assert not said, said
+    attack(REAL, SECONDS * 0.2, first=1_000_000)
 
 
 run(globals())

@@ -9,7 +9,7 @@ import time
 import urllib.parse
 import zipfile
 
-from harness import REAL, VIEW, Daemon, eventually, npy, run
+from harness import REAL, VIEW, Daemon, Skipped, eventually, npy, run
 
 RAYS = VIEW.replace("/view", "/rays")
 POSE = {"eye": [3, 0.8, 1], "target": [0, 0.8, 1]}
@@ -212,6 +212,13 @@ def test_long_lists_are_let_in():
 
 def test_who_dawdles_keeps_no_place_of_long_lists():
     """Seven clients that send two of three MiB and fall silent or send a byte now and then, and one that goes on."""
+    for _ in range(10):  # where all is not sent within 5 s, we are such clients ourselves
+        if dawdle():
+            return
+    raise Skipped("it takes longer than 5 s to send 15 MiB")
+
+
+def dawdle():
     def send(piece):
         for sock in silent[:3]:
             sock.sendall(b"\0")
@@ -220,10 +227,13 @@ def test_who_dawdles_keeps_no_place_of_long_lists():
         one = npy(DIRECTIONS[:1])
         body, ask = npy([DIRECTIONS[0]] * 120000, "d"), lambda: d.ask(f"{RAYS}?{QUERY}", "POST", one + bytes(2 << 20), NPY)
         silent, steady = [begin(d, 3 << 20) for _ in range(7)], begin(d, len(body))
+        began = time.monotonic()
         for sock in silent:
             sock.sendall(bytes(2 << 20))
         send(body[:1200000])
         eventually(lambda: ask().status == 503)
+        if time.monotonic() - began > 4:
+            return False
         for i in range(1200000, len(body), 100000):
             send(body[i:i + 100000])
             if ask().status == 400:  # let in, read and not liked
@@ -233,11 +243,12 @@ def test_who_dawdles_keeps_no_place_of_long_lists():
             raise AssertionError("nobody's place was given up")
         steady.sendall(body[i + 100000:])
         assert b" 200 " in steady.recv(4096).split(b"\r\n")[0]
-        told = select.select(silent, [], [], 30)[0]
+        told = select.select(silent, [], [], 150)[0]
         assert len(told) == 1 and b" 408 " in told[0].recv(4096).split(b"\r\n")[0], told
         for sock in silent:
             sock.close()
         assert d.status()["counters"]["slow_closed"] == 1
+        return True
 
 
 run(globals())

@@ -5,9 +5,8 @@ import math
 import re
 import struct
 import threading
-import time
 
-from harness import FAKE, REAL, VIEW, Daemon, run
+from harness import FAKE, PATIENT, REAL, VIEW, Daemon, Hold, eventually, run, together
 
 PICK = VIEW.replace("/view", "/pick")
 AXIS = "axis:0,0,0,0,0,1<0.5"
@@ -73,19 +72,24 @@ def test_layers_and_picks_speak_of_what_is_asked_for():
         assert d.view(**near).body == d.view(**near, of="first").body, "colours stay what they are"
 
 
-SLOW = dict(width=96, height=54, soft=AXIS, soft_model="base")  # 5184 samples: 2 s at 386 s a megapixel
+SLOW = dict(width=96, height=54, soft=AXIS, soft_model="base")
 
 
 def test_who_takes_long_gives_way():
     """In the middle of an image too small to be cut: others come between, and it ends as if they had not."""
-    with Daemon(FAKE, FAKE_SOFT_MS=386000) as d:
+    hold = Hold()
+    with Daemon(FAKE, *PATIENT, **hold.environment) as d:
         ended = []
         thread = threading.Thread(target=lambda: ended.append(d.view(**SLOW)))
         thread.start()
-        time.sleep(0.2)
-        for i in range(3):
-            assert d.view(width=16 + i, height=16).status == 200
-        assert not ended, "a view of a moment waited for one of two seconds"
+        eventually(lambda: d.status()["counters"]["cache_misses"] == 1 and not d.status()["queues"]["render"]["length"])
+
+        def go_on():
+            eventually(lambda: d.status()["counters"]["cache_misses"] == 4 and d.status()["queues"]["render"]["length"] == 2)
+            hold.allow(3)  # it has given way to the first
+        *others, _ = together(4, lambda i: d.view(width=16 + i, height=16) if i < 3 else go_on())
+        assert [reply.status for reply in others] == [200] * 3 and not ended, "views of a moment waited for one that takes long"
+        hold.allow_all()
         thread.join()
         assert ended[0].status == 200, ended[0].body
 

@@ -10,12 +10,11 @@ import signal
 import subprocess
 import tempfile
 import threading
-import time
 import zipfile
 
 import openapi
 import tiles
-from harness import FAKE, REAL, WALL, Daemon, eventually, run, together, Reply
+from harness import FAKE, PATIENT, REAL, WALL, Daemon, Hold, eventually, run, together, Reply
 
 TOURS = "/v1/datasets/wall/tours"
 SMALL = dict(width=64, height=48)
@@ -47,26 +46,24 @@ def begin(d, document, status=202):
 
 
 def ended(d, uri, state="done"):
-    eventually(lambda: d.ask(uri).json()["state"] in ("done", "failed"), 120)
+    eventually(lambda: d.ask(uri).json()["state"] in ("done", "failed"))
     tour = d.ask(uri).json()
     assert tour["state"] == state, tour
     return tour
 
 
-SLOW = dict(width=96, height=54, soft="axis:0,0,0,0,0,1<0.5", soft_model="base")  # 20 s a frame at 3860 s a megapixel
+SLOW = dict(width=96, height=54, soft="axis:0,0,0,0,0,1<0.5", soft_model="base")  # 2000 s a frame at 386000 s a megapixel
 
 
 def test_a_slow_frame_gives_way_and_goes_with_its_tour():
-    with Folder() as tours, Daemon(FAKE, "--tours", tours, FAKE_SOFT_MS=3860000) as d:
+    with Folder() as tours, Daemon(FAKE, "--tours", tours, FAKE_SOFT_MS=386000000) as d:
         slow = begin(d, body(settings=SLOW))["uri"]
-        time.sleep(0.3)  # its first frame is being drawn
+        eventually(lambda: d.ops("/metrics").body.count(b'splatd_tours{state="rendering"} 1\n'))  # its first frame is being drawn
         for i in range(3):
             assert d.view(width=16 + i, height=16).status == 200
         assert d.ask(slow).json()["state"] == "rendering" and d.ask(slow).json()["frames_done"] == 0
         assert d.ask(slow, "DELETE").status == 204
-        began = time.monotonic()
-        ended(d, begin(d, body(2))["uri"])
-        assert time.monotonic() - began < 8, "the frames of a tour that was removed were drawn on"
+        ended(d, begin(d, body(2))["uri"])  # or the frames of the tour that was removed are drawn on
 
 
 def test_what_the_dataset_lacks_is_refused_at_once():
@@ -89,7 +86,7 @@ def test_a_frame_whose_faces_are_too_many_samples_fails_its_tour():
 
 def read_stream(d, uri, begun=None):
     """Reads a stream to its end; `begun` is set once its first byte is there."""
-    connection = d.connect(120)
+    connection = d.connect()
     connection.request("GET", uri)
     answer = connection.getresponse()
     first = answer.read(1)
@@ -108,7 +105,7 @@ def watch(d, uris):
         begun = threading.Event()
         threads.append(threading.Thread(target=lambda uri=uri, begun=begun: replies.update({uri: read_stream(d, uri, begun)})))
         threads[-1].start()
-        assert begun.wait(60)
+        assert begun.wait(150)
     return threads, replies
 
 
@@ -227,8 +224,7 @@ def test_a_camera_path_becomes_frames_a_zip_a_stream_and_a_video():
         if video:
             check_video(d, tour, 4)
         assert parts_of(read_stream(d, tour["stream"])) == frames
-        eventually(lambda: sum(f.stat().st_size for f in (folder / tour["name"]).iterdir() if f.name[0] != ".")
-                   == d.ask("/v1/tours").json()["bytes"])
+        eventually(lambda: disk_bytes(folder / tour["name"], False) == d.ask("/v1/tours").json()["bytes"])
         assert d.ask(uri, "DELETE").status == 204 and d.ask(uri).status == 404
         assert d.ask("/v1/tours").json() == {"tours": [], "bytes": 0, "bytes_max": 10 << 30}
         eventually(lambda: not list(folder.iterdir()))
@@ -355,7 +351,7 @@ def test_quotas():
         ended(d, begin(d, body(2))["uri"])
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-age", "1") as d:
         begin(d, body(2))
-        eventually(lambda: d.ask("/v1/tours").json()["tours"] == [], 60)  # old
+        eventually(lambda: d.ask("/v1/tours").json()["tours"] == [])  # old
         eventually(lambda: not list(folder.iterdir()))
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "0") as d:
         assert "0 bytes" in begin(d, body(), 503)["detail"]
@@ -365,8 +361,16 @@ def test_quotas():
         assert "32 tours are still to be made" in begin(d, body(), 503)["detail"]
 
 
-def disk_bytes(folder):
-    return sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+def size(path):
+    """0 where it has gone meanwhile: what is being written has another name."""
+    try:
+        return path.stat().st_size if path.is_file() else 0
+    except FileNotFoundError:
+        return 0
+
+
+def disk_bytes(folder, hidden=True):
+    return sum(size(f) for f in folder.rglob("*") if hidden or f.name[0] != ".")
 
 
 def idle(text):
@@ -390,7 +394,7 @@ def test_what_is_kept_of_a_path_is_bounded_before_it_is_accepted():
         eventually(lambda: disk_bytes(folder) > 3.8e6)
         taken = {reply.status for reply in together(8, lambda _: d.post(texts, TOURS))}
         assert taken == {202, 503}, taken  # two more have room
-        eventually(lambda: sum(f.stat().st_size for f in folder.rglob("*") if f.name[0] != ".") >= d.ask("/v1/tours").json()["bytes"] > 6e6)
+        eventually(lambda: disk_bytes(folder, False) >= d.ask("/v1/tours").json()["bytes"] > 6e6)
         assert disk_bytes(folder) < 8 << 20
         d.process.send_signal(signal.SIGKILL)
         d.wait_exit()
@@ -407,7 +411,7 @@ def test_a_tour_of_the_version_before_goes_on():
     with Folder() as folder:
         with Daemon(FAKE, "--tours", str(folder)) as d:
             wanted = frames_of(d, ended(d, begin(d, depth_tour(6))["uri"]))
-        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=1000) as d:
+        with Daemon(FAKE, "--tours", str(folder), **Hold().environment) as d:
             tour = begin(d, depth_tour(6))
             file = folder / tour["name"] / "tour.json"
             eventually(file.exists)
@@ -425,7 +429,7 @@ def test_a_client_that_leaves_while_its_path_is_read():
     with Folder() as folder, Folder() as elsewhere:
         gate = elsewhere / "gate"
         gate.touch()  # for the dataset
-        with Daemon(FAKE, "--tours", str(folder), "--deadline", "1000", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
+        with Daemon(FAKE, "--tours", str(folder), "--deadline", "6000", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
                     SLOW_DISK_NAME="tour.json", UV_THREADPOOL_SIZE=1) as d:
             gate.unlink()
             first = begin(d, body(2))  # its state is being written by the pool's one thread
@@ -477,7 +481,7 @@ def test_cancelling_ends_streams_and_removes_files():
         assert d.view(**SMALL).status == 200  # in between
         assert d.ask(tour["uri"], "DELETE").status == 204 and d.ask(tour["uri"], "DELETE").status == 404
         for thread in threads:
-            thread.join(60)
+            thread.join(150)
         assert events_of(replies[tour["events"]].body)[-1][0] == "removed"
         assert parts_of(replies[tour["stream"]])
         ended(d, other["uri"])
@@ -494,7 +498,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
         with Daemon(FAKE, "--tours", str(plain)) as d:
             wanted = frames_of(d, ended(d, begin(d, depth_tour(60))["uri"]))
         assert len(set(wanted)) > 30  # the fake renderer's depth follows the eye
-        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=40) as d:
+        with Daemon(FAKE, "--tours", str(folder), **Hold(allowed=20).environment) as d:
             tour = begin(d, depth_tour(60))
             eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] >= 15)
             d.process.send_signal(signal.SIGKILL)
@@ -509,7 +513,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
         with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=20) as d:  # ended by SIGTERM, a stream open
             [stream], _ = watch(d, [tour["events"]])
             eventually(lambda: d.ask(tour["uri"]).json()["frames_done"] > len(files))
-            assert any("0123456789abcdef is not understood" in line for line in d.lines)
+            d.log("0123456789abcdef is not understood")
             odd = d.ask("/v1/tours/0123456789abcdef").json()
             assert odd["state"] == "failed" and "tour.json" in odd["error"] and odd["bytes"] == 5002, odd
             for leaf in ("events", "stream", "frames.zip", "frames/0"):
@@ -517,7 +521,7 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert d.ask("/v1/tours/0123456789abcdef", "DELETE").status == 204
             eventually(lambda: not (folder / "0123456789abcdef").exists())
             assert d.stop() == 0
-            stream.join(60)
+            stream.join(150)
         with Daemon(FAKE, "--tours", str(folder)) as d:
             tour = ended(d, tour["uri"])
             assert frames_of(d, tour) == wanted
@@ -554,7 +558,7 @@ def test_frames_that_are_not_complete_are_named():
             tour = ended(d, reply.json()["uri"])
             assert tour["frames_done"] == 5 and tour["incomplete_frames"] == {"count": 2, "first": [0, 3]}, tour
             assert d.ask("/v1/tours").json()["tours"][0]["incomplete_frames"] == tour["incomplete_frames"]
-            eventually(lambda: json.loads((tours / tour["name"] / "tour.json").read_text())["incomplete"] == {"count": 2, "first": [0, 3]}, 10)
+            eventually(lambda: json.loads((tours / tour["name"] / "tour.json").read_text())["incomplete"] == {"count": 2, "first": [0, 3]})
         assert any("done after 5 of 5 frames, 2 of them not complete" in line for line in d.lines), d.lines
         with Daemon(REAL, "--tours", tours, datasets=[folder / "city/city.spld"]) as d:
             assert d.ask(tour["uri"]).json()["incomplete_frames"] == {"count": 2, "first": [0, 3]}
@@ -618,11 +622,11 @@ def test_a_full_disk_ends_the_tour_and_nothing_else():
 
 def test_two_services_do_not_share_a_folder():
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder)):
-        second = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", str(folder), WALL], timeout=60,
+        second = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", str(folder), WALL], timeout=150,
                                 stderr=subprocess.PIPE, text=True)
         assert second.returncode == 2 and "another service keeps its tours" in second.stderr, second
     for where in ("/proc/none/x", WALL):
-        refused = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", where, WALL], timeout=60,
+        refused = subprocess.run([FAKE, "--listen", "127.0.0.1:0", "--tours", where, WALL], timeout=150,
                                  stderr=subprocess.PIPE, text=True)
         assert refused.returncode and "tours' folder" in refused.stderr, refused
 

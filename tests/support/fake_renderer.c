@@ -5,13 +5,17 @@
  * frames of more than FAKE_ROOM_PX samples, FAKE_PAGES_MS that a frame waits for its pages, FAKE_UPLOADS that it takes
  * to put them on the device, and FAKE_HANG_MS that the first frame ignores its deadline for, as a hanging driver does;
  * FAKE_LOSE_LOADING pages of one dataset in which the device is lost; FAKE_LOSE_FRAME, while which every frame loses
- * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. Tests in the same process hold
- * frames, too (fake_renderer.h). TSan sees all of it, which it cannot with a driver that compiles its own code. */
+ * it; FAKE_REFUSE datasets that have no room; the device "other" is of another kind. What a test holds up until it
+ * has seen what it came for it names by a file: while that of FAKE_STEPS is there, only as many steps end as the
+ * number in it says; while those of FAKE_OPENING, FAKE_PAGES and FAKE_HANG are there, no device is opened, no page
+ * has come, and the first frame hangs. Tests in the same process hold frames without files (fake_renderer.h). TSan sees
+ * it all, which it cannot with a driver that compiles its own code. */
 #include "fake_renderer.h"
 
 #include <splatd/render.h>
 
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -48,13 +52,51 @@ void fake_unsetenv(const char *name)
     pthread_mutex_unlock(&environment);
 }
 
-static long setting(const char *name, long otherwise)
+/* The text stays as it is; another may come in its place. */
+static const char *get_text(const char *name)
 {
     pthread_mutex_lock(&environment);
     const char *text = getenv(name);
-    const long value = text ? strtol(text, NULL, 10) : otherwise;
     pthread_mutex_unlock(&environment);
-    return value;
+    return text;
+}
+
+static long setting(const char *name, long otherwise)
+{
+    const char *text = get_text(name);
+    return text ? strtol(text, NULL, 10) : otherwise;
+}
+
+static bool is_held(const char *name)
+{
+    const char *path = get_text(name);
+    return path && !access(path, F_OK);
+}
+
+static void wait_while_held(const char *name)
+{
+    while (is_held(name))
+        usleep(1000);
+}
+
+/* Whether one more step may end; it is counted then. */
+static bool may_end(void)
+{
+    static _Atomic long ended; /* since the file is there */
+    const char *path = get_text("FAKE_STEPS");
+    FILE *file = path ? fopen(path, "r") : NULL;
+    long allowed = 0;
+    if (!file) {
+        ended = 0;
+        return true;
+    }
+    if (fscanf(file, "%ld", &allowed) != 1)
+        allowed = 0;
+    fclose(file);
+    if (ended++ < allowed)
+        return true;
+    ended--;
+    return false;
 }
 
 int spl_renderer_create(const struct spl_renderer_options *options, struct spl_renderer **out, struct spl_error *err)
@@ -65,6 +107,7 @@ int spl_renderer_create(const struct spl_renderer_options *options, struct spl_r
     usleep((useconds_t)setting("FAKE_OPEN_MS", 0) * 1000);
     while (atomic_load(&fake_frames.closed))
         usleep(500);
+    wait_while_held("FAKE_OPENING");
     if (!(*out = spl_alloc(1, sizeof **out, err)))
         return SPL_E_NOMEM;
     (*out)->device =
@@ -305,7 +348,7 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
     if (fill_all(&steps->frame, &steps->view, err))
         return SPL_E_NOMEM;
     steps->frame.stats.soft_ms = soft_ms(&steps->view);
-    steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns);
+    steps->frame.stats.complete = !spl_remaining_ns(steps->there_ns) && !is_held("FAKE_PAGES");
     steps->frame.stats.pending = !steps->frame.stats.complete;
     return 0;
 }
@@ -313,7 +356,8 @@ static int make_images(struct spl_frame_steps *steps, struct spl_error *err)
 bool spl_frame_is_waiting(struct spl_frame_steps *steps)
 {
     return !steps->view.partial &&
-           (spl_remaining_ns(steps->there_ns) || steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
+           (spl_remaining_ns(steps->there_ns) || is_held("FAKE_PAGES") ||
+            steps->renderer->uploads < setting("FAKE_UPLOADS", 0));
 }
 
 uint32_t spl_frame_stop_waiting(struct spl_frame_steps *steps)
@@ -335,7 +379,7 @@ static int take_time(struct spl_frame_steps *steps, uint64_t began_ns, uint64_t 
     int rc = 0;
     steps->paused = false;
     atomic_fetch_add(&fake_frames.drawing, 1);
-    while (!rc && !steps->paused && (atomic_load(&fake_frames.held) || spl_remaining_ns(until_ns))) {
+    while (!rc && !steps->paused && (atomic_load(&fake_frames.held) || spl_remaining_ns(until_ns) || !may_end())) {
         if ((steps->paused = gives_way(steps, began_ns)))
             steps->drawn_ns += spl_now_ns() - began_ns;
         else if (!spl_remaining_ns(deadline_ns))
@@ -370,6 +414,7 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
     if (!renderer->hung) {
         renderer->hung = true;
         usleep((useconds_t)setting("FAKE_HANG_MS", 0) * 1000);
+        wait_while_held("FAKE_HANG");
         usleep((useconds_t)setting("FAKE_KERNELS_MS", 0) * 1000);
         steps->frame.stats.kernels_ms = (double)setting("FAKE_KERNELS_MS", 0);
         atomic_fetch_add(&fake_frames.hanging, 1);

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 
-from harness import REAL, WALL, Daemon
+from harness import REAL, WALL, Daemon, slower_than_usual
 from mutating import drafts
 
 STALL_S = 0.05
@@ -119,7 +119,7 @@ class Victim:
         if files > self.files_at_start + 60:
             found.append(f"{files} descriptors, {self.files_at_start} at the start")
         limit = STALL_S * (10 if self.slow else 1)  # sanitisers slow down what the loop computes, not what it waits for
-        if self.stalls > limit:
+        if self.stalls > limit and self.stalls > limit * slower_than_usual():
             found.append(f"a turn of the loop took {self.stalls * 1000:.0f} ms of processor time")
         return found + self.unknown_lines()
 

@@ -43,7 +43,7 @@ class Server:
     def _serve(self, s):
         data, held = b"", b""
         with s:
-            s.settimeout(5)
+            s.settimeout(60)
             try:
                 while True:
                     found = self._take(data)
@@ -64,7 +64,7 @@ class Server:
                     if close and self.fault != "stays open":
                         return
                     if close:
-                        time.sleep(3)
+                        time.sleep(60)
             except Refused:
                 s.sendall(_reply(400, b"none", b"", True).replace(b"X-Request-Id: none\r\n", b""))
             except (OSError, ValueError):
@@ -175,7 +175,7 @@ def _found(fault):
     server = Server(fault)
     try:
         for exchange in _exchanges():
-            received, ended = wire.converse(server.port, exchange, {}, 2)
+            received, ended = wire.converse(server.port, exchange, {}, 2 if fault else 60)  # a right one is given time
             wrong = replies.fault(exchange.sents, received, ended)
             if wrong:
                 return wrong
