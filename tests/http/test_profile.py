@@ -53,11 +53,11 @@ def serving(document, binary=FAKE, source=WALL, **environment):
 
 
 def on_a_quiet_machine(test):
-    """Frames take at least what is said, and longer where others have the processor just then; that is learned, and another
-    setting chosen. So what is right is so in one of ten attempts at the latest, and what is wrong in none."""
+    """Frames take what is said, but replies take longer where others have the processor just then; that is learned, and
+    another setting chosen. So what is right is so in one of three attempts, and what is wrong in none."""
     @functools.wraps(test)
     def attempt():
-        for left in reversed(range(10)):
+        for left in reversed(range(3)):
             try:
                 return test()
             except AssertionError as why:

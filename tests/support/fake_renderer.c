@@ -433,6 +433,8 @@ int spl_frame_step(struct spl_frame_steps *steps, uint64_t deadline_ns, bool *mo
         *more = true;
         return 0;
     }
+    /* what others kept it from the processor for is told as what is no property of the view */
+    steps->frame.stats.kernels_ms += (double)(spl_now_ns() - until) / SPL_NS_PER_MS;
     steps->drawn_ns = 0;
     if (steps->spread) {
         rc = tile ? finish_piece(steps, err) : 0;
