@@ -36,17 +36,23 @@ build() {
     [ ! "$out/normal/shaders/kernels.S" -nt "$out/$name/shaders/kernels.S" ] || rm -f "$out/$name/shaders/kernels.S"
     if CC="ccache $compiler" "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" ${targets-} >>"$log" 2>&1; then
         printf '%-10s %-8s built in %d s\n' "$name" "" $((SECONDS - begin)) >"$out/$name.said"
-        echo yes >"$out/$name.built"
+        tell "$name" yes
     else
         { tail -60 "$log"; printf '%-10s %-8s DOES NOT BUILD (%s)\n' "$name" "" "$log"; } >"$out/$name.said"
-        echo no >"$out/$name.built"
+        tell "$name" no
     fi
+}
+
+# Name, yes or no, for built(): a file that is there holds what is said in it.
+tell() {
+    echo "$2" >"$out/$1.built.new"
+    mv "$out/$1.built.new" "$out/$1.built"
 }
 
 # Waits for a build and shows what is said of it; a broken one is counted.
 built() {
     until [ -f "$out/$1.built" ]; do
-        kill -0 "${others-}" 2>/dev/null || { echo "$1 was not built" >"$out/$1.said"; echo no >"$out/$1.built"; }
+        kill -0 "${others-}" 2>/dev/null || [ -f "$out/$1.built" ] || { echo "$1 was not built" >"$out/$1.said"; tell "$1" no; }
         sleep 1
     done
     cat "$out/$1.said"
