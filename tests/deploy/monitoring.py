@@ -224,7 +224,7 @@ def prometheus(d, tries=5):
         config = yaml.safe_load((ROOT / SCRAPE).read_text())
         config["global"] = {"evaluation_interval": "1s"}
         config["rule_files"] = [str(ROOT / RULES)]
-        config["scrape_configs"][0].update(scrape_interval="1s", scrape_timeout="1s")
+        config["scrape_configs"][0].update(scrape_interval="2s", scrape_timeout="2s")
         config["scrape_configs"][0]["static_configs"][0]["targets"] = [f"127.0.0.1:{d.ops_port}"]
         pathlib.Path(top, "prometheus.yml").write_text(yaml.safe_dump(config))
         process = port = None
@@ -249,7 +249,7 @@ def prometheus(d, tries=5):
                 start()
             url = f"http://127.0.0.1:{port}/api/v1/query?" + urllib.parse.urlencode({"query": expression})
             try:
-                with urllib.request.urlopen(url, timeout=60) as answer:
+                with urllib.request.urlopen(url, timeout=120) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as error:
                 return [] if error.code == 503 else error.read().decode()  # 503: it is not ready

@@ -147,7 +147,7 @@ def test_clouds_are_scans_again():
         assert np.array_equal(cloud.colors, color[np.isfinite(w.array("depth", **POSE, fov=60, **SIZE))][:, :3])
         file = pathlib.Path(folder, "cloud.ply")
         cloud.save(file)
-        info = json.loads(subprocess.run([REAL, "info", "--json", file], check=True, capture_output=True, timeout=60).stdout)
+        info = json.loads(subprocess.run([REAL, "info", "--json", file], check=True, capture_output=True, timeout=600).stdout)
         scan = info[0] if isinstance(info, list) else info.get("scans", [info])[0]
         assert scan["points"] == len(cloud), scan
         head, _, rows = file.read_bytes().partition(b"end_header\n")

@@ -26,7 +26,7 @@ SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--siz
 
 
 def help_of(command):
-    return subprocess.run([REAL, command, "--help"], capture_output=True, text=True, check=True, timeout=60).stdout
+    return subprocess.run([REAL, command, "--help"], capture_output=True, text=True, check=True, timeout=600).stdout
 
 
 def complete(text):
