@@ -5,8 +5,9 @@
 
 #include "gpu/gpu.h"
 
-/* How long a wait of our own (a next list, close) may take before the device counts as lost. */
+/* What spl_gpu_patience_ns() says. */
 #define SPL_GPU_PATIENCE_NS (10 * SPL_NS_PER_S)
+#define SPL_GPU_SOFTWARE_PATIENCE_NS (120 * SPL_NS_PER_S)
 
 enum { SPL_GPU_BOUND_MAX = 8 }; /* of either kind: OpenGL may have as many image units */
 

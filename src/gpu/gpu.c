@@ -26,6 +26,11 @@ const struct spl_device_info *spl_gpu_get_device(const struct spl_gpu *gpu)
     return &gpu->info;
 }
 
+uint64_t spl_gpu_patience_ns(const struct spl_gpu *gpu)
+{
+    return gpu->info.software ? SPL_GPU_SOFTWARE_PATIENCE_NS : SPL_GPU_PATIENCE_NS;
+}
+
 const struct spl_gpu_limits *spl_gpu_get_limits(const struct spl_gpu *gpu)
 {
     return &gpu->limits;
@@ -54,7 +59,7 @@ static bool is_stuck(struct spl_gpu *gpu)
     if (!gpu->settled) {
         gpu->settled = true;
         gpu->stuck = gpu->tickets &&
-                     gpu->backend->wait(gpu, gpu->tickets, SPL_GPU_PATIENCE_NS, NULL) == SPL_E_TIMEOUT;
+                     gpu->backend->wait(gpu, gpu->tickets, spl_gpu_patience_ns(gpu), NULL) == SPL_E_TIMEOUT;
         if (gpu->stuck)
             spl_log_warn("device '%s' does not end its work; its memory stays taken until this process exits",
                          gpu->info.name);
@@ -170,7 +175,7 @@ int spl_gpu_begin(struct spl_gpu *gpu, struct spl_error *err)
         return lost(gpu, err);
     int code = 0;
     if (gpu->tickets)
-        code = wait_for(gpu, gpu->tickets, SPL_GPU_PATIENCE_NS, err);
+        code = wait_for(gpu, gpu->tickets, spl_gpu_patience_ns(gpu), err);
     if (code >= 0)
         code = gpu->backend->begin(gpu, err);
     if (code < 0) {
@@ -291,7 +296,7 @@ int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err)
     struct spl_error why = {0};
     int code = submit(gpu, &ticket, &why);
     if (code >= 0)
-        code = wait_for(gpu, ticket, SPL_GPU_PATIENCE_NS, &why);
+        code = wait_for(gpu, ticket, spl_gpu_patience_ns(gpu), &why);
     if (code < 0)
         return spl_fail(err, SPL_E_DEVICE_LOST, "%s", why.message);
     if (gpu->limits.timestamps)

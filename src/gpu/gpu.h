@@ -105,6 +105,9 @@ void spl_gpu_timestamp(struct spl_gpu *gpu, uint32_t slot); /* no effect without
 int spl_gpu_run(struct spl_gpu *gpu, struct spl_error *err);
 /* Ends recording and starts it; the next begin waits for its end. */
 int spl_gpu_submit(struct spl_gpu *gpu, uint64_t *ticket, struct spl_error *err);
+/* How long a list of work may take before the device counts as lost. A software driver has longer: it does not hang,
+ * but works only when others leave it a processor, and compiles kernels meanwhile. */
+uint64_t spl_gpu_patience_ns(const struct spl_gpu *gpu);
 /* SPL_E_TIMEOUT once deadline_ns has passed, which also marks the device lost. */
 int spl_gpu_wait(struct spl_gpu *gpu, uint64_t ticket, uint64_t deadline_ns, struct spl_error *err);
 /* Nanoseconds of slot `slot` in the last list that was waited for, on the device's own clock; 0 where it was not

@@ -131,7 +131,7 @@ static int run(struct spl_gpu *gpu, const char *name, bool atomics_64, struct sp
     spl_gpu_barrier(gpu);
     spl_gpu_copy(gpu, device, 0, readback, 0, outputs);
     if ((code = spl_gpu_submit(gpu, &ticket, err)) < 0 ||
-        (code = spl_gpu_wait(gpu, ticket, spl_now_ns() + SPL_GPU_PATIENCE_NS, err)) < 0)
+        (code = spl_gpu_wait(gpu, ticket, spl_now_ns() + spl_gpu_patience_ns(gpu), err)) < 0)
         goto done;
     code = compare(gpu, name, atomics_64, spl_gpu_buffer_map(readback), err);
 done:

@@ -12,11 +12,6 @@
 #include "render/soft/pass.h"
 #include "render/soft_params.h"
 
-/* Of one list of work. A software driver does not hang, but gets as little of the processors as others leave it, and
- * compiles its kernels meanwhile. */
-#define FRAME_DEADLINE_NS (10 * SPL_NS_PER_S)
-#define SOFTWARE_DEADLINE_NS (120 * SPL_NS_PER_S)
-
 /* Which run of the shade pass each layer needs; coverage reads the depth only and goes with whatever runs. */
 static const uint8_t group_of_layer[SPL_LAYER_COUNT] = {
     [SPL_LAYER_COLOR] = SPL_SUMS_COLOR,   [SPL_LAYER_DEPTH] = SPL_SUMS_DEPTH, [SPL_LAYER_RANGE] = SPL_SUMS_DEPTH,
@@ -441,9 +436,8 @@ static int draw_tile(struct spl_tile *tile, struct spl_error *err)
     struct spl_error why = {0};
     int ended = spl_gpu_submit(gpu, &ticket, &why);
     /* The device is given its own full deadline: a request that is merely late must not mark it lost. */
-    const uint64_t patience_ns = spl_gpu_get_device(gpu)->software ? SOFTWARE_DEADLINE_NS : FRAME_DEADLINE_NS;
     if (!ended)
-        ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + patience_ns, &why);
+        ended = spl_gpu_wait(gpu, ticket, spl_now_ns() + spl_gpu_patience_ns(gpu), &why);
     if (!ended)
         return rc;
     if (err)

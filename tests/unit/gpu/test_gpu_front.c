@@ -102,6 +102,11 @@ static void next_list_waits_for_the_one_before(void **state)
     assert_int_equal(fake.waits, 1);
     assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_TIMEOUT); /* the second has not ended, ever */
     assert_int_equal(fake.last_timeout_ns, SPL_GPU_PATIENCE_NS);
+    gpu.lost = false;
+    gpu.info.software = true; /* it may only wait for a processor */
+    assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_TIMEOUT);
+    assert_int_equal(fake.last_timeout_ns, SPL_GPU_SOFTWARE_PATIENCE_NS);
+    gpu.info.software = false;
     assert_int_equal(spl_gpu_begin(&gpu, NULL), SPL_E_DEVICE_LOST);
     fake.ended = 3;
     spl_gpu_close(&gpu);
