@@ -60,14 +60,14 @@ built() {
 }
 
 # name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
-# shown with its output, and every suite is counted. Tests have four times their limit: machines are shared, and others
+# shown with its output, and every suite is counted. Tests have ten times their limit: machines are shared, and others
 # build beside them. `only` names those that run, `but` suites whose tests do not.
 suites() {
     local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/testlog told p f s
     shift 2
     rm -f "$log".{json,txt}
     ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" ${but+"${but[@]/#/--no-suite=}"} --print-errorlogs ${only-} \
-        --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$1.log" 2>&1 || true
+        --num-processes "$at_once" --timeout-multiplier "${timeouts:-10}" >"$out/$name-$1.log" 2>&1 || true
     told=$(python3 tests/counts.py "$name" "$log.json" "$out/why.txt" "$@")
     echo "${told%$'\n'*}"
     read -r p f s <<<"${told##*$'\n'}"
@@ -139,7 +139,7 @@ fi
 
 unset but
 if built asan; then
-    timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so"
+    timeouts=15 run_under="env LD_PRELOAD=$out/keep-loaded.so"
     suites asan "$here" unit "${again[@]}" fuzz
     suites asan $((2 * here)) "$attacks"
     only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
@@ -158,7 +158,7 @@ if built tsan; then
         runs_here="setarch -R"
     fi
     if [ -n "${runs_here-}" ]; then
-        timeouts=10 run_under=$runs_here
+        timeouts=25 run_under=$runs_here
         suites tsan "$here" unit "${again[@]}"
         suites tsan $((2 * here)) "$crowds"
         timeouts="" run_under=""
