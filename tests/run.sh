@@ -36,17 +36,23 @@ build() {
     [ ! "$out/normal/shaders/kernels.S" -nt "$out/$name/shaders/kernels.S" ] || rm -f "$out/$name/shaders/kernels.S"
     if CC="ccache $compiler" "${setup[@]}" >"$log" 2>&1 && ninja -C "$out/$name" ${targets-} >>"$log" 2>&1; then
         printf '%-10s %-8s built in %d s\n' "$name" "" $((SECONDS - begin)) >"$out/$name.said"
-        echo yes >"$out/$name.built"
+        tell "$name" yes
     else
         { tail -60 "$log"; printf '%-10s %-8s DOES NOT BUILD (%s)\n' "$name" "" "$log"; } >"$out/$name.said"
-        echo no >"$out/$name.built"
+        tell "$name" no
     fi
+}
+
+# Name, yes or no, for built(): a file that is there holds what is said in it.
+tell() {
+    echo "$2" >"$out/$1.built.new"
+    mv "$out/$1.built.new" "$out/$1.built"
 }
 
 # Waits for a build and shows what is said of it; a broken one is counted.
 built() {
     until [ -f "$out/$1.built" ]; do
-        kill -0 "${others-}" 2>/dev/null || { echo "$1 was not built" >"$out/$1.said"; echo no >"$out/$1.built"; }
+        kill -0 "${others-}" 2>/dev/null || [ -f "$out/$1.built" ] || { echo "$1 was not built" >"$out/$1.said"; tell "$1" no; }
         sleep 1
     done
     cat "$out/$1.said"
@@ -54,14 +60,14 @@ built() {
 }
 
 # name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
-# shown with its output, and every suite is counted. Tests have four times their limit: machines are shared, and others
+# shown with its output, and every suite is counted. Tests have ten times their limit: machines are shared, and others
 # build beside them. `only` names those that run, `but` suites whose tests do not.
 suites() {
     local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/testlog told p f s
     shift 2
     rm -f "$log".{json,txt}
     ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" ${but+"${but[@]/#/--no-suite=}"} --print-errorlogs ${only-} \
-        --num-processes "$at_once" --timeout-multiplier "${timeouts:-4}" >"$out/$name-$1.log" 2>&1 || true
+        --num-processes "$at_once" --timeout-multiplier "${timeouts:-10}" >"$out/$name-$1.log" 2>&1 || true
     told=$(python3 tests/counts.py "$name" "$log.json" "$out/why.txt" "$@")
     echo "${told%$'\n'*}"
     read -r p f s <<<"${told##*$'\n'}"
@@ -133,7 +139,7 @@ fi
 
 unset but
 if built asan; then
-    timeouts=6 run_under="env LD_PRELOAD=$out/keep-loaded.so"
+    timeouts=15 run_under="env LD_PRELOAD=$out/keep-loaded.so"
     suites asan "$here" unit "${again[@]}" fuzz
     suites asan $((2 * here)) "$attacks"
     only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
@@ -152,7 +158,7 @@ if built tsan; then
         runs_here="setarch -R"
     fi
     if [ -n "${runs_here-}" ]; then
-        timeouts=10 run_under=$runs_here
+        timeouts=25 run_under=$runs_here
         suites tsan "$here" unit "${again[@]}"
         suites tsan $((2 * here)) "$crowds"
         timeouts="" run_under=""

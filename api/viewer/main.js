@@ -174,12 +174,14 @@ async function lookAt({detail: pixel}) {
   const found = await points.find(pixel).catch(() => null);
   if (!found) return say("Nothing there");
   const {eye, target} = stage.camera;
+  let own = stage.camera; // until a link or a hand puts another in its place
   const began = performance.now(),
     span = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : 300; // ms
   const step = (now) => {
+    if (stage.camera !== own) return;
     const t = Math.min(1, Math.max(0, (now - began) / span));
     const s = t * t * (3 - 2 * t);
-    stage.setCamera({...stage.camera, eye, target: target.map((x, i) => x + s * (found.position[i] - x))});
+    stage.setCamera((own = {...own, eye, target: target.map((x, i) => x + s * (found.position[i] - x))}));
     if (t < 1) requestAnimationFrame(step);
   };
   requestAnimationFrame(step);

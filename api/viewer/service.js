@@ -13,6 +13,7 @@ let pass = ""; // what a signed page adds to its requests for its dataset
 export const setPass = (parameters) => (pass = parameters);
 
 const TOKEN = "splatd-token";
+const KEPT_MS = 60000; // what is saved, until the browser has surely begun to
 export const setToken = (token) => sessionStorage.setItem(TOKEN, token);
 export const hasToken = () => Boolean(sessionStorage.getItem(TOKEN));
 
@@ -60,7 +61,7 @@ export async function download(path, name) {
   link.href = sessionStorage.getItem(TOKEN) ? URL.createObjectURL(await (await ask(path)).blob()) : path;
   link.download = name;
   link.click();
-  if (link.href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  if (link.href.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(link.href), KEPT_MS);
 }
 
 /** Saves a text as a file. */
@@ -69,7 +70,7 @@ export function save(text, type, name) {
   link.href = URL.createObjectURL(new Blob([text], {type}));
   link.download = name;
   link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  setTimeout(() => URL.revokeObjectURL(link.href), KEPT_MS);
 }
 
 /** Parameters of a view as a query, vectors joined by commas, texts of a list one by one; what is null or "" is left out. */

@@ -42,14 +42,18 @@ KEYS = {  # path -> what is hashed
 }
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+class Connection(http.client.HTTPConnection):
+    """To a socket in the file system: a port that is free now may be somebody's when nginx comes to it."""
+
+    def connect(self):
+        self.sock = socket.socket(socket.AF_UNIX)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self.place)
 
 
-def ask(port, path):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+def ask(place, path):
+    connection = Connection("127.0.0.1", timeout=120)
+    connection.place = place
     connection.request("GET", path)
     answer = connection.getresponse()
     result = answer.status, answer.getheader("X-Key"), answer.read()
@@ -66,35 +70,35 @@ with tempfile.TemporaryDirectory() as top, contextlib.ExitStack() as stack:
     for name in ids:
         shutil.copy(WALL, os.path.join(top, f"{name}.spld"))
     daemons = [stack.enter_context(Daemon(FAKE, "--cache", "0", datasets=[top])) for _ in range(3)]
-    port = free_port()
+    place = f"{top}/socket"
     kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     folders = "".join(f"{kind}_temp_path {top}/{kind};" for kind in kinds)
     servers = "".join(f"server 127.0.0.1:{d.port};" for d in daemons)
     pathlib.Path(top, "nginx.conf").write_text(
         f"pid {top}/pid; error_log {top}/error.log; daemon off; events {{}} http {{ {folders} access_log off;\n"
         f"{SNIPPET}\n"
-        f"upstream pods {{ hash {VARIABLE} consistent; {servers} }} server {{ listen 127.0.0.1:{port};"
+        f"upstream pods {{ hash {VARIABLE} consistent; {servers} }} server {{ listen unix:{place};"
         f"location / {{ add_header X-Key {VARIABLE} always; proxy_set_header Host $host; proxy_pass http://pods; }} }} }}")
     process = subprocess.Popen([NGINX, "-c", f"{top}/nginx.conf", "-p", top], stderr=subprocess.DEVNULL)
     try:
         def answers():
             assert process.poll() is None, pathlib.Path(top, "error.log").read_text()
             try:
-                return ask(port, "/v1/status")[0] == 200
+                return ask(place, "/v1/status")[0] == 200
             except OSError:
                 return False
-        eventually(answers, 60)
-        got = {path: ask(port, path)[1] for path in KEYS}
+        eventually(answers, 120)
+        got = {path: ask(place, path)[1] for path in KEYS}
         assert got == KEYS, {path: key for path, key in got.items() if KEYS[path] != key}
         for name in ids:
             before = [frames(d) for d in daemons]
             for i in range(4):
                 path = f"/v1/datasets/{urllib.parse.quote(name)}/view?width=16&height=16&near=0.{i + 1}"
-                assert ask(port, path)[0] == 200
+                assert ask(place, path)[0] == 200
             served = sorted(frames(d) - n for d, n in zip(daemons, before))
             assert served == [0, 0, 4], (name, served)
         assert all(frames(d) for d in daemons), [frames(d) for d in daemons]
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(120)
 print(f"{len(KEYS)} paths, {len(ids)} datasets, {len(daemons)} daemons")

@@ -205,44 +205,64 @@ def promtool():
     return wrong
 
 
-def prometheus(d):
-    """Expressions that a real Prometheus refuses, or that find nothing in what it scraped from a real daemon."""
+def free_port():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
-        port = s.getsockname()[1]
+        return s.getsockname()[1]
+
+
+def stalled(d):
+    """Turns of the daemon's loop that took longer than the alert of its stalls has it, on a machine that others use too."""
+    text = d.ops("/metrics").body.decode()
+    count, quick = (float(re.search(rf"^splatd_loop_turn_seconds_{name} (\S+)$", text, re.M)[1]) for name in ("count", r'bucket\{le="0\.25"\}'))
+    return count - quick
+
+
+def prometheus(d, tries=5):
+    """Expressions that a real Prometheus refuses, or that find nothing in what it scraped from a real daemon."""
     with tempfile.TemporaryDirectory() as top:
         config = yaml.safe_load((ROOT / SCRAPE).read_text())
         config["global"] = {"evaluation_interval": "1s"}
         config["rule_files"] = [str(ROOT / RULES)]
-        config["scrape_configs"][0].update(scrape_interval="1s", scrape_timeout="1s")
+        config["scrape_configs"][0].update(scrape_interval="2s", scrape_timeout="2s")
         config["scrape_configs"][0]["static_configs"][0]["targets"] = [f"127.0.0.1:{d.ops_port}"]
         pathlib.Path(top, "prometheus.yml").write_text(yaml.safe_dump(config))
-        process = subprocess.Popen(
-            [
-                PROMETHEUS,
-                f"--config.file={top}/prometheus.yml",
-                f"--storage.tsdb.path={top}/data",
-                f"--web.listen-address=127.0.0.1:{port}",
-                "--log.level=error",
-            ]
-        )
+        process = port = None
+
+        def start():
+            nonlocal process, port
+            port = free_port()
+            process = subprocess.Popen(
+                [
+                    PROMETHEUS,
+                    f"--config.file={top}/prometheus.yml",
+                    f"--storage.tsdb.path={top}/data",
+                    f"--web.listen-address=127.0.0.1:{port}",
+                    "--log.level=error",
+                ]
+            )
 
         def ask(expression):
+            nonlocal tries
+            if process.poll() is not None and tries:  # somebody may have taken the port meanwhile
+                tries -= 1
+                start()
             url = f"http://127.0.0.1:{port}/api/v1/query?" + urllib.parse.urlencode({"query": expression})
             try:
-                with urllib.request.urlopen(url, timeout=60) as answer:
+                with urllib.request.urlopen(url, timeout=120) as answer:
                     return json.load(answer)["data"]["result"]
             except urllib.error.HTTPError as error:
                 return [] if error.code == 503 else error.read().decode()  # 503: it is not ready
             except OSError:
                 return []
 
+        start()
         try:
-            eventually(lambda: ask("splatd_ready == 1"), 120)
+            eventually(lambda: isinstance(found := ask("splatd_ready == 1"), list) and found, 300)
             rules, dashboard = yaml.safe_load((ROOT / RULES).read_text()), json.loads((ROOT / DASHBOARD).read_text())
             alerts = {rule.get("alert") for group in rules["groups"] for rule in group["rules"]}
             wanted = [(where, e) for where, e in expressions(rules, dashboard) if where not in alerts]
-            left, end = wanted, time.monotonic() + 120
+            left, end = wanted, time.monotonic() + 300
             while left and time.monotonic() < end:
                 use(d)
                 answers = [(where, e, ask(e)) for where, e in left]
@@ -255,6 +275,7 @@ def prometheus(d):
                 if where in alerts and isinstance(ask(e), str):
                     wrong.append(f"{where}: {ask(e)}")
             firing = [alert["metric"]["alertname"] for alert in ask('ALERTS{alertstate="firing"}')]
+            firing = [name for name in firing if name != "SplatdLoopStalls" or stalled(d) < 3]
             return wrong + [f"{name} fires at a daemon that is well" for name in firing]
         finally:
             process.terminate()

@@ -93,7 +93,7 @@ def check_at_once(survey):
     running = [subprocess.Popen([SPLATD, "pack", "--part", str(part), survey.job, "--threads", "1"], stderr=subprocess.DEVNULL)
                for part in list(range(PARTS)) * 2]
     for process in running:
-        assert process.wait(60) == 0
+        assert process.wait(600) == 0
     survey.check()
 
 
@@ -108,7 +108,7 @@ def check_failures(survey):
     scan.write_bytes(whole)
     killer = survey.bin / "killed"
     for delay in "0.01", "0.03", "0.06", "0.1":
-        killer.write_text(f'#!/bin/sh\n"{SPLATD}" "$@" & sleep {delay}; kill -9 $!; exit 137\n')
+        killer.write_text(f'#!/bin/sh\n"{SPLATD}" "$@" & sleep {delay}; kill -9 $!; wait $!; exit 137\n')
         killer.chmod(0o755)
         made = survey.make("-k", "parts", splatd=killer)
         assert made.returncode, made.stdout  # whichever was done before it was killed is whole
@@ -147,6 +147,30 @@ def check_headers(survey, top):
     assert {s["name"] for s in whole["streams"]} <= {s["name"] for s in joined["streams"]}, joined["streams"]
 
 
+def in_part(command, number, whole, how):
+    """The process of the command, stopped or killed by the signal `how` after it has begun the part of that number, and before
+    it has replaced the file `whole`. One that was done before the signal came begins once more, where the file was as it is now."""
+    def version():
+        return whole.stat().st_ino if whole.exists() else None
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        before = version()
+        running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        for line in running.stderr:
+            if line.startswith(f"part {number} of"):
+                break
+        os.kill(running.pid, how)
+        came = os.waitid(os.P_PID, running.pid, os.WEXITED | os.WSTOPPED | os.WNOWAIT).si_code
+        if came != os.CLD_EXITED and version() == before:
+            return running
+        running.send_signal(signal.SIGCONT)
+        said = running.communicate()[1]
+        assert running.returncode in (0, -signal.SIGKILL), (running.returncode, said)
+        if before is None:
+            whole.unlink(missing_ok=True)
+    raise AssertionError(f"part {number}: the process was done each time before the signal came")
+
+
 def check_leftovers(survey, command, whole, parts):
     """Of another number of parts nothing stays; what is a user's does; two at once are told; scans written meanwhile are read."""
     first = whole.read_bytes()
@@ -156,17 +180,12 @@ def check_leftovers(survey, command, whole, parts):
         (parts / name).write_text("of a plan before")
     (parts / "job.json").write_text("{}")
     assert subprocess.run(others, stderr=subprocess.DEVNULL).returncode == 0 and not parts.exists(), list(parts.iterdir())
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as running:
-        for line in running.stderr:
-            if line.startswith("part 2 of"):
-                break
-        running.send_signal(signal.SIGSTOP)
+    with in_part(command, 2, whole, signal.SIGSTOP) as running:
         second = subprocess.run(command, stderr=subprocess.PIPE, text=True)
         assert second.returncode == 2 and "another splatd packs these parts" in second.stderr, second.stderr
         running.kill()
     (parts / "notes.txt").write_text("mine")
-    time.sleep(0.01)
-    (survey.scans / "scan 0.ply").touch()
+    os.utime(survey.scans / "scan 0.ply", (time.time() + 60,) * 2)  # however coarse the disk's clock is
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 0 and "it is packed anew" in done.stderr and "it is left" in done.stderr, done.stderr
     assert sorted(p.name for p in parts.iterdir()) == ["job.json", "notes.txt"] and whole.read_bytes() == first
@@ -182,12 +201,8 @@ def check_one_file(survey, top):
     assert survey.run("--join", survey.truth).returncode == 0  # without the title again, for all others
     command = [SPLATD, "pack", "--parts", str(PARTS), survey.scans, "-o", whole, "--title", "Parts"]
     for part in range(PARTS):
-        running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        for line in running.stderr:
-            if line.startswith(f"part {part + 1} of {PARTS}"):
-                break
-        running.kill()
-        running.communicate()
+        with in_part(command, part + 1, whole, signal.SIGKILL):
+            pass
         assert not whole.exists() and parts.is_dir(), part
         assert (parts / f"part-{part - 1}.spld").exists() or not part, part
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True)

@@ -13,7 +13,15 @@ import threading
 import time
 
 BINARY = os.environ.get("CHROMIUM") or shutil.which("chromium")
-PATIENCE = 60  # seconds; a busy machine may be slow, a broken page never gets there
+PATIENCE = 120  # seconds; a busy machine may be slow, a broken page never gets there
+APART = 0.5  # seconds between clicks that are no double click, for the page
+# What the page asks for, as it asks. (The browser's own list of resources has a request some time after its reply.)
+FETCHED = """(usual => { window.fetched = []; window.fetch = (path, how) => {
+    fetched.push(new URL(path, location.href).href);
+    return usual(path, how); }; })(fetch);"""
+# Pointers that have come up again, as the page hears of it.
+LIFTED = """window.lifted = 0;
+    for (const name of ['pointerup', 'pointercancel']) addEventListener(name, () => lifted++, true);"""
 KEYS = {
     "ArrowLeft": 37,
     "ArrowUp": 38,
@@ -55,6 +63,10 @@ class Browser:
                 "--disable-background-networking",
                 "--disable-component-update",
                 "--hide-scrollbars",
+                "--allow-pre-commit-input",
+                "--disable-renderer-backgrounding",
+                "--disable-background-timer-throttling",
+                "--disable-hang-monitor",
                 "about:blank",
             ],
             stdout=self.log,
@@ -66,6 +78,7 @@ class Browser:
         os.close(to_browser)
         os.close(from_browser)
         self.numbers, self.replies, self.listeners = itertools.count(1), {}, {}
+        self.writing = threading.Lock()  # long messages are no single write
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self):
@@ -84,7 +97,10 @@ class Browser:
         number, answer = next(self.numbers), queue.Queue()
         self.replies[number] = answer
         message = {"id": number, "method": method, "params": params, **({"sessionId": session} if session else {})}
-        os.write(self.out, json.dumps(message).encode() + b"\0")
+        with self.writing:
+            data = json.dumps(message).encode() + b"\0"
+            while data:
+                data = data[os.write(self.out, data):]
         reply = answer.get(timeout=PATIENCE)
         if "error" in reply:
             raise AssertionError(f"{method}: {reply['error']['message']}")
@@ -112,7 +128,7 @@ class Page:
     script that runs before the page's own."""
 
     def __init__(self, browser, url, size=(900, 600), phone=False, dark=False, before=""):
-        self.browser, self.complaints = browser, []
+        self.browser, self.complaints, self.clicked = browser, [], 0.0
         self.target = browser.send("Target.createTarget", url="about:blank")["targetId"]
         self.session = browser.send("Target.attachToTarget", targetId=self.target, flatten=True)["sessionId"]
         browser.listeners[self.session] = self._hear
@@ -123,7 +139,7 @@ class Page:
             "Emulation.setEmulatedMedia",
             features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
         )
-        self.send("Page.addScriptToEvaluateOnNewDocument", source=before)
+        self.send("Page.addScriptToEvaluateOnNewDocument", source=FETCHED + LIFTED + before)
         self.go(url)
 
     def _hear(self, method, params):
@@ -178,9 +194,14 @@ class Page:
         self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
     def click(self, x, y, times=1):
+        """`times` clicks are a few hundredths of a second apart, whenever the browser gets to them; those of two calls are
+        none that belong together."""
+        time.sleep(max(0, self.clicked + APART - time.time()))
+        begin = time.time()
         for count in range(1, times + 1):
-            self.mouse("mousePressed", x, y, button="left", clickCount=count)
-            self.mouse("mouseReleased", x, y, button="left", clickCount=count)
+            for i, kind in enumerate(("mousePressed", "mouseReleased")):
+                self.mouse(kind, x, y, button="left", clickCount=count, timestamp=begin + 0.04 * (count - 1) + 0.02 * i)
+        self.clicked = time.time()
 
     def drawn(self):
         """Waits for the page's parts and two frames: browsers drop what comes before a page's first picture."""
@@ -207,6 +228,7 @@ class Page:
 
     def touch(self, *moves):
         """Fingers along `moves`, each a list of points, one a finger."""
+        before = self.run("lifted")
         for i, points in enumerate([*moves, []]):
             kind = "touchStart" if i == 0 else "touchMove" if points else "touchEnd"
             self.send(
@@ -214,12 +236,14 @@ class Page:
                 type=kind,
                 touchPoints=[{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)],
             )
+        self.until(f"lifted >= {before + len(moves[0])}", "the page hears that fingers are up")
 
-    def key(self, key, hold=0.0, shift=False):
+    def key(self, key, hold="true", shift=False):
+        """It stays down until `hold` is true."""
         code = KEYS.get(key) or ord(key.upper())
         common = dict(key=key, windowsVirtualKeyCode=code, modifiers=8 if shift else 0)
         self.send("Input.dispatchKeyEvent", type="keyDown", **common, **({"text": "\r"} if key == "Enter" else {}))
-        time.sleep(hold)
+        self.until(hold)
         self.send("Input.dispatchKeyEvent", type="keyUp", **common)
 
     def choose(self, selector, value):

@@ -6,7 +6,6 @@ import math
 import os
 import pathlib
 import re
-import shlex
 import socket
 import subprocess
 import sys
@@ -17,7 +16,7 @@ import urllib.request
 HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
-from harness import FAKE, MAPPED, REAL, WALL, Daemon, run, together
+from harness import FAKE, MAPPED, REAL, WALL, Daemon, eventually, run, together
 from splatd import Splatd, SplatdError, ring, sign
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
@@ -33,7 +32,7 @@ def shell(daemon, *arguments, code=0, folder=None, **environment):
     done = subprocess.run(
         [CLIENTS / "splatd.sh", *arguments],
         capture_output=True,
-        timeout=120,
+        timeout=600,
         cwd=folder,
         env={**os.environ, "SPLATD_URL": url(daemon) + "/", **environment},
     )
@@ -141,8 +140,13 @@ def test_a_busy_service_is_asked_again():
         def views(patience):
             return together(4, lambda i: Splatd(url(d), patience=patience).dataset("wall").view(lod=i, **SMALL))
 
-        refused = [view for view in views(0) if isinstance(view, SplatdError)]
-        assert refused and all(error.status == 503 for error in refused), refused
+        refused = []
+
+        def is_refused():  # not where threads begin one after the other, each when the frame before it is done
+            refused.extend(view for view in views(0) if isinstance(view, Exception))
+            return refused
+        eventually(is_refused, 120)
+        assert all(isinstance(error, SplatdError) and error.status == 503 for error in refused), refused
         found = views(120)
         assert all(not isinstance(view, Exception) and view.bytes for view in found), found
         assert d.status()["counters"]["refused_full"] > 0
@@ -152,7 +156,7 @@ def test_python_on_the_command_line():
     with Daemon(REAL) as d:
         command = [sys.executable, CLIENTS / "splatd.py", url(d), "wall"]
         done = subprocess.run(
-            [*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=60
+            [*command, "eye=3,0,1", "target=0,0,1", "width=64", "height=48"], capture_output=True, timeout=600
         )
         assert done.returncode == 0 and done.stdout.startswith(JPEG), done
         for arguments, code, said in [
@@ -164,14 +168,22 @@ def test_python_on_the_command_line():
             (command[:3], 2, "DATASET is missing\nusage: "),
             ([*command, "lod=1", "layer"], 2, "'layer' is not NAME=VALUE\nusage: "),
         ]:
-            done = subprocess.run(arguments, capture_output=True, timeout=60)
+            done = subprocess.run(arguments, capture_output=True, timeout=600)
             assert done.returncode == code and not done.stdout, done
             assert done.stderr.decode().startswith("splatd.py: ") and said in done.stderr.decode(), done
-        done = subprocess.run([*command[:2], "--help"], capture_output=True, text=True, timeout=60)
+        done = subprocess.run([*command[:2], "--help"], capture_output=True, text=True, timeout=600)
         assert done.returncode == 0 and "usage: " in done.stdout and "eye=" in done.stdout, done
-        done = subprocess.run(["script", "-qec", shlex.join(map(str, command)), "/dev/null"], capture_output=True, timeout=60)
-        assert done.returncode == 2 and b"> FILE" in done.stdout and b"\xff\xd8" not in done.stdout, done
-        done = subprocess.run([*command[:2], url(d).removeprefix("http://"), "wall", "width=64"], capture_output=True, timeout=60)
+        terminal, end = os.openpty()
+        done = subprocess.run(command, stdout=end, stderr=subprocess.PIPE, timeout=600)
+        os.set_blocking(terminal, False)
+        try:
+            shown = os.read(terminal, 1000)
+        except OSError:  # nothing
+            shown = b""
+        os.close(end)
+        os.close(terminal)
+        assert done.returncode == 2 and b"> FILE" in done.stderr and not shown, (done, shown)
+        done = subprocess.run([*command[:2], url(d).removeprefix("http://"), "wall", "width=64"], capture_output=True, timeout=600)
         assert done.returncode == 0 and done.stdout.startswith(JPEG), done
 
 
@@ -314,7 +326,7 @@ def test_the_examples_of_the_readmes():
                     [sys.executable, "-c", program],
                     check=True,
                     cwd=folder,
-                    timeout=120,
+                    timeout=600,
                     env={**os.environ, "PYTHONPATH": client},
                 )
                 views = {file.read_bytes() for file in pathlib.Path(folder).glob("view*.jpg")}
@@ -332,7 +344,7 @@ def test_pictures_need_no_display():
         for more in {}, {"DISPLAY": ":97", "WAYLAND_DISPLAY": "wayland-97", "XDG_SESSION_TYPE": "x11"}:
             kept = {name: os.environ[name] for name in os.environ if not re.match("DISPLAY|WAYLAND|XDG_|XAUTH", name)}
             file = pathlib.Path(folder, "view.png")
-            done = subprocess.run([REAL, "render", WALL, "--size", "64x48", "-o", file], env={**kept, **more}, capture_output=True, timeout=120)
+            done = subprocess.run([REAL, "render", WALL, "--size", "64x48", "-o", file], env={**kept, **more}, capture_output=True, timeout=600)
             assert done.returncode == 0, done.stderr
             pictures.add(file.read_bytes())
     assert len(pictures) == 1

@@ -26,7 +26,7 @@ SMALLER = [("synth", " -o ", "--points 3000"), ("synth", "--print-views", "--siz
 
 
 def help_of(command):
-    return subprocess.run([REAL, command, "--help"], capture_output=True, text=True, check=True, timeout=60).stdout
+    return subprocess.run([REAL, command, "--help"], capture_output=True, text=True, check=True, timeout=600).stdout
 
 
 def complete(text):
@@ -55,7 +55,7 @@ def examples():
 
 
 def bash(command, folder, **environment):
-    return subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, errors="replace", timeout=120,
+    return subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, errors="replace", timeout=600,
                           env={**os.environ, **environment})
 
 
@@ -102,7 +102,8 @@ def test_commands():
         pathlib.Path(full, "groundtruth.txt").write_text("1 3 0 1 0 0 0 1\n2 3 0 2 0 0 0 1\n")
         pathlib.Path(full, "keys.json").write_text('{"keyframes": [{"camera": {"eye": [3, 0, 1], "target": [0, 0, 1], "fov": 60}},'
                                                    ' {"camera": {"eye": [2, 1, 1], "target": [0, 0, 1], "fov": 60}}], "fps": 2}')
-        shutil.copytree(ROOT / "api/examples", pathlib.Path(full, "api/examples"))
+        shutil.copytree(ROOT / "api/examples", pathlib.Path(full, "api/examples"),
+                        ignore=shutil.ignore_patterns("__pycache__"))  # which another test may be writing
         key = pathlib.Path(full, "url.key")
         key.write_text("0123456789abcdef0123456789abcdef\n")
         key.chmod(0o600)

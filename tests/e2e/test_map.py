@@ -44,7 +44,7 @@ def make_scene(folder):
     made = {}
     for name, crs in (("town", "EPSG:25832"), ("yard", "none")):
         made[name] = str(pathlib.Path(folder, f"{name}.spld"))
-        subprocess.run([REAL, "pack", scan, "--crs", crs, "--unit", "m", "-o", made[name]], check=True, capture_output=True, timeout=120)
+        subprocess.run([REAL, "pack", scan, "--crs", crs, "--unit", "m", "-o", made[name]], check=True, capture_output=True, timeout=600)
     return made
 
 

@@ -21,7 +21,7 @@ import zipfile
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "http"))
 import browser
 from browser import Browser, Page
-from harness import FAKE, MAPPED, REAL, TEXTURED, WALL, Daemon, run
+from harness import FAKE, MAPPED, REAL, TEXTURED, WALL, Daemon, eventually, run
 
 if not browser.BINARY:
     print("skipped: there is no chromium")
@@ -41,8 +41,15 @@ DIGEST_OF = """(c => {
     }
     return [h, colours.size, c.width, c.height]; })"""
 DIGEST = f"{DIGEST_OF}(document.querySelector('canvas'))"
-VIEWS = """performance.getEntriesByType('resource').filter(e => e.name.includes('/view?'))
-    .map(e => [e.name, e.startTime, e.responseEnd])"""
+VIEWS = "fetched.filter(url => url.includes('/view?'))"
+# Frames that are counted: time stands still once `left` of them have come, so that what moves moves as far everywhere.
+STEPS = """(usual => { window.left = 0; let now = 0; window.requestAnimationFrame = step => usual(() => {
+    if (left > 0) { left--; now += 16; }
+    step(now); }); })(requestAnimationFrame)"""
+# Whether a picture was ever bent: it is straight again as soon as the next frame has come.
+BENT = """(canvas => { window.bent = false;
+    new MutationObserver(() => { window.bent ||= canvas.style.transform.startsWith('matrix3d'); })
+        .observe(canvas, {attributes: true}); })(document.querySelector('canvas'))"""
 
 chromium = Browser()
 daemon = Daemon(REAL)
@@ -76,21 +83,25 @@ def settled(tab, before=None):
 
 
 def link(tab):
+    return read_link(tab.run("location.hash"))
+
+
+def read_link(text):
     """The fragment as {name: text}, vectors as lists of floats."""
-    found = dict(urllib.parse.parse_qsl(tab.run("location.hash").removeprefix("#")))
+    found = dict(urllib.parse.parse_qsl(text.removeprefix("#")))
     return {k: [float(x) for x in v.split(",")] if k in ("eye", "target", "up") else v for k, v in found.items()}
 
 
 def moved(tab, camera):
     """Waits until the fragment has another eye or target, at rest."""
-    tab.until(REST)
     return next_link(tab, lambda now: now["eye"] != camera["eye"] or now["target"] != camera["target"])
 
 
 def next_link(tab, wanted):
+    """The fragment at rest, once it is as wanted: in the middle of a motion the page may rest, too, and say where it is."""
     end = time.monotonic() + browser.PATIENCE
-    while not wanted(now := link(tab)):
-        assert time.monotonic() < end, now
+    while not (text := tab.run(f"{REST} && location.hash")) or not wanted(now := read_link(text)):
+        assert time.monotonic() < end, link(tab)
         time.sleep(0.05)
     return now
 
@@ -203,9 +214,8 @@ def test_dragging_orbits_and_pans():
     with page() as tab:
         start, digest = link(tab), settled(tab)
         x, y = middle(tab)
-        tab.drag(
-            (x, y), (x + 60, y + 20), hold="document.querySelector('canvas').style.transform.startsWith('matrix3d')"
-        )
+        tab.run(BENT)
+        tab.drag((x, y), (x + 60, y + 20), hold="bent")
         orbited, digest = moved(tab, start), settled(tab, digest)
         assert orbited["target"] == start["target"] and abs(far(orbited["eye"], orbited["target"]) - 3) < 0.01
         assert orbited["eye"][2] > 1.1, "dragging down must show more from above"
@@ -235,14 +245,14 @@ def test_only_one_frame_is_asked_for_at_a_time():
         x, y = middle(tab)
         tab.drag((x, y), (x + 100, y + 30), steps=25)
         settled(tab)
-        views = sorted(tab.run(VIEWS), key=lambda v: v[1])
-        coarse = [v for v in views if "budget=60ms" in v[0]]
-        assert 1 <= len(coarse) <= 26 and "budget" not in views[-1][0], views
+        views = tab.run(VIEWS)
+        coarse = [url for url in views if "budget=60ms" in url]
+        assert 1 <= len(coarse) <= 26 and "budget" not in views[-1], views
         assert tab.run("[most, flying]") == [1, 0]
 
 
 def test_the_keyboard_does_all_of_it():
-    with page() as tab:
+    with page(before=STEPS) as tab:
         start, digest = link(tab), settled(tab)
         for _ in range(2):
             tab.key("Tab")
@@ -259,7 +269,8 @@ def test_the_keyboard_does_all_of_it():
             "-": lambda a, b: far(b["eye"], b["target"]) > far(a["eye"], a["target"]),
         }
         for key, right in steps.items():
-            tab.key(key, hold=0.05)
+            tab.run("left = 4")
+            tab.key(key, hold="left === 0")
             now = moved(tab, start)
             assert right(start, now), (key, start, now)
             start = now
@@ -282,7 +293,6 @@ def test_clicks_give_coordinates_and_a_distance():
         x, y = middle(tab)
         tab.click(x + 60, y - 40)
         tab.until("document.querySelectorAll('#points dd').length === 1")
-        time.sleep(0.4)  # not a double click
         tab.run("document.querySelector('#stage').focus()")
         tab.key("Enter")
         tab.until("document.querySelectorAll('#points dd').length === 2")
@@ -393,7 +403,7 @@ def test_colours_and_shading():
 
 def asked(tab):
     """The parameters of the newest view that was asked for."""
-    return dict(urllib.parse.parse_qsl(tab.run(VIEWS)[-1][0].split("?", 1)[1]))
+    return dict(urllib.parse.parse_qsl(tab.run(VIEWS)[-1].split("?", 1)[1]))
 
 
 def test_layers_are_asked_for_with_what_they_take():
@@ -495,7 +505,7 @@ def test_dark_and_light():
     grounds = []
     for dark in (False, True):
         with page(dark=dark) as tab:
-            grounds.append(urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])["background"][0])
+            grounds.append(urllib.parse.parse_qs(tab.run(VIEWS)[-1])["background"][0])
             assert tab.run(
                 "getComputedStyle(document.body).colorScheme || getComputedStyle(document.documentElement).colorScheme"
             )
@@ -614,7 +624,7 @@ def test_the_service_renders_tours():
             assert len(pictures) == frames and all(picture.startswith(b"\xff\xd8") for picture in pictures)
             tab.press_on("#cancel")
             tab.until("document.querySelector('#making').hidden")
-            assert not d.ask("/v1/tours").json()["tours"]
+            eventually(lambda: not d.ask("/v1/tours").json()["tours"], browser.PATIENCE)  # the page does not wait for it
     with page() as tab:
         assert tab.run("document.querySelector('#making-of').hidden"), "a service without a place for tours"
 
@@ -675,7 +685,7 @@ def test_several_datasets_are_a_gallery():
             for size, phone, dark in (((1280, 800), False, False), ((390, 844), True, True)):
                 address = f"{site}/#clip=x%3C5" if phone else f"{site}/"  # kept in pictures and links
                 with page(address, ready=f"{CARDS}.length === 2 && {PICTURES}", size=size, phone=phone, dark=dark) as tab:
-                    asked = tab.run("performance.getEntriesByType('resource').map(e => e.name).filter(n => n.includes('thumbnail'))")
+                    asked = tab.run("fetched.filter(url => url.includes('thumbnail'))")
                     assert all(("clip=x%3C5" in url) == phone for url in asked + tab.run(f"{CARDS}.map(a => a.href)")) and asked, asked
                     assert tab.run(f"{CARDS}.map(a => a.querySelector('strong').textContent)") == ["The <i>site</i>", "wall"]
                     assert tab.text("title").startswith("Datasets")
@@ -719,8 +729,7 @@ def test_the_first_view_fits_the_window():
                 assert across(tab) > fit[0] - 0.1, (across(tab), fit)
                 tall = link(tab)["fov"]
                 tab.resize((1280, 500))
-                next_link(tab, lambda now: now["fov"] != tall)
-                assert across(tab) > fit[0] - 0.1, (across(tab), fit)
+                next_link(tab, lambda now: now["fov"] != tall and across(tab) > fit[0] - 0.1)
 
 
 def test_wrong_links_say_so():
@@ -763,7 +772,7 @@ def test_atoms_are_offered_where_there_are_textures():
         with page(f"http://127.0.0.1:{other.port}/{close}&atoms=0") as tab:
             assert tab.run(DIGEST)[0] == mean[0], "the address has them"
         with page(f"http://127.0.0.1:{other.port}/embed/wall-textured{close}&atoms=0") as tab:
-            assert any("atoms=0" in name for name, *_ in tab.run(VIEWS))
+            assert any("atoms=0" in name for name in tab.run(VIEWS))
 
 
 def test_maps_are_offered_where_there_are_any():
@@ -795,19 +804,19 @@ def test_maps_are_offered_where_there_are_any():
             tab.run("location.hash = '#dataset=wall-mapped&station=0'")
             tab.until(f"document.querySelector('#stations').value === '0' && {REST}")
         with page(f"{site}/embed/wall-mapped#station=0&target=0,0,1") as tab:
-            assert any("eye=2%2C0%2C1&target=0%2C0%2C1" in name.replace(",", "%2C") for name, *_ in tab.run(VIEWS)), tab.run(VIEWS)
+            assert any("eye=2%2C0%2C1&target=0%2C0%2C1" in name.replace(",", "%2C") for name in tab.run(VIEWS)), tab.run(VIEWS)
         with page(f"{site}/{look}&maps=off") as tab:
-            assert any("maps=off" in name for name, *_ in tab.run(VIEWS)), "the address has it"
+            assert any("maps=off" in name for name in tab.run(VIEWS)), "the address has it"
             assert tab.run("document.querySelector('#parameter-maps').value") == "off"
         with page(f"{site}/embed/wall-mapped{look}&maps=off") as tab:
-            assert any("maps=off" in name for name, *_ in tab.run(VIEWS))
+            assert any("maps=off" in name for name in tab.run(VIEWS))
 
 
 def test_a_pruned_dataset_says_what_is_left():
     with tempfile.TemporaryDirectory() as folder:
         for command in ("synth", "courtyard", "--points", "30000", "--format", "ply", "-o", folder), (
                 "pack", f"{folder}/courtyard.ply", "--prune", "10", "-o", f"{folder}/left.spld"):
-            subprocess.run([REAL, *command], check=True, capture_output=True, timeout=120)
+            subprocess.run([REAL, *command], check=True, capture_output=True, timeout=600)
         with Daemon(REAL, datasets=[f"{folder}/left.spld"]) as other:
             about = other.ask("/v1/datasets/left").json()
             assert about["leaf_splats"] < about["pruned"]["of"] / 5, about
@@ -861,10 +870,10 @@ def test_fill_has_its_own_controls():
         x, y = middle(tab)
         tab.drag((x, y), (x + 60, y), steps=10)
         settled(tab, digest)
-        moving = [v for v, _, _ in tab.run(VIEWS) if "budget=60ms" in v and "kernel=3" in v]
+        moving = [v for v in tab.run(VIEWS) if "budget=60ms" in v and "kernel=3" in v]
         assert moving and all(f"{name}={value}" in moving[-1] for name, value in wanted.items()), "looks as at rest"
     with page(url.replace("/#", "/embed/wall#")) as tab:
-        view = urllib.parse.parse_qs(tab.run(VIEWS)[-1][0])
+        view = urllib.parse.parse_qs(tab.run(VIEWS)[-1])
         assert {name: view[name][0] for name in FILL} == wanted
 
 
@@ -1044,7 +1053,7 @@ ROUND = "document.querySelector('#handles')"
 
 def sent(tab):
     """The parameters of the newest view that was asked for."""
-    return dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(tab.run(VIEWS)[-1][0]).query))
+    return dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(tab.run(VIEWS)[-1]).query))
 
 
 def test_what_the_link_says_of_what_is_drawn_is_kept():
@@ -1062,7 +1071,7 @@ def test_what_the_link_says_of_what_is_drawn_is_kept():
         x, y = middle(tab)
         tab.click(x, y)
         tab.until("document.querySelectorAll('#points dd').length === 1")
-        pick = tab.run("performance.getEntriesByType('resource').map(e => e.name).filter(n => n.includes('/pick?'))")[-1]
+        pick = tab.run("fetched.filter(url => url.includes('/pick?'))")[-1]
         assert {"clip": TERM, "near": "0.5", "far": "9"}.items() <= dict(urllib.parse.parse_qsl(urllib.parse.urlsplit(pick).query)).items()
         tab.click(x, y - 200)  # what is cut away is not there
         tab.until("document.querySelector('#said').textContent === 'Nothing there'")
@@ -1141,8 +1150,10 @@ def test_a_clip_box_has_handles():
                  "box:0,0,0,1,1,1 and box:2,0,0,3,1,1 and z:0..1e+2"]
         assert tab.run(again % json.dumps(texts)) == [*texts[:3], "-1<plane:0,0,3,0,0,1<1", *texts[4:7], "box:0,0,0,1,1,1 and z:0..100 and box:2,0,0,3,1,1"]
         endless = ["box:" + ",".join(["1" * 300] * 7) + "x", "z<1" + " " * 7000 + "x", "+" * 8000]  # a link freezes no page
-        took = tab.run("""import('/viewer/clip_terms.js').then(({parseClip}) => JSON.parse('%s').map(text => {
-            const begin = performance.now(); parseClip(text); return performance.now() - begin; }))""" % json.dumps(endless))
+        # the shortest of many: what does not come back in time, or ever, never does
+        took = tab.run("""import('/viewer/clip_terms.js').then(({parseClip}) => JSON.parse('%s').map(text =>
+            Math.min(...Array.from({length: 20}, () => {
+                const begin = performance.now(); parseClip(text); return performance.now() - begin; }))))""" % json.dumps(endless))
         assert max(took) < 500, took
 
 
@@ -1318,6 +1329,18 @@ def test_a_link_outlives_the_frames_before_it():
         tab.until(REST)
         tab.run("release()")
         tab.until("document.querySelector('#notice p').textContent.startsWith('Refused: ')")
+    late = """(usual => { window.waiting = null; window.requestAnimationFrame = step =>
+        waiting ? waiting.push(step) : usual(step); })(requestAnimationFrame)"""
+    with page(before=late) as tab:
+        tab.run("waiting = []")
+        tab.click(*middle(tab), times=2)
+        tab.until("waiting.length", "it begins to turn")
+        tab.run("location.hash = '#dataset=wall&eye=4,1,2&target=0,0,1.5'")
+        next_link(tab, lambda now: now["eye"] == [4, 1, 2])
+        tab.run("(steps => { waiting = null; steps.forEach(step => step(performance.now() + 99)); })(waiting)")
+        tab.drawn()
+        now = next_link(tab, lambda now: True)
+        assert now["eye"] == [4, 1, 2] and now["target"] == [0, 0, 1.5], now
 
 
 def test_trouble_is_told_and_passes():
@@ -1379,7 +1402,7 @@ def test_embed():
     term = "axis:0,0,0,0,0,1<0.5 or class:3"
     with page(f"{SITE}/embed/wall#eye=3,0,1&target=0,0,1&budget=500ms&soft={urllib.parse.quote(term)}&soft_opacity=0.5"
               "&clip=z%3C1.5&clip=x%3E-9&near=0.5&background=ffeedd&mark=0,0,1,The%20%3Cb%3Ewall", size=(400, 300)) as tab:
-        asked = [urllib.parse.unquote(name) for name, *_ in tab.run(VIEWS)]
+        asked = [urllib.parse.unquote(name) for name in tab.run(VIEWS)]
         kept = {"clip": "z<1.5 and x>-9", "near": "0.5", "background": "ffeedd"}
         assert kept.items() <= sent(tab).items() and tab.text(".marks text") == "The <b>wall", sent(tab)
         assert asked and all(f"soft={term}&soft_opacity=0.5" in url for url in asked), asked
@@ -1418,7 +1441,7 @@ def test_longitude_and_latitude():
         assert far(cut[:3], (0, 0, 1.2)) < 1e-3 and cut[3:] == [0, 0, 1], now  # in the world by now
         assert far(now["eye"], (3, 0, 1)) < 1e-3 and far(now["target"], (0, 0, 1)) < 1e-3 and "crs" not in now, now
     with page(f"{SITE}/embed/wall#{camera}", size=(400, 300)) as tab:
-        asked = [name for name, *_ in tab.run(VIEWS)]
+        asked = [name for name in tab.run(VIEWS)]
         assert all("eye=3%2C0%2C1&" in a or "eye=3,0,1&" in a for a in asked) and "crs" not in asked[0], asked
         digest = settled(tab)
         tab.drag((200, 150), (260, 150))
@@ -1518,7 +1541,7 @@ def test_a_signed_page_needs_no_token():
 
             def sign(path, expires="1h"):
                 command = [REAL, "sign", site + path, "--key", str(key), "--expires", expires]
-                return subprocess.run(command, capture_output=True, text=True, check=True, timeout=30).stdout.strip()
+                return subprocess.run(command, capture_output=True, text=True, check=True, timeout=600).stdout.strip()
             signed = sign("/embed/wall#eye=3,0,1&target=0,0,1")
             with elsewhere(site, f'{heard}<iframe width=400 height=300 src="{signed}"></iframe>') as url:
                 with page(url, ready="window.heard?.includes('camera')") as tab:

@@ -17,7 +17,7 @@ wrong = []
 def run(*arguments, code=0, words=""):
     """stdout; wants that exit code, and the words on stderr."""
     done = subprocess.run([SPLATD, "compare", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=60)
+                          timeout=600)
     if done.returncode != code or words not in done.stderr:
         wrong.append(f"compare {' '.join(arguments)}: exit {done.returncode}, {done.stderr!r} lacks {words!r}")
     return done.stdout

@@ -14,7 +14,7 @@ WIRE = 300
 
 
 def run(*arguments, code=0):
-    done = subprocess.run([SPLATD, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([SPLATD, *map(str, arguments)], capture_output=True, text=True, timeout=600)
     if done.returncode != code:
         sys.exit(f"{arguments}: exit code {done.returncode}, not {code}: {done.stderr}")
     return done

@@ -15,7 +15,7 @@ wrong = []
 
 def check(arguments, code, where):
     """Runs splatd; wants `code`, something on `where` and nothing on the other stream. Returns what was said."""
-    done = subprocess.run([SPLATD, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+    done = subprocess.run([SPLATD, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=600)
     said, silent = (done.stdout, done.stderr) if where == "stdout" else (done.stderr, done.stdout)
     if done.returncode != code or not said or silent:
         wrong.append(f"splatd {' '.join(arguments)}: exit {done.returncode}, stdout {done.stdout!r}, stderr {done.stderr!r}")
@@ -106,7 +106,7 @@ with tempfile.TemporaryDirectory() as folder:
             wrong.append(f"splatd tour -o {name}: {said!r}")
     # Each stage counts in a unit or not at all, and photographs and their share of the points are told apart.
     packed = folder + "/packed.spld"
-    said = subprocess.run([SPLATD, "pack", scan, "-o", packed], stderr=subprocess.PIPE, text=True, timeout=60).stderr
+    said = subprocess.run([SPLATD, "pack", scan, "-o", packed], stderr=subprocess.PIPE, text=True, timeout=600).stderr
     if "looking at colours: 1 scan in" not in said or re.search(r"^[a-z ,]*: \d+ in ", said, re.MULTILINE):
         wrong.append(f"pack's stages: {said!r}")
     text, told = (check(["info", *json_too, packed], 0, "stdout") for json_too in ([], ["--json"]))
