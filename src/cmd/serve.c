@@ -2,6 +2,7 @@
 #include "cmd/cmd.h"
 
 #include <getopt.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -179,6 +180,7 @@ int spl_cmd_serve(int argc, char **argv)
     struct spl_service_options o;
     struct flags flags = {0};
     struct spl_error err = {0};
+    signal(SIGHUP, SIG_IGN); // until it is heeded: whoever sends one so early wants read what is not read yet
     int rc = spl_service_options_init(&o, &err);
     if (!rc)
         rc = make_flags(&flags, &err);

@@ -543,6 +543,45 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert all(d.ask(tour["frame"].replace("{n}", str(i))).status == 409 for i in (7, 8, 9))
 
 
+def test_what_is_no_tours_stays():
+    """The folder may be an operator's, too: links are not followed, and nothing goes but what a tour writes."""
+    with Folder() as folder, Folder() as other, Folder() as whole:
+        with Daemon(FAKE, "--tours", str(whole)) as d:
+            done = ended(d, begin(d, body(3))["uri"])
+        state = json.loads((whole / done["name"] / "tour.json").read_text())
+        for name in "precious", "tour.json", "000000.jpg", ".tour.json.1-1":
+            (other / name).write_text("{}")
+        kept = {p.name for p in other.iterdir()}
+        for name in "fedcba9876543210", ".fedcba9876543211", "fedcba9876543212":
+            (folder / name).symlink_to(other if name[-1] != "2" else other / "nowhere")
+        (folder / "fedcba9876543213").write_text("a file")
+        foreign = folder / "fedcba9876543214"
+        foreign.mkdir()
+        for name in "mine.txt", ".hidden", "000001.jpg":
+            (foreign / name).write_text("x")
+        shutil.copytree(whole / done["name"], mixed := folder / "fedcba9876543215")
+        for name in "notes.txt", ".hidden":
+            (mixed / name).write_text("x")
+        late = []
+        for i, change in enumerate(({"ended": 10**17}, {"ended": 2**63 - 1}, {"created": -1}, {"created": 10**17})):
+            late.append(folder / f"aedcba987654321{i}")
+            shutil.copytree(whole / done["name"], late[-1])
+            (late[-1] / "tour.json").write_text(json.dumps({**state, **change}))
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            assert {p.name for p in other.iterdir()} == kept and {p.name for p in foreign.iterdir()} == {"mine.txt", ".hidden", "000001.jpg"}
+            assert all((folder / f"fedcba987654321{i}").is_symlink() for i in (0, 2)) and (folder / ".fedcba9876543211").is_symlink()
+            assert len([line for line in d.lines if "is left" in line]) >= 4, d.lines
+            assert {tour["uri"][-16:] for tour in d.ask("/v1/tours").json()["tours"]} == {p.name for p in late} | {mixed.name}
+            for path in late:
+                tour = d.ask(f"/v1/tours/{path.name}").json()
+                assert tour["state"] == "failed" and "values that no tour has" in tour["error"], tour
+                assert d.ask(f"/v1/tours/{path.name}/frames.zip").status in (200, 404, 409)
+            assert len(frames_of(d, d.ask(f"/v1/tours/{mixed.name}").json())) == 3
+            assert d.ask(f"/v1/tours/{mixed.name}", "DELETE").status == 204
+            eventually(lambda: {p.name for p in mixed.iterdir()} == {"notes.txt", ".hidden"})
+            d.log(f"{mixed.name} is left")
+
+
 def test_frames_that_are_not_complete_are_named():
     """A tile of a collection is gone: frames that show it are as it is from afar, and the tour says which, also after a restart."""
     away, near = [[[x + 20, -15, 8], [x + 20, 30, 0]] for x in (-20, 60)]  # eye and target

@@ -351,6 +351,13 @@ def test_a_file_named_itself_and_a_broken_list_are_left_alone():
                 assert get(d, "width=16&height=16").status == 200
                 d.log("wall.views.json")
             assert (home / "wall.views.json").read_text() == text
+    for target in "wall.views.json", "nowhere.json":  # to itself
+        with serving() as (home, start):
+            (home / "wall.views.json").symlink_to(target)
+            with start() as d:
+                assert views(d) == {} and put(d, "door", DOOR).status == 409
+                d.log("wall.views.json")
+            assert (home / "wall.views.json").is_symlink() and not (home / "nowhere.json").exists()
 
 
 def test_thumbnails():

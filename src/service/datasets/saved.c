@@ -2,6 +2,7 @@
  * enough to be written whole. */
 #include "service/datasets/saved.h"
 
+#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,10 +71,12 @@ static int parse_file(struct spl_saved *saved, struct spl_error *err)
     json_error_t where;
     struct stat status;
     if (stat(saved->path, &status))
-        return SPL_OK;
+        return errno == ENOENT && lstat(saved->path, &status) // no link that leads nowhere either
+                   ? SPL_OK
+                   : spl_fail(err, SPL_E_CORRUPT, "it cannot be opened");
     if (!S_ISREG(status.st_mode) || status.st_size > file_bytes_max)
         return spl_fail(err, SPL_E_CORRUPT, "it is no file of at most %d bytes", file_bytes_max);
-    json_t *json = json_load_file(saved->path, JSON_REJECT_DUPLICATES, &where);
+    json_t *json = spl_json_load_file(saved->path, &where);
     if (!json)
         return spl_fail(err, SPL_E_CORRUPT, "%s in line %d", where.text, where.line);
     int rc = spl_saved_views_from_json(json_object_get(json, "views"), saved->info->default_up, saved->views,

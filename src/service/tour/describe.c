@@ -74,7 +74,7 @@ json_t *spl_tour_describe(const struct spl_tour *tour)
     set_link(json, tour, "stream", "stream");
     set_link(json, tour, "zip", "frames.zip");
     if (spec->video)
-        set_link(json, tour, "video", "video.mp4");
+        set_link(json, tour, "video", SPL_TOUR_VIDEO_FILE);
     else
         set(json, "video", json_null());
     return json;

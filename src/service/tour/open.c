@@ -96,7 +96,7 @@ static void load(struct spl_tours *tours, const char *name)
     struct spl_error err = {0};
     int rc = spl_tour_load(tours, name, &tour, &err);
     if (rc == SPL_E_NOT_FOUND) { // a crash while it began: it has no frames yet
-        spl_tour_store_remove(tours->directory, name);
+        spl_tour_store_remove(tours->directory, name, false);
         return;
     }
     if (rc) {
@@ -128,7 +128,7 @@ static int load_all(struct spl_tours *tours, const struct spl_catalog *catalog, 
         if (spl_tour_name_is_valid(item->d_name))
             load(tours, item->d_name);
         else if (item->d_name[0] == '.' && spl_tour_name_is_valid(item->d_name + strspn(item->d_name, ".")))
-            spl_tour_store_remove(tours->directory, item->d_name);
+            spl_tour_store_remove(tours->directory, item->d_name, false); // of versions that hid what they removed
     }
     closedir(dir);
     struct spl_tour *tour;

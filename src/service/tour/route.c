@@ -182,6 +182,6 @@ void spl_show_tour_video(struct request *request, const struct spl_call *call)
     } else if (tour->state != SPL_TOUR_DONE) {
         refuse_early(request, tour->state == SPL_TOUR_FAILED ? tour->failure.message : "the video is not made yet");
     } else {
-        reply_file(request, tour, "video.mp4", "video/mp4");
+        reply_file(request, tour, SPL_TOUR_VIDEO_FILE, "video/mp4");
     }
 }

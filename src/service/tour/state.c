@@ -97,6 +97,9 @@ json_t *spl_tour_to_json(const struct spl_tour *tour)
                      spl_tour_parts_to_json(tour));
 }
 
+/* The end of the year 9999: what dates are written with knows no later ones. */
+static const json_int_t latest_s = 253402300799;
+
 static int read_state(const char *text)
 {
     int i = 0;
@@ -138,7 +141,7 @@ static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
     int format_number = zip ? 0 : spl_format_from_name(format);
     int state_number = read_state(state);
     if (state_number < 0 || layers < 1 || layers >> SPL_LAYER_COUNT || format_number < 0 || frames < 1 ||
-        frames > SPL_CAMERA_PATH_MAX || width < 1 || height < 1 || !(spec->fps > 0) ||
+        frames > SPL_CAMERA_PATH_MAX || created < 0 || created > latest_s || ended < 0 || ended > latest_s || width < 1 || height < 1 || !(spec->fps > 0) ||
         strlen(dataset) >= sizeof tour->dataset || strlen(version) >= sizeof tour->version)
         return spl_fail(err, SPL_E_CORRUPT, "tour.json holds values that no tour has");
     strcpy(tour->dataset, dataset);
@@ -191,17 +194,15 @@ static void take_parts(struct spl_tour *tour, const json_t *parts)
  * that failed early, ten million frames do not. */
 static int look_at_files(struct spl_tour *tour, struct spl_error *err)
 {
-    char path[4096];
     struct stat status;
-    snprintf(path, sizeof path, "%s/%s", tour->tours->directory, tour->name);
-    DIR *dir = opendir(path);
+    DIR *dir = spl_tour_folder_open(tour->tours->directory, tour->name);
     if (!dir)
-        return spl_fail_errno(err, errno, "%s: cannot be listed", path);
+        return spl_fail_errno(err, errno, "its folder cannot be listed");
     for (struct dirent *item; (item = readdir(dir));) {
         size_t frame = frame_of(tour, item->d_name);
-        if (item->d_name[0] == '.') // what a crash left half written; the folders . and .. stay
+        if (item->d_name[0] == '.' && spl_tour_file_is_ours(item->d_name)) // what a crash left half written
             unlinkat(dirfd(dir), item->d_name, 0);
-        bool video = spl_tour_has_ended(tour) && !strcmp(item->d_name, "video.mp4");
+        bool video = spl_tour_has_ended(tour) && !strcmp(item->d_name, SPL_TOUR_VIDEO_FILE);
         if ((frame == SIZE_MAX && !video) || fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW))
             continue;
         if (!S_ISREG(status.st_mode) || !status.st_size) // none of ours
@@ -219,12 +220,10 @@ static int look_at_files(struct spl_tour *tour, struct spl_error *err)
 /* What stands for a folder whose tour.json says nothing that we understand. */
 static int stand_in(struct spl_tour *tour, const struct spl_error *why, struct spl_error *err)
 {
-    char path[4096];
     struct stat status;
-    snprintf(path, sizeof path, "%s/%s", tour->tours->directory, tour->name);
-    DIR *dir = opendir(path);
+    DIR *dir = spl_tour_folder_open(tour->tours->directory, tour->name);
     if (!dir || fstat(dirfd(dir), &status)) {
-        spl_fail_errno(err, errno, "%s: cannot be listed", path);
+        spl_fail_errno(err, errno, "it is no folder that can be listed");
         if (dir)
             closedir(dir);
         return SPL_E_IO;

@@ -12,12 +12,28 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "service/tour/tour.h"
+
+static const char state_name[] = "tour.json";
 
 bool spl_tour_name_is_valid(const char *name)
 {
     return strlen(name) == SPL_TOUR_NAME && strspn(name, "0123456789abcdef") == SPL_TOUR_NAME;
+}
+
+DIR *spl_tour_folder_open(const char *directory, const char *name)
+{
+    char path[4096];
+    const bool fits = snprintf(path, sizeof path, "%s/%s", directory, name) < (int)sizeof path;
+    const int fd = fits ? open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC) : -1;
+    DIR *dir = fd < 0 ? NULL : fdopendir(fd);
+    const int why = fits ? errno : ENAMETOOLONG;
+    if (!dir && fd >= 0)
+        close(fd);
+    errno = why;
+    return dir;
 }
 
 int spl_tour_store_write(const char *directory, const char *name, const char *file, const void *bytes, size_t length,
@@ -43,13 +59,16 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
 int spl_tour_file_open(const char *directory, const char *name, const char *file, struct spl_tour_file *out,
                        struct spl_error *err)
 {
-    char path[4096];
     struct stat status;
     int rc = 0;
     *out = (struct spl_tour_file){.fd = -1};
-    if (snprintf(path, sizeof path, "%s/%s/%s", directory, name, file) >= (int)sizeof path)
-        return spl_fail(err, SPL_E_USAGE, "the path of the tours' folder is too long");
-    out->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    DIR *dir = spl_tour_folder_open(directory, name);
+    if (dir)
+        out->fd = openat(dirfd(dir), file, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    const int why = errno;
+    if (dir)
+        closedir(dir);
+    errno = why;
     if (out->fd < 0 || fstat(out->fd, &status))
         rc = errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s of tour %s is not there", file, name)
                              : spl_fail_errno(err, errno, "%s of tour %s cannot be read", file, name);
@@ -111,20 +130,47 @@ int spl_tour_store_read(const char *directory, const char *name, const char *fil
     return rc;
 }
 
-void spl_tour_store_remove(const char *directory, const char *name)
+bool spl_tour_file_is_ours(const char *file)
 {
-    char path[4096], gone[4096], file[4096 + 256];
-    snprintf(path, sizeof path, "%s/%s", directory, name);
-    snprintf(gone, sizeof gone, "%s/.%s", directory, name); // no restart takes up a tour half removed
-    if (rename(path, gone))
-        snprintf(gone, sizeof gone, "%s", path);
-    DIR *dir = opendir(gone);
-    for (struct dirent *item; dir && (item = readdir(dir));) {
-        snprintf(file, sizeof file, "%s/%s", gone, item->d_name);
-        if (strcmp(item->d_name, ".") && strcmp(item->d_name, ".."))
-            unlink(file);
-    }
+    const char *name = file + (*file == '.'), *end;
+    const size_t digits = strspn(name, "0123456789");
+    if (digits >= 6 && name[digits] == '.')
+        end = name + digits + 1 + strcspn(name + digits + 1, ".");
+    else if (!strncmp(name, state_name, strlen(state_name)))
+        end = name + strlen(state_name);
+    else if (!strncmp(name, SPL_TOUR_VIDEO_FILE, strlen(SPL_TOUR_VIDEO_FILE)))
+        end = name + strlen(SPL_TOUR_VIDEO_FILE);
+    else
+        return false;
+    return !*end || (name > file && *end == '.'); // hidden: while it is written
+}
+
+/* Does the folder hold nothing else? Rewinds it. */
+static bool is_ours(DIR *dir)
+{
+    bool others = false;
+    for (struct dirent *item; (item = readdir(dir));)
+        others |= strcmp(item->d_name, ".") && strcmp(item->d_name, "..") && !spl_tour_file_is_ours(item->d_name);
+    rewinddir(dir);
+    return !others;
+}
+
+/* tour.json goes first: no restart takes up a tour half removed, and one that finds none goes on removing. */
+void spl_tour_store_remove(const char *directory, const char *name, bool wanted)
+{
+    char path[4096];
+    DIR *dir = spl_tour_folder_open(directory, name);
+    if (!dir && errno == ENOENT)
+        return;
+    bool left = !dir || (!wanted && !is_ours(dir));
+    if (!left)
+        unlinkat(dirfd(dir), state_name, 0);
+    for (struct dirent *item; !left && (item = readdir(dir));)
+        if (spl_tour_file_is_ours(item->d_name))
+            unlinkat(dirfd(dir), item->d_name, 0);
     if (dir)
         closedir(dir);
-    rmdir(gone);
+    snprintf(path, sizeof path, "%s/%s", directory, name);
+    if (left || rmdir(path))
+        spl_log_warn("%s is left: it is no tour's folder, or holds what is of no tour", path);
 }

@@ -6,6 +6,7 @@
 #ifndef SPL_SERVICE_TOUR_H
 #define SPL_SERVICE_TOUR_H
 
+#include <dirent.h>
 #include <jansson.h>
 #include <stdatomic.h>
 #include <sys/queue.h>
@@ -154,7 +155,14 @@ int spl_tour_file_open(const char *directory, const char *name, const char *file
 size_t spl_tour_file_read(struct spl_tour_file *file, void *out,
                           size_t room);               /* 0: nothing left, or it cannot be read */
 void spl_tour_file_close(struct spl_tour_file *file); /* idempotent */
-void spl_tour_store_remove(const char *directory, const char *name);
+/* Removes a tour's files and, once it is empty, its folder; a link, or what is no tour's, stays, and is told. Not
+ * `wanted` by a client, as what a crash left: nothing where there is more than a tour has. */
+void spl_tour_store_remove(const char *directory, const char *name, bool wanted);
+/* A tour's own folder; NULL where it is none, a link among them: errno says why. closedir() it. */
+DIR *spl_tour_folder_open(const char *directory, const char *name);
+/* Is it a file of a tour: a frame, its state, its video, or one of these while it is written? */
+bool spl_tour_file_is_ours(const char *file);
+#define SPL_TOUR_VIDEO_FILE "video.mp4"
 bool spl_tour_name_is_valid(const char *name);
 
 /* work.c: the same on uv's threads; each tells the engine when it is done. */

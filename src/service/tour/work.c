@@ -173,8 +173,8 @@ static void make_video(uv_work_t *uv)
     struct spl_video *video = NULL;
     struct stat status;
     char temporary[4096], path[4096];
-    snprintf(temporary, sizeof temporary, "%s/%s/.video.mp4", work->tours->directory, work->name);
-    snprintf(path, sizeof path, "%s/%s/video.mp4", work->tours->directory, work->name);
+    snprintf(temporary, sizeof temporary, "%s/%s/." SPL_TOUR_VIDEO_FILE, work->tours->directory, work->name);
+    snprintf(path, sizeof path, "%s/%s/" SPL_TOUR_VIDEO_FILE, work->tours->directory, work->name);
     int rc = spl_video_create(temporary, camera->width, camera->height, work->tour->spec.fps, &video, &work->err);
     if (!rc && !(rc = add_frames(work, video)))
         rc = spl_video_finish(video, &work->err);
@@ -208,7 +208,7 @@ void spl_tour_work_video(struct spl_tour *tour)
 static void remove_files(uv_work_t *uv)
 {
     struct work *work = uv->data;
-    spl_tour_store_remove(work->tours->directory, work->name);
+    spl_tour_store_remove(work->tours->directory, work->name, true);
 }
 
 static void after_remove(uv_work_t *uv, int status)
