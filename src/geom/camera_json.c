@@ -152,21 +152,36 @@ static void add_name(char known[NAMES_SIZE], const char *name)
         snprintf(known + length, NAMES_SIZE - length, ", …");
 }
 
+const char *spl_camera_find_ours(const char *name)
+{
+    static const char *const words[][2] = {{"position", "eye"},  {"lookat", "target"}, {"look_at", "target"},
+                                           {"center", "target"}, {"fovy", "fov"},      {"vfov", "fov"}};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (!strcasecmp(name, words[i][0]))
+            return words[i][1];
+    return NULL;
+}
+
 static int find(const char *name, enum spl_value_place place, const char *const *others, struct spl_error *err)
 {
-    for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
+    bool of_camera = false;
+    for (int i = 0; i < SPL_CAMERA_PARAMS; i++) {
         if (!strcmp(name, params[i].name) && (params[i].places & place))
             return i;
-        else if (!strcmp(name, params[i].name))
-            return spl_fail_field(err, SPL_E_INPUT, name, "'%s' belongs into the \"camera\" object", name);
+        of_camera |= !strcmp(name, params[i].name);
+    }
     char known[NAMES_SIZE] = "";
     for (; *others; others++)
         add_name(known, *others);
+    if (of_camera)
+        return spl_fail_field(err, SPL_E_INPUT, name, "'%s' belongs into the \"camera\" object; known beside it are %s",
+                              name, known);
     for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
         if (params[i].places & place)
             add_name(known, params[i].name);
-    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s; known are %s", name,
-                          place == SPL_CAMERA ? "camera" : "view", known);
+    const char *ours = place == SPL_CAMERA ? spl_camera_find_ours(name) : NULL;
+    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s%s%s; known are %s", name,
+                          place == SPL_CAMERA ? "camera" : "view", ours ? ": it is called " : "", ours ? ours : "", known);
 }
 
 static bool among(const char *name, const char *const *names)

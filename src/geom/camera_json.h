@@ -154,6 +154,9 @@ void spl_camera_inherit_projection(struct spl_value values[SPL_CAMERA_PARAMS], d
 int spl_camera_from_json(json_t *view, const char *const *others, const struct spl_camera_defaults *defaults,
                          const struct spl_camera_limits *limits, struct spl_camera *camera, struct spl_error *err);
 
+/* Our name for what others call a camera's parameter: "eye" for "position"; NULL = not known. */
+const char *spl_camera_find_ours(const char *name);
+
 /* Puts "camera." before the field of `why` where the member stands in the "camera" object of `view`, so that who looks
  * for it by its path finds it. */
 void spl_camera_locate(const json_t *view, struct spl_error *why);

@@ -360,6 +360,16 @@ def test_a_file_named_itself_and_a_broken_list_are_left_alone():
             assert (home / "wall.views.json").is_symlink() and not (home / "nowhere.json").exists()
 
 
+def test_what_others_call_otherwise_is_told():
+    with Daemon(FAKE) as d:
+        for camera, field, ours in (({"position": [3, 0, 1], "target": [0, 0, 1]}, "position", "eye"),
+                                    ({"eye": [3, 0, 1], "lookAt": [0, 0, 1]}, "lookAt", "target")):
+            problem = d.post({"camera": camera}).json()
+            assert problem["field"] == field and f"it is called '{ours}'" in problem["detail"], problem
+        problem = d.view(eye="3,0,1", lookat="0,0,1").json()
+        assert problem["field"] == "lookat" and "'target'" in problem["detail"], problem
+
+
 def test_thumbnails():
     with Daemon(REAL) as d:
         path = "/v1/datasets/wall/thumbnail.jpg"

@@ -35,7 +35,11 @@ static const char *say_taken(enum spl_value_place place)
 
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
 {
-    const char *taken = say_taken(place);
+    const char *taken = say_taken(place), *ours = spl_camera_find_ours(name);
+    if (ours && place & (SPL_QUERY | SPL_CAMERA)) {
+        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s': it is called '%s'", name, ours);
+        return PARAM_COUNT;
+    }
     for (int i = 0; i < PARAM_COUNT; i++) {
         const struct param_info *info = &spl_params[i];
         bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);

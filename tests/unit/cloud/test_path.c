@@ -303,6 +303,10 @@ static void test_what_is_no_trajectory_says_so(void **state)
         {"0 2 3 4 0 0 0 1\n1 2 x 4 0 0 0 1\n", "line 2: ty: 'x' is no number"},
         {OWN("{\"camera\":{},\"blur\":4}"),
          "unknown field 'blur' of a view; known are camera, time, width, height, near"},
+        {OWN("{\"camera\":{\"eye\":[1,2,3]},\"t\":4}"),
+         "'t' belongs into the \"camera\" object; known beside it are camera, time"},
+        {OWN("{\"camera\":{\"eye\":[1,2,3],\"lookAt\":[0,0,0]}}"),
+         "unknown field 'lookAt' of a camera: it is called target"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct spl_camera_path path;
