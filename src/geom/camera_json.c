@@ -181,7 +181,8 @@ static int find(const char *name, enum spl_value_place place, const char *const 
             add_name(known, params[i].name);
     const char *ours = place == SPL_CAMERA ? spl_camera_find_ours(name) : NULL;
     return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s%s%s; known are %s", name,
-                          place == SPL_CAMERA ? "camera" : "view", ours ? ": it is called " : "", ours ? ours : "", known);
+                          place == SPL_CAMERA ? "camera" : "view", ours ? ": it is called " : "", ours ? ours : "",
+                          known);
 }
 
 static bool among(const char *name, const char *const *names)

@@ -5,8 +5,8 @@
 
 #include "gpu/gpu.h"
 
-/* How long a wait of our own (a next list, close) may take before the device counts as lost; of processor time, where it
- * is software. */
+/* How long a wait of our own (a next list, close) may take before the device counts as lost; of processor time, where
+ * it is software. */
 #define SPL_GPU_PATIENCE_NS (10 * SPL_NS_PER_S)
 
 enum { SPL_GPU_BOUND_MAX = 8 }; /* of either kind: OpenGL may have as many image units */

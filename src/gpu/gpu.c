@@ -47,8 +47,8 @@ void spl_gpu_complain(const char *backend, bool error, const char *message)
     spl_log(error ? SPL_LOG_ERROR : SPL_LOG_WARN, "%s: %s", backend, message);
 }
 
-/* Waits for `ticket`. A software driver's work is done by this process, which others may keep from the processors: it is
- * late once it has had `timeout_ns` of them, or after twelve times as long. */
+/* Waits for `ticket`. A software driver's work is done by this process, which others may keep from the processors: it
+ * is late once it has had `timeout_ns` of them, or after twelve times as long. */
 static int wait_fairly(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns, struct spl_error *err)
 {
     enum { longest = 12 };

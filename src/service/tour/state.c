@@ -141,7 +141,8 @@ static int from_json(struct spl_tour *tour, json_t *json, struct spl_error *err)
     int format_number = zip ? 0 : spl_format_from_name(format);
     int state_number = read_state(state);
     if (state_number < 0 || layers < 1 || layers >> SPL_LAYER_COUNT || format_number < 0 || frames < 1 ||
-        frames > SPL_CAMERA_PATH_MAX || created < 0 || created > latest_s || ended < 0 || ended > latest_s || width < 1 || height < 1 || !(spec->fps > 0) ||
+        frames > SPL_CAMERA_PATH_MAX || created < 0 || created > latest_s || ended < 0 || ended > latest_s ||
+        width < 1 || height < 1 || !(spec->fps > 0) ||
         strlen(dataset) >= sizeof tour->dataset || strlen(version) >= sizeof tour->version)
         return spl_fail(err, SPL_E_CORRUPT, "tour.json holds values that no tour has");
     strcpy(tour->dataset, dataset);
