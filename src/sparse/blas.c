@@ -98,7 +98,7 @@ int spl_blas_eigen(size_t n, float *a, size_t wanted, float *values, float *vect
     blas.eigen("V", "I", "L", &size, a, &size, &none, &none, &first, &size, &none, &found, values, vectors, &size, NULL,
                &best, &ask, &integers, &ask, &info);
     int work_count = (int)best;
-    float *work = spl_alloc_raw((size_t)work_count, sizeof *work, err);
+    float *work = spl_alloc_raw((size_t)work_count + SPL_BLAS_PAD, sizeof *work, err);
     int *work_integers = spl_alloc_raw((size_t)integers, sizeof *work_integers, err);
     int *support = spl_alloc_raw(2 * n, sizeof *support, err);
     float *all_values = spl_alloc(n, sizeof *all_values, err);

@@ -31,7 +31,10 @@ void spl_blas_apply_transposed(size_t rows, size_t columns, const float *a, cons
 void spl_blas_covariance(size_t rows, size_t n, const float *a, float *out);
 
 /* The `wanted` largest eigenvalues of the symmetric matrix a[n × n] (its upper triangle; destroyed), largest first, and
- * their unit vectors, one a row of vectors[wanted × n]. SPL_E_NOMEM, SPL_E_INTERNAL (no convergence: not finite). */
+ * their unit vectors, one a row of vectors[wanted × n]. Behind the matrix are SPL_BLAS_PAD floats more, since OpenBLAS
+ * reads some (0.3.21, ssymv of processors that it does not know) and would leave the page. SPL_E_NOMEM,
+ * SPL_E_INTERNAL (no convergence: not finite). */
+enum { SPL_BLAS_PAD = 16 };
 int spl_blas_eigen(size_t n, float *a, size_t wanted, float *values, float *vectors, struct spl_error *err);
 
 #endif

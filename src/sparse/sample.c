@@ -71,7 +71,8 @@ static int find_basis(struct spl_training *t, struct reader *reader, struct spl_
     size_t n = t->n, rows = 0, wanted = n / 2;
     uint64_t sample = t->population < axes_textures ? t->population : axes_textures;
     int rc = SPL_E_NOMEM;
-    float *y = spl_alloc_raw(SPL_BLOCK_TEXTURES * n, sizeof *y, err), *covariance = spl_alloc(n * n, sizeof *y, err);
+    float *y = spl_alloc_raw(SPL_BLOCK_TEXTURES * n, sizeof *y, err);
+    float *covariance = spl_alloc(n * n + SPL_BLAS_PAD, sizeof *covariance, err);
     float *values = spl_alloc_raw(wanted, sizeof *values, err), *axes = NULL;
     double all = 0, inside = 0;
     if (!y || !covariance || !values)
