@@ -35,11 +35,7 @@ static const char *say_taken(enum spl_value_place place)
 
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
 {
-    const char *taken = say_taken(place), *ours = spl_camera_find_ours(name);
-    if (ours && place & (SPL_QUERY | SPL_CAMERA)) {
-        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s': it is called '%s'", name, ours);
-        return PARAM_COUNT;
-    }
+    const char *taken = say_taken(place), *ours = place & (SPL_QUERY | SPL_CAMERA) ? spl_camera_find_ours(name) : NULL;
     for (int i = 0; i < PARAM_COUNT; i++) {
         const struct param_info *info = &spl_params[i];
         bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
@@ -52,6 +48,8 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
             places |= places & SPL_PICK ? SPL_PICK_BODY : 0;
         if (places & place)
             return (enum param)i;
+        if (ours)
+            break;
         spl_fail_field(err, SPL_E_INPUT, name, "'%s' does not belong here; %s", name,
                        place == SPL_PICK_BODY && info->places & SPL_CAMERA ? "give it in the \"camera\" object"
                        : taken                              ? taken
@@ -63,8 +61,11 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
-    spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s", name,
-                   taken ? taken : "/v1/openapi.json lists those of a view");
+    if (ours)
+        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s': it is called '%s'", name, ours);
+    else
+        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s", name,
+                       taken ? taken : "/v1/openapi.json lists those of a view");
     return PARAM_COUNT;
 }
 
