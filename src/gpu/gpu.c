@@ -53,14 +53,13 @@ static int wait_fairly(struct spl_gpu *gpu, uint64_t ticket, uint64_t timeout_ns
 {
     enum { longest = 12 };
     const uint64_t begun = spl_processor_ns();
-    struct spl_error why = {0};
-    int code = gpu->backend->wait(gpu, ticket, timeout_ns, &why);
-    for (int k = 1; k < longest && code == SPL_E_TIMEOUT && gpu->info.software && timeout_ns &&
-                    spl_processor_ns() - begun < timeout_ns;
-         k++) {
+    struct spl_error why;
+    int code, waits = 0;
+    do {
         why = (struct spl_error){0};
         code = gpu->backend->wait(gpu, ticket, timeout_ns, &why);
-    }
+    } while (code == SPL_E_TIMEOUT && gpu->info.software && ++waits < longest &&
+             spl_processor_ns() - begun < timeout_ns);
     return code < 0 ? spl_fail(err, code, "%s", why.message) : code;
 }
 
