@@ -16,8 +16,7 @@ void draw(capsule c)
         bool second;
         float distance = capsule_sample(c, walk, z, second);
         if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u, CUT_OPEN)) {
-            precise float pushed = z + capsule_margin(c, z);
-            uint index = image_sample_index(sample_of(c, walk)), bits = floatBitsToUint(pushed);
+            uint index = image_sample_index(sample_of(c, walk)), bits = capsule_word(c, z);
             /* What it reads may be old, never too near. */
             if (bits < imageLoad(depth_texels, int(index)).x)
                 atomicMin(depth[index], bits);

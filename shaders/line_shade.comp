@@ -30,10 +30,10 @@ void draw(splat_run run, splat a, splat b)
         float distance = capsule_sample(c, walk, z, second);
         if (distance < 1.0 && is_inside(c, walk) && is_kept(capsule_point(c, walk, z), 0u, CUT_OPEN)) {
             uint at = image_sample_index(sample_of(c, walk));
-            float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
-            precise float pushed = z + capsule_margin(c, z);
+            uint front = imageLoad(depth_texels, int(at)).x;
+            float first = uintBitsToFloat(front);
             if (z <= first)
-                shade(at, first, z, distance, pushed, second ? values[1] : values[0],
+                shade(at, first, z, distance, capsule_word(c, z) == front, second ? values[1] : values[0],
                       identity(SPL_DRAWN_LINE, run.chunk.first_id + a.index + uint(second)));
         }
         next_step(c, walk);

@@ -10,7 +10,7 @@ coherent SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 
 void panel_fragment(panel_draw d, ivec2 at, float z, float distance, float pushed, vec2 place)
 {
-    uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
+    uint index = image_sample_index(at), bits = sided_word(pushed, panel_side(d, z, pushed));
     /* What it reads may be old, never too near. */
     SPL_WHERE(bits < imageLoad(depth_texels, int(index)).x)
         if (!is_trimmed(d, at, z))

@@ -17,18 +17,19 @@ SPL_TEXEL_BUFFER(SPL_TEXELS_DEPTH) depth_texels;
 void panel_fragment(panel_draw d, ivec2 at, float z, float distance, float pushed, vec2 place)
 {
     uint index = image_sample_index(at);
-    float first = uintBitsToFloat(imageLoad(depth_texels, int(index)).x);
+    uint front = imageLoad(depth_texels, int(index)).x, own = sided_word(pushed, panel_side(d, z, pushed));
+    float first = uintBitsToFloat(front);
 #ifdef SPL_TRIMS
-    z = pushed < first ? 3e38 : z; /* what was trimmed: see splat_shade.comp */
+    z = own < front ? 3e38 : z; /* what was trimmed: see splat_shade.comp */
 #endif
     precise float there = z + d.behind;
-    if (there <= first) {
+    if (there <= first && !is_hidden(front, own, there)) {
         uvec3 value = uvec3(0u);
         if (GROUP == SPL_SUMS_COLOR)
             value = shown_on_panel(d, panel_color_between(d.own, place), at, z);
         else if (GROUP == SPL_SUMS_NORMAL)
             value = uvec3(d.facing * 127.0 + 127.5);
-        shade(index, first, z, distance, pushed, value, identity(SPL_DRAWN, d.id));
+        shade(index, first, z, distance, own == front, value, identity(SPL_DRAWN, d.id));
     }
 }
 

@@ -32,7 +32,7 @@ void touch(work w, ivec2 at)
     float distance = clip(w.line, offset, disc_sample(w.d, at, z, offset));
     if (distance < 1.0 && at.y <= w.d.last.y) {
         precise float pushed = z + w.d.margin + w.d.behind;
-        uint index = image_sample_index(at), bits = floatBitsToUint(pushed);
+        uint index = image_sample_index(at), bits = sided_word(pushed, w.d.side);
         /* What it reads may be old, never too near. */
         SPL_WHERE(bits < imageLoad(depth_texels, int(index)).x)
             if (!is_trimmed(w.rule, at, z))

@@ -64,19 +64,21 @@ void touch(work w, ivec2 sample_at)
     float distance = clip(w.line, offset, disc_sample(w.d, sample_at, z, offset));
     uint at = image_sample_index(sample_at);
     if (distance < 1.0 && sample_at.y <= w.d.last.y) {
-        float first = uintBitsToFloat(imageLoad(depth_texels, int(at)).x);
+        uint front = imageLoad(depth_texels, int(at)).x;
+        float first = uintBitsToFloat(front);
         uvec3 value = w.value;
 #ifdef SPL_TEXTURED
         if (z <= first)
             value = sample_texture(w.texture, offset);
 #endif
         precise float pushed = z + w.d.margin + w.d.behind;
+        uint own = sided_word(pushed, w.d.side);
 #ifdef SPL_TRIMS
-        z = pushed < first ? 3e38 : z;
+        z = own < front ? 3e38 : z;
 #endif
         precise float there = z + w.d.behind;
-        if (there <= first)
-            shade(at, first, z, distance, pushed, value, w.id);
+        if (there <= first && !is_hidden(front, own, there))
+            shade(at, first, z, distance, own == front, value, w.id);
     }
 }
 

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/near_name.h"
 #include "cmd/cmd.h"
 #include "cmd/options.h"
 
@@ -50,7 +51,7 @@ int main(int argc, char **argv)
         puts("splatd " SPLATD_VERSION);
         return 0;
     }
-    const char *near = spl_cmd_find_nearest(argv[1], names);
+    const char *near = spl_near_name_find(argv[1], names);
     fprintf(stderr, "splatd: unknown command '%s'; %s%s%s'splatd --help' lists them\n", argv[1],
             near ? "did you mean " : "", near ? near : "", near ? "? " : "");
     return 2;

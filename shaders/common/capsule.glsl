@@ -144,4 +144,12 @@ float capsule_margin(capsule c, float z)
     return margin;
 }
 
+/* The word of method splat of depth z. A line has no sides: what is shown behind it shows its front. */
+uint capsule_word(capsule c, float z)
+{
+    float margin = capsule_margin(c, z);
+    precise float pushed = z + margin;
+    return sided_word(pushed, side_of(margin, z, false));
+}
+
 #endif

@@ -17,6 +17,7 @@ struct disc {
     vec2 center;       /* samples */
     float depth;       /* of the centre */
     float margin;      /* metres that the disc is pushed back for blending */
+    uint side;         /* as of side_of() */
     float behind;      /* metres that its back is pushed back besides, so that what faces the eye wins */
     /* With uv = sample - centre: the plane is hit at depth k, k = 1 / (1 + slope . uv) (never behind the eye: there the
      * divisor is not positive), off the centre by scale (ray (k - 1) + uv k / f, k - 1) radii, scale = depth /
@@ -96,6 +97,7 @@ disc make_disc(splat s, vec2 window_low, vec2 window_high)
     precise float short_radius = frame.fx * min(abs(facing), 1.0) / scale;
     d.short_radius = short_radius;
     d.margin = margin;
+    d.side = side_of(margin, p.z, facing > 0.0);
     d.behind = facing > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? s.radius : 0.0;
     return d;
 }

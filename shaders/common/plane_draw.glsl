@@ -36,6 +36,7 @@ struct panel_draw {
     vec3 normal;        /* product with (ray, 1): n.d */
     float offset;       /* of its plane from the eye, along its normal */
     float least, most;  /* depths of its corners */
+    bool back;          /* it turns its back to the eye */
     float behind;       /* as of a disc */
     ivec2 first, last;  /* samples, inclusive; empty when last < first */
     bool thin;
@@ -96,7 +97,8 @@ void set_plane(inout panel_draw d, vec3 n, vec3 o)
     d.facing = n;
     d.normal = normal;
     d.offset = offset;
-    d.behind = (PARALLEL != 0u ? n.z : offset) > 0.0 && (frame.flags & SPL_FRAME_SIDED) != 0u ? d.radius : 0.0;
+    d.back = (PARALLEL != 0u ? n.z : offset) > 0.0;
+    d.behind = d.back && (frame.flags & SPL_FRAME_SIDED) != 0u ? d.radius : 0.0;
 }
 
 /* Where it lies: `corners`, view space, in order around it; of a triangle the first one again. What it is a piece of is
@@ -146,6 +148,13 @@ float panel_push(panel_draw d, float z, float tilt)
     precise float margin = frame.margin * max(d.radius, frame.low_pass * ray_scale(z) * frame.inverse_fx) * slant;
     precise float pushed = z + margin + d.behind;
     return pushed;
+}
+
+/* As of side_of(), of a fragment that is pushed back so. */
+uint panel_side(panel_draw d, float z, float pushed)
+{
+    precise float margin = pushed - d.behind - z;
+    return side_of(margin, z, d.back);
 }
 
 /* One over n.d of the ray through uv = sample - principal point, and the depth where it meets the plane. */

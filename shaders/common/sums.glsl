@@ -35,12 +35,12 @@ void add(uint pair, uint a, uint b)
 }
 #endif
 
-/* One fragment: view depth z within the margin in front of `first`, the sample's pushed depth. */
-void shade(uint at, float first, float z, float distance, float pushed, uvec3 value, uint id)
+/* One fragment: view depth z within the margin in front of `first`, the sample's pushed depth, which may be its own. */
+void shade(uint at, float first, float z, float distance, bool sets_first, uvec3 value, uint id)
 {
 #ifndef SPL_TEXTURED
     if (IDENTIFIES) {
-        if (pushed == first)
+        if (sets_first)
             atomicMin(ids[at], id);
         return;
     }

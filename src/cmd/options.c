@@ -113,48 +113,6 @@ int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], st
     return spl_fail(err, SPL_E_USAGE, "%s takes " SPL_COLOR_FORMS ", not '%s'", option, text);
 }
 
-/* Letters to change, add, leave out, or swap with their neighbour, to make `b` of `a`[0..length). */
-static size_t distance(const char *a, size_t length, const char *b)
-{
-    enum { most = 40 };
-    size_t rows[3][most + 1], *before = rows[0], *last = rows[1], *now = rows[2], width = strlen(b);
-    if (length > most || width > most)
-        return most;
-    for (size_t j = 0; j <= width; j++)
-        last[j] = j;
-    for (size_t i = 1; i <= length; i++) {
-        now[0] = i;
-        for (size_t j = 1; j <= width; j++) {
-            size_t cost = last[j - 1] + (a[i - 1] != b[j - 1]);
-            cost = last[j] + 1 < cost ? last[j] + 1 : cost;
-            cost = now[j - 1] + 1 < cost ? now[j - 1] + 1 : cost;
-            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] && before[j - 2] + 1 < cost)
-                cost = before[j - 2] + 1;
-            now[j] = cost;
-        }
-        size_t *oldest = before;
-        before = last;
-        last = now;
-        now = oldest;
-    }
-    return last[width];
-}
-
-const char *spl_cmd_find_nearest(const char *word, const char *const *names)
-{
-    const char *nearest = NULL;
-    word += strspn(word, "-");
-    size_t length = strcspn(word, "="), least = length < 3 ? 1 : 1 + length / 3; // as many would be another word
-    for (; *names; names++) {
-        size_t d = distance(word, length, *names);
-        if (d < least) {
-            least = d;
-            nearest = *names;
-        }
-    }
-    return nearest;
-}
-
 void spl_cmd_print_wrapped(FILE *out, size_t used, size_t column, const char *text)
 {
     enum { line_length = 112 };

@@ -33,10 +33,6 @@ int spl_cmd_parse_color(const char *option, const char *text, uint8_t out[4], st
 
 enum { SPL_CMD_NAMES_MAX = 96 };
 
-/* Which of `names`, closed by NULL, was probably meant by `word`, whose dashes in front and argument behind '=' do not
- * count: the one with the fewest letters to change, add, leave out or swap, where these are few. NULL: none. */
-const char *spl_cmd_find_nearest(const char *word, const char *const *names);
-
 /* Writes `text` from column `column` on, broken between words; `used` columns of the line are taken, on which it begins
  * where they leave room. */
 void spl_cmd_print_wrapped(FILE *out, size_t used, size_t column, const char *text);

@@ -9,6 +9,7 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/near_name.h"
 #include "cmd/options.h"
 #include "service/service.h"
 
@@ -102,7 +103,7 @@ static int refuse(int why, const char *text, struct spl_error *err)
     names[count] = NULL;
     bool unknown = why == '?' && (!optopt || optopt < opt_manual);
     if (unknown && !optopt)
-        near = spl_cmd_find_nearest(text, names);
+        near = spl_near_name_find(text, names);
     return spl_fail(err, SPL_E_USAGE, "'%.80s' %s; %s%s%s'splatd serve --help' shows how", text,
                     why == ':' ? "needs a value" : unknown ? "is no option of serve" : "takes no value",
                     near ? "did you mean --" : "", near ? near : "", near ? "? " : "");

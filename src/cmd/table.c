@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/near_name.h"
 #include "cmd/options.h"
 
 enum {
@@ -189,7 +190,7 @@ static int refuse(const struct spl_cmd_table *table, int what, const char *word,
     if (known)
         return spl_fail(err, SPL_E_USAGE, "--%s takes no argument; 'splatd %s --help' shows how", o->name,
                         table->command);
-    const char *near = is_letter ? NULL : spl_cmd_find_nearest(word, names);
+    const char *near = is_letter ? NULL : spl_near_name_find(word, names);
     return spl_fail(err, SPL_E_USAGE, "'%.80s' is no option of %s; %s%s%s'splatd %s --help' shows how",
                     is_letter ? letter : word, table->command, near ? "did you mean --" : "", near ? near : "",
                     near ? "? " : "", table->command);

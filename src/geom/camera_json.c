@@ -11,6 +11,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/near_name.h"
 #include "geom/camera_matrix.h"
 
 static const struct {
@@ -176,13 +177,17 @@ static int find(const char *name, enum spl_value_place place, const char *const 
     if (of_camera)
         return spl_fail_field(err, SPL_E_INPUT, name, "'%s' belongs into the \"camera\" object; known beside it are %s",
                               name, known);
+    struct spl_near_name near = spl_near_name_of(name);
     for (int i = 0; i < SPL_CAMERA_PARAMS; i++)
-        if (params[i].places & place)
+        if (params[i].places & place) {
             add_name(known, params[i].name);
+            spl_near_name_offer(&near, params[i].name);
+        }
     const char *ours = place == SPL_CAMERA ? spl_camera_find_ours(name) : NULL;
-    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s%s%s; known are %s", name,
+    char meant[SPL_NEAR_NAME_TEXT_MAX];
+    return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of a %s%s%s; %sknown are %s", name,
                           place == SPL_CAMERA ? "camera" : "view", ours ? ": it is called " : "", ours ? ours : "",
-                          known);
+                          ours ? "" : spl_near_name_say(&near, meant), known);
 }
 
 static bool among(const char *name, const char *const *names)

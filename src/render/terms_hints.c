@@ -1,5 +1,4 @@
-/* Names are compared by how many letters one is from the other (Levenshtein), and a start of one counts as it. Bounded
- * by the lengths of names; nothing is allocated. */
+/* What people write in other languages of queries, and the names that they meant. Nothing is allocated. */
 #include "render/terms_hints.h"
 
 #include <ctype.h>
@@ -8,6 +7,7 @@
 #include <string.h>
 
 #include "base/decimal.h"
+#include "base/near_name.h"
 #include "dataset/classes.h"
 #include "dataset/streams.h"
 
@@ -39,46 +39,14 @@ bool spl_terms_hint_list(const char *name, const char *at, char hint[SPL_TERMS_H
     return true;
 }
 
-static unsigned least(unsigned a, unsigned b)
-{
-    return a < b ? a : b;
-}
-
-/* Letters to put in, take out or exchange. */
-static unsigned distance(const char *a, const char *b)
-{
-    unsigned row[SPL_STREAM_TEXT_MAX + 1];
-    const size_t width = strnlen(b, SPL_STREAM_TEXT_MAX);
-    for (size_t j = 0; j <= width; j++)
-        row[j] = (unsigned)j;
-    for (; *a; a++) {
-        unsigned corner = row[0]++;
-        for (size_t j = 1; j <= width; j++) {
-            unsigned other = corner + (tolower((unsigned char)*a) != tolower((unsigned char)b[j - 1]));
-            corner = row[j];
-            row[j] = least(other, least(row[j - 1], row[j]) + 1);
-        }
-    }
-    return row[width];
-}
-
 /* NULL where none is near. */
 static const char *find_near(const char *name, const struct spl_dataset_info *info)
 {
-    const char *found = NULL;
-    const size_t length = strlen(name);
-    unsigned best = 1 + (unsigned)least((unsigned)length, 9) / 3;
-    for (uint32_t s = 0; s < info->stream_count; s++) {
-        const char *known = info->streams[s].name;
-        const size_t shorter = least((unsigned)length, (unsigned)strlen(known));
-        const bool begins = shorter >= 3 && !strncmp(known, name, shorter);
-        const unsigned far = begins ? 0 : distance(name, known);
-        if (spl_stream_type_from_name(info->streams[s].type) == SPL_STREAM_UNKNOWN || far >= best)
-            continue;
-        best = far;
-        found = known;
-    }
-    return found;
+    struct spl_near_name near = spl_near_name_of(name);
+    for (uint32_t s = 0; s < info->stream_count; s++)
+        if (spl_stream_type_from_name(info->streams[s].type) != SPL_STREAM_UNKNOWN)
+            spl_near_name_offer(&near, info->streams[s].name);
+    return near.found;
 }
 
 /* The axis that a coordinate's name means, or -1. */

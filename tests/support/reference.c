@@ -209,9 +209,37 @@ static void bend(struct sample *at, const struct disc *d, float z, float bent, u
  * pushed. */
 struct fragment {
     float z, distance, offset[3], margin, behind;
+    float centre; /* depth that the margin is told as a share of: of a disc its centre's, of what else its own */
+    bool back;  /* it turns its back to the eye */
+    bool lines; /* it is of a line, which has no sides */
     bool whole; /* of a line or a panel, whose samples all weigh 1 in method nearest */
     uint32_t size; /* of a disc, there: how often its radius was halved */
 };
+
+/* Words of depths of method splat end in 7 bits: the share that they are pushed back by, 2 bits of mantissa and
+ * exponents -16 to -1 rounded down, then whether a back is seen. */
+static float with_side(float pushed, float margin, float z, bool back)
+{
+    const float share = margin / (z + margin);
+    uint32_t word;
+    int exponent;
+    const float mantissa = frexpf(share, &exponent); /* 0.5 to 1 */
+    const int steps = share > 0 ? 4 * (exponent + 15) + (int)(8 * mantissa) - 4 : 0;
+    memcpy(&word, &pushed, 4);
+    word = ((word + 127) & ~127u) | (uint32_t)(steps < 0 ? 0 : steps > 63 ? 63 : steps) << 1 | back;
+    memcpy(&pushed, &word, 4);
+    return pushed;
+}
+
+/* Turns what is seen at depth z the other side to the eye than what set `first`, behind it? */
+static bool is_hidden(float first, float z, bool back)
+{
+    uint32_t word;
+    memcpy(&word, &first, 4);
+    const int steps = word >> 1 & 63;
+    const float share = steps ? ldexpf((float)(4 + steps % 4) / 8, steps / 4 - 15) : 0;
+    return (word & 1) != back && z > first * (1 - share);
+}
 
 static void draw(struct scene *s, const struct disc *d, struct sample *at, const struct fragment *f, bool shade)
 {
@@ -222,6 +250,7 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
              f->whole ? 0 : (uint32_t)(f->distance * 63) | f->size << 6);
         return;
     }
+    pushed = with_side(pushed, f->margin, f->centre, f->back);
     if (!shade) {
         at->light += light;
         at->fragments += !light;
@@ -230,6 +259,8 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
         return;
     }
     if (z + f->behind > at->first || pushed < at->first) /* the latter was trimmed */
+        return;
+    if (!f->lines && is_hidden(at->first, z + f->behind, f->back))
         return;
     if (pushed == at->first && d->id < at->id)
         at->id = d->id;
@@ -298,6 +329,8 @@ static void depth_disc(struct scene *s, const struct disc *d, bool shade)
     float slant = 1.0f / fmaxf(fabsf(facing), 1e-6f);
     slant = slant < 1 ? 1 : slant > SPL_MARGIN_SLANT ? SPL_MARGIN_SLANT : slant;
     struct fragment f = {.margin = margin_of(s, d->radius, d->p[2], slant),
+                         .centre = d->p[2],
+                         .back = facing > 0,
                          .behind = s->sided && facing > 0 ? d->radius : 0};
     float radius = (float)s->camera.fx * fminf(fabsf(facing), 1) * d->radius / ray_scale(&s->camera, d->p[2]);
     for (radius /= SPL_SMOOTH_RADIUS; radius >= 1 && f.size < 2; radius /= 2)
@@ -351,8 +384,10 @@ static void draw_fragment(void *context, const struct reference_fragment *from)
     if (!(sums(s) && panels->shade) && panels->trims && reference_map_trims(panels->trims, p, d.n, radius))
         return;
     struct fragment f = {.z = from->z,
+                         .centre = from->z,
                          .distance = from->light,
                          .margin = margin_of(s, radius, from->z, from->slant),
+                         .back = from->behind,
                          .behind = s->sided && from->behind ? radius : 0,
                          .whole = true};
     draw(s, &d, sample_of(s, from->x, from->y), &f, panels->shade);
@@ -364,10 +399,11 @@ static void wide_piece(struct scene *s, const struct disc ends[2], const struct 
     const struct reference_capsule c = reference_capsule(&s->camera, cut);
     for (int64_t y = 0; y < s->camera.height; y++)
         for (int64_t x = 0; x < s->camera.width; x++) {
-            struct fragment f = {.whole = true};
+            struct fragment f = {.lines = true, .whole = true};
             bool second;
             f.distance = reference_capsule_sample(&c, (int)x, (int)y, &f.z, &second);
             f.margin = margin_of(s, cut->half, f.z, 1);
+            f.centre = f.z;
             float p[3];
             view_point(s, (int)x, (int)y, f.z, p);
             if (f.distance < 1 && !is_dropped(s, UINT64_MAX, p))

@@ -1,6 +1,6 @@
-/* Where the points are, by quantiles: the box begins at a hundredth of them from either end and goes on outwards as
- * long as there is no gap, so that a mast or a wire that few points show belongs to it, and a bird or noise far off
- * does not. One thread; the outcome depends on the points alone. */
+/* Where the points are, by quantiles: the box begins at a hundredth of them from either end, or within a gap as wide as
+ * most of the scan, and goes on outwards as long as there is no gap, so that a mast or a wire that few points show
+ * belongs to it, and a bird or noise far off does not. One thread; the outcome depends on the points alone. */
 #include "pack/view/sample.h"
 
 #include <math.h>
@@ -9,17 +9,12 @@
 
 #include "base/memory.h"
 #include "geom/vector.h"
+#include "pack/bulk.h"
 #include "pack/median.h"
 #include "pack/up.h"
 
 enum { sample_max = 200000, tail = 100 };
 static const double gap_most = 0.04, beyond_most = 0.3; /* of the larger extent of the bulk */
-
-static int compare_doubles(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
 
 void spl_view_to_world(const struct spl_view_sample *s, const double local[3], double world[3])
 {
@@ -53,7 +48,7 @@ static double walk(const double *sorted, size_t count, size_t from, int step, do
 
 static int find_box(struct spl_view_sample *s, size_t count, struct spl_error *err)
 {
-    double *sorted[3] = {0}, extent = 0, radius;
+    double *sorted[3] = {0}, width = 0, extent = 0, radius;
     if (!(sorted[0] = spl_alloc_raw(count, sizeof **sorted, err)))
         return SPL_E_NOMEM;
     for (size_t i = 0; i < count; i++)
@@ -61,7 +56,7 @@ static int find_box(struct spl_view_sample *s, size_t count, struct spl_error *e
     radius = 10 * sqrt(spl_nth(sorted[0], count, count / 2));
     for (int a = 0; a < 3; a++) /* what doubles tell apart there */
         radius = fmax(radius, 1e-14 * fabs(s->at[count / 2][a]));
-    size_t first = count / tail, last = count - 1 - count / tail;
+    size_t first[3], last[3];
     int rc = 0;
     for (int a = 0; !rc && a < 3; a++) {
         if (!sorted[a] && !(sorted[a] = spl_alloc_raw(count, sizeof **sorted, err))) {
@@ -70,16 +65,15 @@ static int find_box(struct spl_view_sample *s, size_t count, struct spl_error *e
         }
         for (size_t i = 0; i < count; i++)
             sorted[a][i] = s->at[i][a];
-        /* what lies between is asked for nothing */
-        spl_nth(sorted[a], count, first);
-        spl_nth(sorted[a] + first, count - first, last - first);
-        qsort(sorted[a], first, sizeof **sorted, compare_doubles);
-        qsort(sorted[a] + last, count - last, sizeof **sorted, compare_doubles);
-        extent = fmax(extent, sorted[a][last] - sorted[a][first]);
+        width = fmax(width, spl_bulk_order(sorted[a], count));
     }
     for (int a = 0; !rc && a < 3; a++) {
-        s->low[a] = walk(sorted[a], count, first, -1, gap_most * extent, beyond_most * extent);
-        s->high[a] = walk(sorted[a], count, last, 1, gap_most * extent, beyond_most * extent);
+        spl_bulk_find(sorted[a], count, count / tail, width, &first[a], &last[a]);
+        extent = fmax(extent, sorted[a][last[a]] - sorted[a][first[a]]);
+    }
+    for (int a = 0; !rc && a < 3; a++) {
+        s->low[a] = walk(sorted[a], count, first[a], -1, gap_most * extent, beyond_most * extent);
+        s->high[a] = walk(sorted[a], count, last[a], 1, gap_most * extent, beyond_most * extent);
         if (s->high[a] - s->low[a] < radius) { /* of a single point, too, there is something to see */
             s->low[a] -= radius;
             s->high[a] += radius;

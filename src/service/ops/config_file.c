@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/memory.h"
+#include "base/near_name.h"
 #include "service/ops/options.h"
 
 enum { config_max = 1 << 20 };
@@ -40,9 +41,14 @@ static int parse_line(struct spl_service_options *options, const char *path, uns
         return spl_fail(err, SPL_E_USAGE, "%s'%.80s' is no 'name = value'", where, text);
     char *value = trim(equals + 1, equals + strlen(equals)), *name = trim(text, equals);
     size_t index = spl_parameter_find(name);
-    if (index == SPL_PARAMETERS)
-        return spl_fail(err, SPL_E_USAGE, "%sthere is no parameter '%.80s'; 'splatd serve --help' lists them", where,
-                        name);
+    if (index == SPL_PARAMETERS) {
+        struct spl_near_name near = spl_near_name_of(name);
+        char meant[SPL_NEAR_NAME_TEXT_MAX];
+        for (size_t i = 0; i < SPL_PARAMETERS; i++)
+            spl_near_name_offer(&near, spl_parameters[i].name);
+        return spl_fail(err, SPL_E_USAGE, "%sthere is no parameter '%.80s'; %s'splatd serve --help' lists them", where,
+                        name, spl_near_name_say(&near, meant));
+    }
     if (given[index] && spl_parameters[index].type != SPL_PARAMETER_LIST)
         return spl_fail_field(err, SPL_E_USAGE, name, "%s%s is given a second time, as '%.80s'; line %u has it already",
                               where, name, value, given[index]);

@@ -8,6 +8,7 @@
 #include <strings.h>
 
 #include "base/decimal.h"
+#include "base/near_name.h"
 #include "dataset/saved_views.h"
 #include "image/color.h"
 
@@ -33,20 +34,29 @@ static const char *say_taken(enum spl_value_place place)
                                    : NULL;
 }
 
+/* Of enum spl_value_place; a pick takes a view's camera. */
+static unsigned get_places(enum param param)
+{
+    unsigned places = spl_params[param].places;
+    if ((int)param < (int)SPL_CAMERA_PARAMS)
+        return places | (places & SPL_QUERY ? SPL_PICK : 0) | (places & SPL_BODY ? SPL_PICK_BODY : 0);
+    return places | (places & SPL_PICK ? SPL_PICK_BODY : 0);
+}
+
 enum param spl_param_find(const char *name, enum spl_value_place place, struct spl_error *err)
 {
     const char *taken = say_taken(place), *ours = place & (SPL_QUERY | SPL_CAMERA) ? spl_camera_find_ours(name) : NULL;
+    struct spl_near_name near = spl_near_name_of(name);
     for (int i = 0; i < PARAM_COUNT; i++) {
         const struct param_info *info = &spl_params[i];
         bool alias = place & (SPL_QUERY | SPL_PICK) && info->alias[0] && !strcasecmp(name, info->alias);
-        if (strcmp(name, info->name) && !alias)
+        bool taken_here = get_places((enum param)i) & place;
+        if (strcmp(name, info->name) && !alias) {
+            if (taken_here)
+                spl_near_name_offer(&near, info->name);
             continue;
-        unsigned places = info->places;
-        if (i < (int)SPL_CAMERA_PARAMS)
-            places |= (places & SPL_QUERY ? SPL_PICK : 0) | (places & SPL_BODY ? SPL_PICK_BODY : 0);
-        else
-            places |= places & SPL_PICK ? SPL_PICK_BODY : 0;
-        if (places & place)
+        }
+        if (taken_here)
             return (enum param)i;
         if (ours)
             break;
@@ -61,10 +71,11 @@ enum param spl_param_find(const char *name, enum spl_value_place place, struct s
                                                             : "give it beside \"camera\"");
         return PARAM_COUNT;
     }
+    char meant[SPL_NEAR_NAME_TEXT_MAX];
     if (ours)
         spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s': it is called '%s'", name, ours);
     else
-        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s", name,
+        spl_fail_field(err, SPL_E_INPUT, name, "unknown parameter '%s'; %s%s", name, spl_near_name_say(&near, meant),
                        taken ? taken : "/v1/openapi.json lists those of a view");
     return PARAM_COUNT;
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/near_name.h"
 #include "cloud/path.h"
 #include "image/video.h"
 #include "service/request/body.h"
@@ -25,15 +26,17 @@ static int fail_type(const char *name, const char *wanted, const json_t *json, s
 static int check_keys(json_t *object, const char *where, const char *const *known, struct spl_error *err)
 {
     const char *name;
+    char meant[SPL_NEAR_NAME_TEXT_MAX];
     json_t *value;
     json_object_foreach(object, name, value)
     {
+        struct spl_near_name near = spl_near_name_of(name);
         const char *const *k = known;
-        while (*k && strcmp(*k, name))
-            k++;
+        for (; *k && strcmp(*k, name); k++)
+            spl_near_name_offer(&near, *k);
         if (!*k)
-            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of %s; /v1/openapi.json lists them",
-                                  name, where);
+            return spl_fail_field(err, SPL_E_INPUT, name, "unknown field '%.60s' of %s; %s/v1/openapi.json lists them",
+                                  name, where, spl_near_name_say(&near, meant));
     }
     return 0;
 }

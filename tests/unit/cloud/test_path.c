@@ -305,6 +305,8 @@ static void test_what_is_no_trajectory_says_so(void **state)
          "unknown field 'blur' of a view; known are camera, time, width, height, near"},
         {OWN("{\"camera\":{\"eye\":[1,2,3]},\"t\":4}"),
          "'t' belongs into the \"camera\" object; known beside it are camera, time"},
+        {OWN("{\"camera\":{\"eye\":[1,2,3],\"taget\":[0,0,0]}}"),
+         "unknown field 'taget' of a camera; did you mean 'target'? known are"},
         {OWN("{\"camera\":{\"eye\":[1,2,3],\"lookAt\":[0,0,0]}}"),
          "unknown field 'lookAt' of a camera: it is called target"},
     };

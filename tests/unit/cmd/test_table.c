@@ -192,19 +192,6 @@ static void what_is_wrong_is_said(void **state)
             fail_msg("'%s' says: %s", bad[i].line, err.message);
 }
 
-static void the_nearest_name_is_near(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"render", "serve", "bench", "synth", NULL};
-    assert_string_equal(spl_cmd_find_nearest("rendr", names), "render");
-    assert_string_equal(spl_cmd_find_nearest("--sevre=x", names), "serve");
-    assert_string_equal(spl_cmd_find_nearest("snyth", names), "synth");
-    assert_string_equal(spl_cmd_find_nearest("bench", names), "bench");
-    assert_null(spl_cmd_find_nearest("pack", names));
-    assert_null(spl_cmd_find_nearest("", names));
-    assert_null(spl_cmd_find_nearest("a-name-that-is-far-longer-than-any-option-that-there-is", names));
-}
-
 static void help_follows_from_the_rows(void **state)
 {
     (void)state;
@@ -249,7 +236,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(defaults_are_those_of_the_rows), cmocka_unit_test(options_set_their_members),
-        cmocka_unit_test(what_is_wrong_is_said),          cmocka_unit_test(the_nearest_name_is_near),
+        cmocka_unit_test(what_is_wrong_is_said),
         cmocka_unit_test(help_follows_from_the_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

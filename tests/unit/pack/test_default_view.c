@@ -364,6 +364,28 @@ static void what_stands_over_is_in_it(void **state)
     free(cloud.at);
 }
 
+/* Heights that mean none, more of them than a hundredth, far below a slope. */
+static void heights_that_mean_none_do_not_count(void **state)
+{
+    (void)state;
+    static const double up[3] = {0, 0, 1};
+    struct cloud cloud = {0};
+    double before, fill;
+    add_sheet(&cloud, (double[]){0, 0, 0}, (double[]){60, 0, 5}, (double[]){0, 20, 0}, 0.5, up);
+    const size_t sheet = cloud.count;
+    struct spl_dataset *dataset = open_packed(&cloud, false, "m");
+    share_in_view(dataset, &cloud, sheet, 1280, 720, &before);
+    spl_dataset_close(dataset);
+    for (size_t k = 0; k < sheet / 30; k++)
+        add(&cloud, (double)cloud.at[31 * k % sheet][0], (double)cloud.at[31 * k % sheet][1], -9999, 0, 0, 0);
+    dataset = open_packed(&cloud, false, "m");
+    assert_true(share_in_view(dataset, &cloud, sheet, 1280, 720, &fill) >= 1);
+    if (fill < 0.95 * before)
+        fail_msg("%g of the image, %g without them", fill, before);
+    spl_dataset_close(dataset);
+    free(cloud.at);
+}
+
 /* A dense street before few points of the bushes behind it, which a tile's root has nearly all of: packed in two tiles
  * that are collected, it is framed as packed whole. */
 static void a_collection_is_seen_as_a_pack_is(void **state)
@@ -649,6 +671,7 @@ int main(void)
         cmocka_unit_test(what_is_open_is_seen_from_outside),
         cmocka_unit_test(all_of_it_is_in_images_of_any_shape),
         cmocka_unit_test(what_stands_over_is_in_it),
+        cmocka_unit_test(heights_that_mean_none_do_not_count),
         cmocka_unit_test(a_collection_is_seen_as_a_pack_is),
         cmocka_unit_test(what_faces_somewhere_is_seen_from_there),
         cmocka_unit_test(as_wide_as_coordinates_go),

@@ -67,6 +67,10 @@ static void a_tile_lies_among_others(void **state)
     err = (struct spl_error){0};
     assert_int_equal(spl_tile_request_from_query("rotation=1", 10, &tile, &defaults, &limits, &r, &err), SPL_E_INPUT);
     assert_non_null(strstr(err.message, "unknown parameter 'rotation'; a tile's path"));
+    err = (struct spl_error){0};
+    assert_int_equal(spl_tile_request_from_query("supersampling=2", 15, &tile, &defaults, &limits, &r, &err),
+                     SPL_E_INPUT);
+    assert_non_null(strstr(err.message, "'supersampling'; did you mean 'supersample'? a tile's path"));
     assert_int_equal(spl_view_request_from_query("shade=edl", 9, &defaults, &limits, &r, &err), 0);
     assert_false(r.view.surrounded);
 }
