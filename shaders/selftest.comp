@@ -85,6 +85,7 @@ void put_frame()
     put(frame.cut_half[0]), put(frame.cut_half[1]), put(frame.cut_half[2]);
     put(frame.cut_least), put(frame.cut_most);
     put(frame.cut_flags);
+    put(frame.side_bits);
 }
 
 void put_chunk(spl_draw_chunk c)

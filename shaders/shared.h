@@ -410,6 +410,11 @@ struct spl_chunk_bounds {
     SPL_F32 near;        /* least view depth of its discs; 0 = never occluded (it reaches the eye's plane) */
 };
 
+/* Depth words of method splat end in these: see common/frame.glsl. They may say it where the least margin, that of a
+ * disc of one sample, is this share of depth at least: eight times what the bits round. */
+#define SPL_SIDE_BITS 127u
+#define SPL_SIDE_SHARE 6.1e-5f
+
 /* Flags of a frame. */
 #define SPL_FRAME_KEEP 1u  /* fill: samples are visible in any case */
 #define SPL_FRAME_SIDED 2u /* what turns its back to the eye lies behind what faces it */
@@ -453,6 +458,8 @@ struct spl_frame_params {
     SPL_F32 cut_half[3];
     SPL_F32 cut_least, cut_most;
     SPL_U32 cut_flags;                    /* SPL_SHAPE_*, and what joins its test: SPL_TEST_* */
+    SPL_U32 side_bits;                    /* the last bits of depth words of method splat that say which side is seen:
+                                             SPL_SIDE_BITS, or none where depths need all of theirs */
 };
 
 #ifndef SPL_GLSL
@@ -466,7 +473,7 @@ _Static_assert(SPL_PANEL_WINDOW * SPL_PANEL_WINDOW / SPL_LANES + SPL_PANEL_SIDE 
                "the same of a panel");
 _Static_assert(2 * SPL_MESH_WINDOW * SPL_MESH_WINDOW * (1 << 2 * SPL_RELIEF_LEVEL_MAX) / SPL_MESH_LANES < 55000,
                "the same of a mesh, with some for what the rows of its triangles are short of");
-_Static_assert(sizeof(struct spl_frame_params) == 328, "spl_frame_params is 328 bytes on both sides");
+_Static_assert(sizeof(struct spl_frame_params) == 332, "spl_frame_params is 332 bytes on both sides");
 #endif
 
 #endif

@@ -33,12 +33,11 @@ float depth_slack(float z, float share)
     return share * scale;
 }
 
-/* Depth words of method splat say in their last seven bits what set them: whether that turned its back to the eye, and
- * which share of its depth it was pushed back by, of two bits of mantissa and exponents -16 to -1, rounded down; 0 is
- * none. They are never nearer than what they are of. */
+/* Depth words of method splat say in their last bits, frame.side_bits, what set them: whether that turned its back to
+ * the eye, and which share of its depth it was pushed back by, of two bits of mantissa and exponents -16 to -1, rounded
+ * down; 0 is none. They are never nearer than what they are of. */
 #define SIDE_ZERO ((127 - 16) << 2) /* the upper bits of the float that share 0 would be */
 #define SIDE_SHIFT 21               /* 23 - 2 */
-#define SIDE_BITS 127u
 
 uint side_of(float margin, float z, bool back)
 {
@@ -49,17 +48,17 @@ uint side_of(float margin, float z, bool back)
 
 uint sided_word(float pushed, uint side)
 {
-    return ((floatBitsToUint(pushed) + SIDE_BITS) & ~SIDE_BITS) | side;
+    return ((floatBitsToUint(pushed) + frame.side_bits) & ~frame.side_bits) | (side & frame.side_bits);
 }
 
 /* Is what turns `side` to the eye at depth z hidden by what set `word`, though within its margin? It is if it turns the
  * other side and lies behind: of a wall thinner than the margin the far sheet. */
 bool is_hidden(uint word, uint side, float z)
 {
-    uint code = (word & SIDE_BITS) >> 1;
+    uint code = (word & frame.side_bits) >> 1;
     float share = code == 0u ? 0.0 : uintBitsToFloat((code + uint(SIDE_ZERO)) << SIDE_SHIFT);
     precise float surface = uintBitsToFloat(word) * (1.0 - share);
-    return ((word ^ side) & 1u) != 0u && z > surface;
+    return ((word ^ side) & frame.side_bits & 1u) != 0u && z > surface;
 }
 
 /* Where a point of view space falls on the image. */

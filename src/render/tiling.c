@@ -61,6 +61,21 @@ static bool has_sides(const struct spl_dataset_info *info, const struct spl_view
     return info->has_sides || info->panels || info->meshes || (info->maps && spl_view_get_maps(view));
 }
 
+/* Can depth words of method splat do without the bits that say which side is seen? */
+static bool tells_sides(const struct spl_tile *tile)
+{
+    const struct spl_camera *camera = &tile->camera;
+    const struct spl_dataset_info *info = spl_dataset_get_info(tile->resident->dataset);
+    double farthest = 0, margin = tile->view->disc.margin * (double)SPL_LOW_PASS / camera->fx;
+    if (camera->projection != SPL_ORTHOGRAPHIC)
+        return margin >= (double)SPL_SIDE_SHARE;
+    for (int a = 0; a < 3; a++) {
+        double axis = camera->rotation[6 + a];
+        farthest += axis * ((axis > 0 ? info->bounds_max : info->bounds_min)[a] - camera->eye[a]);
+    }
+    return margin >= (double)SPL_SIDE_SHARE * farthest;
+}
+
 static void set_params(struct spl_tile *tile)
 {
     const struct spl_camera *camera = &tile->camera;
@@ -85,6 +100,7 @@ static void set_params(struct spl_tile *tile)
         .crop_width = tile->width,
         .crop_height = tile->height,
         .flags = has_sides(info, view) ? SPL_FRAME_SIDED : 0,
+        .side_bits = tells_sides(tile) ? SPL_SIDE_BITS : 0,
     };
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++)

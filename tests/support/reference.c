@@ -218,7 +218,7 @@ struct fragment {
 
 /* Words of depths of method splat end in 7 bits: the share that they are pushed back by, 2 bits of mantissa and
  * exponents -16 to -1 rounded down, then whether a back is seen. */
-static float with_side(float pushed, float margin, float z, bool back)
+static float with_side(const struct scene *s, float pushed, float margin, float z, bool back)
 {
     const float share = margin / (z + margin);
     uint32_t word;
@@ -226,19 +226,20 @@ static float with_side(float pushed, float margin, float z, bool back)
     const float mantissa = frexpf(share, &exponent); /* 0.5 to 1 */
     const int steps = share > 0 ? 4 * (exponent + 15) + (int)(8 * mantissa) - 4 : 0;
     memcpy(&word, &pushed, 4);
-    word = ((word + 127) & ~127u) | (uint32_t)(steps < 0 ? 0 : steps > 63 ? 63 : steps) << 1 | back;
+    const uint32_t side = (uint32_t)(steps < 0 ? 0 : steps > 63 ? 63 : steps) << 1 | back;
+    word = ((word + s->side_bits) & ~s->side_bits) | (side & s->side_bits);
     memcpy(&pushed, &word, 4);
     return pushed;
 }
 
 /* Turns what is seen at depth z the other side to the eye than what set `first`, behind it? */
-static bool is_hidden(float first, float z, bool back)
+static bool is_hidden(const struct scene *s, float first, float z, bool back)
 {
     uint32_t word;
     memcpy(&word, &first, 4);
     const int steps = word >> 1 & 63;
     const float share = steps ? ldexpf((float)(4 + steps % 4) / 8, steps / 4 - 15) : 0;
-    return (word & 1) != back && z > first * (1 - share);
+    return s->side_bits && (word & 1) != back && z > first * (1 - share);
 }
 
 static void draw(struct scene *s, const struct disc *d, struct sample *at, const struct fragment *f, bool shade)
@@ -250,7 +251,7 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
              f->whole ? 0 : (uint32_t)(f->distance * 63) | f->size << 6);
         return;
     }
-    pushed = with_side(pushed, f->margin, f->centre, f->back);
+    pushed = with_side(s, pushed, f->margin, f->centre, f->back);
     if (!shade) {
         at->light += light;
         at->fragments += !light;
@@ -260,7 +261,7 @@ static void draw(struct scene *s, const struct disc *d, struct sample *at, const
     }
     if (z + f->behind > at->first || pushed < at->first) /* the latter was trimmed */
         return;
-    if (!f->lines && is_hidden(at->first, z + f->behind, f->back))
+    if (!f->lines && is_hidden(s, at->first, z + f->behind, f->back))
         return;
     if (pushed == at->first && d->id < at->id)
         at->id = d->id;
@@ -675,6 +676,11 @@ int reference_render(const struct spl_dataset *dataset, const struct spl_view *v
     const struct spl_dataset_info *info = spl_dataset_get_info(dataset);
     const bool mapped = info->maps && view->maps == SPL_MAPS_ON && draws_discs(view);
     s.sided = mapped || info->has_sides || info->panels || info->meshes;
+    double deep = s.camera.projection == SPL_ORTHOGRAPHIC ? 0 : 1; /* that the least margin is held against */
+    for (int a = 0; a < 3 && s.camera.projection == SPL_ORTHOGRAPHIC; a++)
+        deep += fmax(s.camera.rotation[6 + a] * (info->bounds_min[a] - s.camera.eye[a]),
+                     s.camera.rotation[6 + a] * (info->bounds_max[a] - s.camera.eye[a]));
+    s.side_bits = view->disc.margin * (double)SPL_LOW_PASS / s.camera.fx < (double)SPL_SIDE_SHARE * deep ? 0 : 127;
     const struct naive_options options = {.dataset = dataset,
                                           .camera = &s.camera,
                                           .lod = view->lod,

@@ -39,6 +39,7 @@ struct scene {
     uint32_t weight_max;
     float margin;
     bool sided;
+    uint32_t side_bits; /* of depths of method splat */
     double advance; /* what depths of the image are more by than those that are drawn: spl_camera_advance() */
     uint32_t *atoms;    /* the dictionary, expanded */
     uint32_t *textures; /* of page textures_page */

@@ -12,6 +12,7 @@
 #include <splatd/collect.h>
 #include <splatd/pack.h>
 
+#include "base/array.h"
 #include "clouds.h"
 #include "dataset/dataset.h"
 #include "pack/median.h"
@@ -20,13 +21,13 @@ static char folder[] = "/tmp/splatd-view-XXXXXX";
 static char scan[64], packed[64];
 
 struct cloud {
-    size_t count;
+    size_t count, capacity;
     float (*at)[6]; /* position, normal */
 };
 
 static void add(struct cloud *cloud, double x, double y, double z, double nx, double ny, double nz)
 {
-    cloud->at = realloc(cloud->at, (cloud->count + 1) * sizeof *cloud->at);
+    assert_int_equal(spl_array_reserve(cloud->at, cloud->capacity, cloud->count + 1, NULL), 0);
     const double all[6] = {x, y, z, nx, ny, nz};
     for (int i = 0; i < 6; i++)
         cloud->at[cloud->count][i] = (float)all[i];
