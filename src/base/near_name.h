@@ -5,8 +5,8 @@
 #include <stddef.h>
 
 /* The nearest of the names that were offered so far: the one with the fewest letters to change, add, leave out or swap,
- * where these are at most a third of the word's, whatever their case. What begins as the word does, or the word as it,
- * by three letters or more, is as near as can be. Pure; nothing is owned. */
+ * where these are at most a third of the word's and three, whatever their case. What begins as the word does, or the
+ * word as it, by three letters or more, is as near as can be. Pure; nothing is owned. */
 struct spl_near_name {
     const char *word;
     size_t length, off; /* of the word that count; letters that the nearest is off, which a nearer one is below */

@@ -61,7 +61,7 @@ static bool has_sides(const struct spl_dataset_info *info, const struct spl_view
     return info->has_sides || info->panels || info->meshes || (info->maps && spl_view_get_maps(view));
 }
 
-/* Can depth words of method splat do without the bits that say which side is seen? */
+/* Can depth words of method splat spare the bits that say which side is seen? */
 static bool tells_sides(const struct spl_tile *tile)
 {
     const struct spl_camera *camera = &tile->camera;

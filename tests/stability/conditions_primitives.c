@@ -87,7 +87,8 @@ static const struct {
      .sights = {{"slats 20 mm wide", NULL, {0, -2.4, 1.4}, {0, 0, 1.4}, .worse = {0, 0.001, 0.001, 0.001}}}},
     /* Each face is a plane of its own, and the one that turns its back lies behind: splats, of a scan that says its
      * station, tell them apart as far as noise lets them. At the foot of a sheet the floor ends where both meet, and
-     * the sheet's last points lie up to two spacings above. */
+     * the sheet's last points lie up to two spacings above. Where sides are guessed splats tell sheets apart by them,
+     * too, since depth words say which is seen: they gained 7.5 and 1.4 dB by it, panels 3.1 and 0.3. */
     {"primitives: thin walls",
      {"thin-walls", POINTS, -1, 0, 0, 0},
      .found = {0.99, 1, 60},

@@ -14,7 +14,7 @@
 #include "support/reference_maps.h"
 
 struct sample {
-    float first;   /* pushed depth, INFINITY = nothing; of method splat with the side that is seen in its last bit */
+    float first;   /* pushed depth, INFINITY = nothing; of method splat with what set it in its last bits */
     float own;     /* method nearest: depth of the winner, which is not bent */
     uint32_t id;
     uint32_t fragments; /* discs and panels that cover it */
