@@ -49,25 +49,30 @@ tell() {
     mv "$out/$1.built.new" "$out/$1.built"
 }
 
-# Waits for a build and shows what is said of it; a broken one is counted.
-built() {
+# Waits for a build; is it there?
+is_built() {
     until [ -f "$out/$1.built" ]; do
         kill -0 "${others-}" 2>/dev/null || [ -f "$out/$1.built" ] || { echo "$1 was not built" >"$out/$1.said"; tell "$1" no; }
         sleep 1
     done
+    [ "$(cat "$out/$1.built")" = yes ]
+}
+
+# The same, and shows what is said of it; a broken one is counted.
+built() {
+    is_built "$1" || { failed=$((failed + 1)); tail -20 "$out/$1.said" >>"$out/why.txt"; cat "$out/$1.said"; return 1; }
     cat "$out/$1.said"
-    [ "$(cat "$out/$1.built")" = yes ] || { failed=$((failed + 1)); tail -20 "$out/$1.said" >>"$out/why.txt"; return 1; }
 }
 
 # name, tests at once, suites…: runs them together, so that no processor waits for the longest of each; what failed is
 # shown with its output, and every suite is counted. Tests have ten times their limit: machines are shared, and others
 # build beside them. `only` names those that run, `but` suites whose tests do not.
 suites() {
-    local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/testlog told p f s
+    local name=$1 at_once=$2 begin=$SECONDS log=$out/$1/meson-logs/$3 told p f s
     shift 2
     rm -f "$log".{json,txt}
     ${run_under-} meson test -C "$out/$name" --no-rebuild "${@/#/--suite=}" ${but+"${but[@]/#/--no-suite=}"} --print-errorlogs ${only-} \
-        --num-processes "$at_once" --timeout-multiplier "${timeouts:-10}" >"$out/$name-$1.log" 2>&1 || true
+        --logbase "$1" --num-processes "$at_once" --timeout-multiplier "${timeouts:-10}" >"$out/$name-$1.log" 2>&1 || true
     told=$(python3 tests/counts.py "$name" "$log.json" "$out/why.txt" "$@")
     echo "${told%$'\n'*}"
     read -r p f s <<<"${told##*$'\n'}"
@@ -88,7 +93,7 @@ sanitiser_runs() {
 deploy/install-packages.sh build run quickstart test
 [ "$mode" != --full ] || deploy/install-packages.sh full
 
-rm -f "$out"/*.built
+rm -f "$out"/*.{built,counts}
 : >"$out/why.txt"
 sanitised=(-Ddebug=false -Dc_args=-g1 -Doptimization=1 -Db_lundef=false) # lines are all that their reports show
 leaks=1
@@ -123,7 +128,7 @@ if [ "$mode" != --quick ]; then
         build_others
     ) &
     others=$!
-    trap 'kill $others 2>/dev/null || true' EXIT
+    trap 'kill $others ${lane-} 2>/dev/null || true' EXIT
 fi
 here=$(nproc)
 # Units, fuzzers and what strangers send run where AddressSanitizer looks on; here those that it shortens, and last the
@@ -131,48 +136,6 @@ here=$(nproc)
 units=(whole) again=() but=(attack sum) attacks=attack crowds=crowd
 [ "$mode" = "" ] || units=(unit fuzz) but=() attacks=http crowds=http
 [ "$mode" != --full ] || units+=(gpu-again) again=(unit-again)
-if built normal; then
-    suites normal "$here" "${units[@]}" rules gpu golden library fault stability e2e
-    suites normal $((2 * here)) http deploy # which wait most of their time
-fi
-[ "$mode" != --quick ] || { finish; exit; }
-
-unset but
-if built asan; then
-    timeouts=15 run_under="env LD_PRELOAD=$out/keep-loaded.so"
-    suites asan "$here" unit "${again[@]}" fuzz
-    suites asan $((2 * here)) "$attacks"
-    only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
-    [ "$mode" != --full ] || only=""
-    suites asan "$here" gpu
-    only="" timeouts="" run_under=""
-    if [ "$mode" = "" ]; then
-        cp -p "$out"/asan/tests/http/exercised/* "$out/normal/tests/http/exercised/" || true # none has passed: the sum says so
-        suites normal 1 sum
-    fi
-fi
-if built tsan; then
-    if sanitiser_runs thread env; then
-        runs_here=env
-    elif sanitiser_runs thread setarch -R; then
-        runs_here="setarch -R"
-    fi
-    if [ -n "${runs_here-}" ]; then
-        timeouts=25 run_under=$runs_here
-        suites tsan "$here" unit "${again[@]}"
-        suites tsan $((2 * here)) "$crowds"
-        timeouts="" run_under=""
-    else
-        echo "note: no thread check, TSan does not start on this kernel"
-        skipped=$((skipped + 1))
-    fi
-fi
-if built no-vulkan; then
-    only="gpu-egl exact-egl devices" suites no-vulkan "$here" gpu # units do not see the backend
-fi
-if built no-egl; then
-    only="gpu-vulkan exact-vulkan devices" suites no-egl "$here" gpu # nor this one, nor what stands in for FFmpeg and systemd
-fi
 # One program as a test: what it is called, and its command.
 program() {
     local name=$1 begin=$SECONDS verdict=passed
@@ -185,8 +148,74 @@ program() {
     fi
     printf '%-10s %-8s %s in %d s\n' "$name" "" "$verdict" $((SECONDS - begin))
 }
-# For what it warns of alone: the sanitised builds see what code does that only one compiler bears.
-program clang python3 tests/clang.py "$out/normal"
+
+# Two lanes, since tests over HTTP wait most of their time: what computes takes what they leave of the processors.
+computing() {
+    if built asan; then
+        timeouts=15 run_under="env LD_PRELOAD=$out/keep-loaded.so"
+        suites asan "$here" unit "${again[@]}" fuzz
+        only="gpu-vulkan gpu-egl exact-vulkan residency-vulkan"
+        [ "$mode" != --full ] || only=""
+        suites asan "$here" gpu
+        only="" timeouts="" run_under=""
+    fi
+    if built tsan && [ -n "$tsan_runs" ]; then
+        timeouts=25 run_under=$tsan_runs
+        suites tsan "$here" unit "${again[@]}"
+        timeouts="" run_under=""
+    fi
+    if built no-vulkan; then
+        only="gpu-egl exact-egl devices" suites no-vulkan "$here" gpu # units do not see the backend
+    fi
+    if built no-egl; then
+        only="gpu-vulkan exact-vulkan devices" suites no-egl "$here" gpu # nor this one, nor what stands in for FFmpeg and systemd
+    fi
+    # For what it warns of alone: the sanitised builds see what code does that only one compiler bears.
+    program clang python3 tests/clang.py "$out/normal"
+}
+
+waiting() {
+    ! is_built normal || suites normal $((2 * here)) http deploy
+    unset but
+    if is_built asan; then
+        timeouts=15 run_under="env LD_PRELOAD=$out/keep-loaded.so" suites asan $((2 * here)) "$attacks"
+    fi
+    if is_built tsan && [ -n "$tsan_runs" ]; then
+        timeouts=25 run_under=$tsan_runs suites tsan $((2 * here)) "$crowds"
+    fi
+}
+
+if sanitiser_runs thread env; then
+    tsan_runs="env"
+elif sanitiser_runs thread setarch -R; then
+    tsan_runs="setarch -R"
+else
+    echo "note: no thread check, TSan does not start on this kernel"
+    tsan_runs="" skipped=$((skipped + 1))
+fi
+
+! built normal || suites normal "$here" "${units[@]}" rules gpu golden library fault stability e2e
+[ "$mode" != --quick ] || { ! is_built normal || suites normal $((2 * here)) http deploy; finish; exit; }
+(
+    renice -n 10 $BASHPID >/dev/null
+    unset but
+    passed=0 failed=0 skipped=0
+    computing
+    echo "$passed $failed $skipped" >"$out/computing.counts"
+) &
+lane=$!
+waiting
+wait $lane || true
+if read -r p f s <"$out/computing.counts"; then
+    passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
+else
+    echo "the lane of what computes has ended early" | tee -a "$out/why.txt"
+    failed=$((failed + 1))
+fi
+if [ "$mode" = "" ] && is_built normal; then
+    cp -p "$out"/asan/tests/http/exercised/* "$out/normal/tests/http/exercised/" || true # none has passed: the sum says so
+    suites normal 1 sum
+fi
 [ "$mode" = --full ] || { finish; exit; }
 
 whole=(stability-whole-{conditions,drivers,invariants-vulkan,invariants-egl})

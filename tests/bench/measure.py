@@ -24,8 +24,18 @@ import sys
 import tempfile
 import time
 
-SPLATD = os.environ["SPLATD_BINARY"]
-DATA = pathlib.Path(os.environ["SPLATD_DATA"])
+
+
+def setting(name):
+    """What the environment says; without it, and for --help, what the program says of itself."""
+    if name not in os.environ or {"-h", "--help"} & set(sys.argv[1:]):
+        print(sys.modules["__main__"].__doc__)
+        sys.exit(0 if {"-h", "--help"} & set(sys.argv[1:]) else f"{name} is not set: see 'environment' above")
+    return os.environ[name]
+
+
+SPLATD = setting("SPLATD_BINARY")
+DATA = pathlib.Path(setting("SPLATD_DATA"))
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "splatd-bench"
 CACHE.mkdir(parents=True, exist_ok=True)
 VIEWS = ["--views", str(DATA / "cameras.json"), "--set", "grenoble"]
