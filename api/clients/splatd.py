@@ -160,8 +160,7 @@ class Dataset:
 
     def __init__(self, service, info):
         self.service, self.info, self.id = service, info, info["id"]
-        low, high = info["bounds"]["min"], info["bounds"]["max"]
-        self.center = [(a + b) / 2 for a, b in zip(low, high)]
+        self.center = info["default_view"]["target"]  # bounds have a middle, too, but strays move that anywhere
         self.title, self.description = info.get("title"), info.get("description")  # None where nobody has said any
         self.views = {view["name"]: view for view in info.get("views", [])}
 

@@ -56,11 +56,43 @@ ask() {
 # NAME=VALUE…: a query
 query() { local IFS='&'; echo "$*" | sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/+/%2B/g'; }
 
+# FILE NAME=VALUE…: `said` is what FILE's ending adds to the query; a FILE that would hold something else is refused.
+say_format() {
+    local file=$1 ending='' named='' given='' several='' pair
+    [[ ${file##*/} == ?*.* ]] && ending=${file##*.}
+    shift
+    for pair in "$@"; do
+        case $pair in
+        format=*) given=${pair#*=} ;;
+        layers=* | container=*) several=$pair ;;
+        esac
+    done
+    case $ending in
+    jpg | jpeg) named=jpeg ;;
+    tif | tiff) named=tiff ;;
+    png | webp | npy | raw | zip) named=$ending ;;
+    esac
+    given=${given/%jpg/jpeg} given=${given/%tif/tiff}
+    said=()
+    if [ "$named" = zip ]; then
+        [[ $several == container=* ]] || said=(container=zip)
+    elif [ -n "$several" ]; then
+        [ -z "$named" ] || usage "$command: '$several' is several images: give FILE.zip in the place of '$file'"
+    elif [ -z "$named$given" ]; then
+        usage "$command: '$file' does not say which format: end it in .jpg, .png or .npy, or add format="
+    elif [ -z "$given" ]; then
+        said=("format=$named")
+    elif [ -n "$named" ] && [ "$named" != "$given" ]; then
+        usage "$command: '$file' is no name of a $given: give one that ends in .$given, or another format="
+    fi
+}
+
 # DATASET FILE NAME=VALUE…
 view() {
-    local id=$1 file=$2
+    local id=$1 file=$2 said
     shift 2
-    ask "$base/v1/datasets/$id/view?$(query "$@")" >"$file.part" && mv "$file.part" "$file" ||
+    say_format "$file" "$@"
+    ask "$base/v1/datasets/$id/view?$(query "$@" ${said[@]+"${said[@]}"})" >"$file.part" && mv "$file.part" "$file" ||
         { rm -f "$file.part"; return 1; }
 }
 

@@ -175,10 +175,13 @@ export function fromParams({projection, view_height: height, ...given}, home) {
   return {...camera, flat: true, eye: sub(camera.target, times(axes(camera).forward, far))};
 }
 
+/** Which of x, y, z is up: z unless it is y that is. */
+export const upIndex = (home) => (Math.abs(home.up[1]) > Math.abs(home.up[2]) ? 1 : 2);
+
 /** The same target from one of its sides ("top", "front", "side"), flat; `home` says what is up. */
 export function fromSide(camera, side, home) {
   const x = [1, 0, 0],
-    up = Math.abs(home.up[1]) > Math.abs(home.up[2]) ? [0, 1, 0] : [0, 0, 1];
+    up = [0, 0, 0].with(upIndex(home), 1);
   const ahead = cross(up, x); // north, of z up
   const [direction, upward] = {top: [times(up, -1), ahead], front: [ahead, up], side: [times(x, -1), up]}[side];
   return {...camera, flat: true, up: upward, eye: sub(camera.target, times(direction, distance(camera)))};

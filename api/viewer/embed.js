@@ -9,7 +9,7 @@ import {parse} from "./link.js";
 import {loadTable} from "./methods.js";
 import {notices} from "./notice.js";
 import {named, toWorld} from "./place.js";
-import {askJson, setPass, setToken} from "./service.js";
+import {Problem, askJson, setPass, setToken} from "./service.js";
 import {keptOf} from "./soft_setting.js";
 import {Stage} from "./stage.js";
 
@@ -29,7 +29,7 @@ async function open() {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
     const wrong = [],
       wanted = parse(location.hash, wrong);
-    for (const what of wrong) console.warn(what); // there is no place for it here but the console
+    if (wrong.length) throw new Problem("refused", wrong.join(". "));
     const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, mark, ...setting} = {
       ...named(dataset, wanted, stage.size),
       ...(await toWorld(dataset, wanted)),

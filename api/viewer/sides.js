@@ -1,10 +1,12 @@
 // Top, Front, Side: an orthographic view from there of all that there is, and back; a section is looked at likewise.
 
-import {add, axes, distance, dot, fromSide, same, sub, times, unit} from "./camera.js";
+import {add, axes, distance, dot, fromSide, same, sub, times, unit, upIndex} from "./camera.js";
 import {span} from "./clip_terms.js";
 
 const SIDES = ["top", "front", "side"],
-  MARGIN = 1.04;
+  MARGIN = 1.04,
+  FAR = 30, // heights beyond so many times the default view's distance are strays,
+  NEAR = 2; // and those within so many times it are shown where there are any
 
 const towards = ({eye, target}) => unit(sub(target, eye)).map((x) => Number(x.toFixed(6)) + 0);
 
@@ -12,6 +14,16 @@ const towards = ({eye, target}) => unit(sub(target, eye)).map((x) => Number(x.to
 function seenFrom({camera, home}) {
   const from = (name) => same(towards(camera), towards(fromSide(camera, name, home)));
   return (camera.flat && SIDES.find(from)) || null;
+}
+
+/** The bounds without heights that mean none (-9999) and put the scan beyond what a picture resolves: of where all but a few
+ * points lie, the default view alone knows. Only heights, for streets and tunnels are as long as that. */
+export function withoutStrays({min, max}, home) {
+  const up = upIndex(home),
+    at = home.target[up],
+    far = distance(home);
+  const cut = (x) => (Math.abs(x - at) > FAR * far ? at + Math.sign(x - at) * NEAR * far : x);
+  return {min: min.with(up, cut(min[up])), max: max.with(up, cut(max[up]))};
 }
 
 /** The camera from that side that shows all of the bounds in a picture of this size; its target stays as deep as it is, if that
@@ -40,7 +52,10 @@ export function attachSides(stage, button) {
     [put, bySection] = [camera, section];
     stage.setCamera(camera);
   };
-  const frame = (name, section) => go(framed(stage.camera, name, stage.home, stage.dataset.bounds, stage.size), section);
+  const frame = (name, section) => {
+    const {camera, home, dataset, size} = stage;
+    go(framed(camera, name, home, withoutStrays(dataset.bounds, home), size), section);
+  };
   const back = () => {
     const now = stage.camera,
       {eye, target, up, fov} = round ?? stage.home;

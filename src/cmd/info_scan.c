@@ -75,9 +75,11 @@ static int print_json(json_t *json, struct spl_error *err)
 }
 
 static int tell(struct session *s, const struct spl_scans *scans, struct spl_scan *scan,
-                const struct spl_cloud_info *info, struct spl_error *err)
+                const struct spl_cloud_info *info, const char *strays, struct spl_error *err)
 {
     json_t *json = spl_info_describe_scan(scans, scan, info, s->options);
+    if (strays[0])
+        json_array_append_new(json_object_get(json_object_get(json, "pack"), "warnings"), spl_info_text(strays));
     spl_cmd_progress_finish(&s->progress);
     if (s->options->json)
         return print_json(json, err);
@@ -117,17 +119,18 @@ static int tell_together(struct session *s, const struct spl_scans *scans, struc
 static int tell_all(struct session *s, struct spl_scans *scans, struct spl_stage *stage, struct spl_error *err)
 {
     struct spl_point_batch batch;
+    char strays[SPL_STRAYS_TEXT_MAX];
     int rc = spl_point_batch_init(&batch, batch_points, err);
     for (size_t i = 0; !rc && i < scans->count;) {
         struct spl_cloud *cloud = NULL;
         struct spl_error why = {0};
-        rc = spl_scan_look(scans, &scans->list[i], s->options->read, &batch, stage, &cloud, &why);
+        rc = spl_scan_look(scans, &scans->list[i], s->options->read, &batch, stage, strays, &cloud, &why);
         if (rc && !(rc = spl_inputs_leave_out(scans->inputs, scans->list[i].path, rc, &why, err))) {
             spl_scans_remove(scans, i);
             continue;
         }
         if (!rc)
-            rc = tell(s, scans, &scans->list[i++], spl_cloud_get_info(cloud), err);
+            rc = tell(s, scans, &scans->list[i++], spl_cloud_get_info(cloud), strays, err);
         spl_cloud_destroy(cloud);
     }
     spl_point_batch_finish(&batch);

@@ -10,8 +10,10 @@ static const double dataset_bytes_a_point = 10;
 static const double memory_bytes_a_point = 60, memory_bytes_least = 30e6;
 
 int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool read, struct spl_point_batch *batch,
-                  struct spl_stage *stage, struct spl_cloud **out, struct spl_error *err)
+                  struct spl_stage *stage, char strays[SPL_STRAYS_TEXT_MAX], struct spl_cloud **out,
+                  struct spl_error *err)
 {
+    struct spl_strays sampled = {0};
     struct spl_cloud_options options = scans->how;
     options.colors = &scan->colors;
     struct spl_cloud *cloud = NULL;
@@ -27,6 +29,7 @@ int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool rea
         while (!rc && (rc = spl_cloud_read(cloud, batch, err)) > 0) {
             spl_stage_add(stage, batch->count, 0);
             rc = spl_scan_grow(scan, batch, points, err);
+            spl_strays_add(&sampled, batch);
             points += batch->count;
         }
         spl_stage_end(stage);
@@ -40,6 +43,8 @@ int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool rea
             scan->max[c] = info->bounds[1][c];
         }
     }
+    if (!spl_strays_tell(&sampled, scan->min, scan->max, strays))
+        strays[0] = '\0';
     if (rc) {
         spl_cloud_destroy(cloud);
         return rc;

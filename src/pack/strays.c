@@ -1,8 +1,9 @@
 /* Whether a few points stretch the bounds: the box of all but a thousandth on either side, of an even sample, against
  * that of all. A tripod's points reach some ten times as far as most of them lie; beyond `far_ratio` something is wrong
  * with them, which bounds, first view and the search for wires and planes pay for. More than a thousandth are strays
- * where a gap parts them that is `gap_ratio` times as wide as nearly all others lie: heights that mean none. One
- * thread. */
+ * where a gap parts them that is `gap_ratio` times as wide as nearly all others lie: heights that mean none. Of more
+ * than a twentieth nobody can say which are the scan, unless all of them have one value, which surfaces do not have so
+ * far from all else. One thread. */
 #include "pack/strays.h"
 
 #include <math.h>
@@ -12,36 +13,71 @@
 #include "base/memory.h"
 #include "pack/bulk.h"
 
-enum { sample_most = 1 << 16, points_least = 2000 };
+enum { sample_most = 1 << 16, points_least = 2000, twentieth = 20 };
 static const double left_out = 1e-3, far_ratio = 50, gap_ratio = 4;
 
-bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
+/* How many of `values` are `level`; *gap to the nearest other, *width of what nearly all others lie in. */
+static size_t part(const double *values, size_t count, double level, double *others, double *gap, double *width)
 {
-    const size_t count = p->count < sample_most ? p->count : sample_most;
-    const size_t outer = (size_t)(left_out * (double)count) + 1;
-    double *sample = count < points_least ? NULL : spl_alloc_raw(3 * count, sizeof *sample, NULL);
-    double low[3], high[3], width = 0, most = 0, all = 0;
-    bool parted = false;
-    if (!sample)
-        return false;
-    for (int c = 0; c < 3; c++) {
-        for (size_t i = 0; i < count; i++) {
-            if (i % 256 == 0)
-                spl_spill_keep_bound(p->spill);
-            sample[(size_t)c * count + i] = spl_points_at(p, c, i * p->count / count);
-        }
-        width = fmax(width, spl_bulk_order(sample + (size_t)c * count, count));
+    size_t kept = 0;
+    *gap = INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        if (values[i] == level)
+            continue;
+        *gap = fmin(*gap, fabs(values[i] - level));
+        others[kept++] = values[i];
     }
+    *width = kept ? spl_bulk_order(others, kept) : 0;
+    return count - kept;
+}
+
+/* Of more than a twentieth of the points: one value of an axis, its lowest or highest, far from all others. */
+static bool find_level(double *const axis[3], size_t count, const double width[3], double *scratch,
+                       char text[SPL_STRAYS_TEXT_MAX])
+{
+    for (int c = 2; c >= 0; c--) {
+        double ends[2] = {axis[c][0], axis[c][0]}, gap, own;
+        for (size_t i = 1; i < count; i++) {
+            ends[0] = fmin(ends[0], axis[c][i]);
+            ends[1] = fmax(ends[1], axis[c][i]);
+        }
+        for (int e = 0; e < 2; e++) {
+            const size_t same = part(axis[c], count, ends[e], scratch, &gap, &own);
+            const double widest = fmax(own, fmax(width[(c + 1) % 3], width[(c + 2) % 3]));
+            if (same <= count / twentieth || count - same <= count / twentieth || !(gap > gap_ratio * widest))
+                continue;
+            snprintf(text, SPL_STRAYS_TEXT_MAX,
+                     "%.0f %% of all points have %c = %.10g, %.4g away from all others: if that means none, take them "
+                     "out of the scan, for they are too many to be left out of the default view, or give it "
+                     "(--default-view)",
+                     100 * (double)same / (double)count, "xyz"[c], ends[e], gap);
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Of a sample whose order is lost, and the bounds of all; `scratch` is as long. */
+static bool judge(double *const axis[3], size_t count, double *scratch, const double min[3], const double max[3],
+                  char text[SPL_STRAYS_TEXT_MAX])
+{
+    const size_t outer = (size_t)(left_out * (double)count) + 1;
+    double low[3], high[3], width[3], most = 0, all = 0;
+    bool parted = false;
+    for (int c = 0; c < 3; c++)
+        width[c] = spl_bulk_order(axis[c], count);
+    if (find_level(axis, count, width, scratch, text))
+        return true;
+    const double gap = gap_ratio * fmax(width[0], fmax(width[1], width[2]));
     for (int c = 0; c < 3; c++) {
         size_t first, last;
-        spl_bulk_find(sample + (size_t)c * count, count, outer, gap_ratio * width, &first, &last);
+        spl_bulk_find(axis[c], count, outer, gap, &first, &last);
         parted = parted || first > outer || last < count - 1 - outer;
-        low[c] = sample[(size_t)c * count + first];
-        high[c] = sample[(size_t)c * count + last];
+        low[c] = axis[c][first];
+        high[c] = axis[c][last];
         most += (high[c] - low[c]) * (high[c] - low[c]);
-        all += (p->bounds_max[c] - p->bounds_min[c]) * (p->bounds_max[c] - p->bounds_min[c]);
+        all += (max[c] - min[c]) * (max[c] - min[c]);
     }
-    free(sample);
     if (!parted && !(sqrt(all) > far_ratio * sqrt(most)))
         return false;
     snprintf(text, SPL_STRAYS_TEXT_MAX,
@@ -49,4 +85,72 @@ bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
              "widen what views, plans and depths reckon with, so take them out of the scan unless they are meant",
              low[0], low[1], low[2], high[0], high[1], high[2], sqrt(all));
     return true;
+}
+
+bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
+{
+    const size_t count = p->count < sample_most ? p->count : sample_most;
+    double *sample = count < points_least ? NULL : spl_alloc_raw(4 * count, sizeof *sample, NULL);
+    if (!sample)
+        return false;
+    double *const axis[3] = {sample, sample + count, sample + 2 * count};
+    for (int c = 0; c < 3; c++)
+        for (size_t i = 0; i < count; i++) {
+            if (i % 256 == 0)
+                spl_spill_keep_bound(p->spill);
+            axis[c][i] = spl_points_at(p, c, i * p->count / count);
+        }
+    const bool found = judge(axis, count, sample + 3 * count, p->bounds_min, p->bounds_max, text);
+    free(sample);
+    return found;
+}
+
+/* Whether the sample of one in 2^`halved` has the point: by chance, for scans are grids whose rows a step would meet. */
+static bool is_drawn(uint64_t point, unsigned halved)
+{
+    uint64_t h = (point + 1) * 0x9E3779B97F4A7C15u;
+    h = (h ^ h >> 30) * 0xBF58476D1CE4E5B9u;
+    h = (h ^ h >> 27) * 0x94D049BB133111EBu;
+    return !((h ^ h >> 31) & (((uint64_t)1 << halved) - 1));
+}
+
+static void halve(struct spl_strays *s)
+{
+    const size_t count = s->count;
+    s->halved++;
+    s->count = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!is_drawn((uint64_t)s->sample[3 * sample_most + i], s->halved))
+            continue;
+        for (size_t c = 0; c < 4; c++)
+            s->sample[c * sample_most + s->count] = s->sample[c * sample_most + i];
+        s->count++;
+    }
+}
+
+void spl_strays_add(struct spl_strays *s, const struct spl_point_batch *batch)
+{
+    if (!s->sample && !(s->sample = spl_alloc_raw(4 * (size_t)sample_most, sizeof *s->sample, NULL)))
+        return;
+    for (size_t i = 0; i < batch->count; i++, s->seen++) {
+        if (!is_drawn(s->seen, s->halved))
+            continue;
+        for (size_t c = 0; c < 3; c++)
+            s->sample[c * sample_most + s->count] = batch->position[i][c];
+        s->sample[3 * sample_most + s->count] = (double)s->seen;
+        if (++s->count == sample_most)
+            halve(s);
+    }
+}
+
+bool spl_strays_tell(struct spl_strays *s, const double min[3], const double max[3], char text[SPL_STRAYS_TEXT_MAX])
+{
+    bool found = false;
+    if (s->count >= points_least) {
+        double *const axis[3] = {s->sample, s->sample + sample_most, s->sample + 2 * sample_most};
+        found = judge(axis, s->count, s->sample + 3 * sample_most, min, max, text);
+    }
+    free(s->sample);
+    *s = (struct spl_strays){0};
+    return found;
 }

@@ -10,4 +10,18 @@ enum { SPL_STRAYS_TEXT_MAX = 400 };
  * there is no memory. Needs ordered points. */
 bool spl_strays_find(const struct spl_points *points, char text[SPL_STRAYS_TEXT_MAX]);
 
+/* The same of points that are not kept, batch by batch. Zeroed before the first one. */
+struct spl_strays {
+    double *sample; // x, y, z and which point; NULL: nothing added
+    size_t count;
+    uint64_t seen;
+    unsigned halved; // the sample has one of 2^halved
+};
+
+void spl_strays_add(struct spl_strays *strays, const struct spl_point_batch *batch);
+
+/* `min` and `max` are those of all that was added, which is forgotten. */
+bool spl_strays_tell(struct spl_strays *strays, const double min[3], const double max[3],
+                     char text[SPL_STRAYS_TEXT_MAX]);
+
 #endif

@@ -112,8 +112,8 @@ static void on_signal(uv_signal_t *handle, int number)
     if (service->leaving)
         _exit(1);
     service->leaving = true;
-    spl_log_info("%s: finishing %zu requests; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
-                 service->http->requests_open);
+    spl_log_info("%s: finishing %zu request%s; a second signal ends at once", number == SIGINT ? "SIGINT" : "SIGTERM",
+                 service->http->requests_open, service->http->requests_open == 1 ? "" : "s");
     spl_supervisor_say_stopping("finishing what runs");
     if (service->library->loading)
         _exit(0); // loading.c

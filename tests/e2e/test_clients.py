@@ -17,7 +17,7 @@ HERE = pathlib.Path(__file__)
 CLIENTS = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"]).resolve() / "api" / "clients"
 sys.path[:0] = [str(HERE.parents[1] / "http"), str(CLIENTS)]
 from harness import FAKE, MAPPED, REAL, WALL, Daemon, eventually, run, together
-from splatd import Splatd, SplatdError, ring, sign
+from splatd import Dataset, Splatd, SplatdError, ring, sign
 
 POSE = dict(eye=[3, 0, 1], target=[0, 0, 1], up=[0, 0, 1], fov=60)
 SMALL = dict(width=65, height=49)
@@ -76,6 +76,10 @@ def test_python_views():
         assert wall.pick(32.5, 24.5, **whole)["splat"] is None and wall.pick(32.5, 24.5, **whole, of="median")["splat"] is not None
         assert wall.depth(**whole, of="first")[2][24 * 65 + 32] > 2.5
         assert wall.view(**POSE, **SMALL, soft=[]).headers["Splatd-Soft"] is None
+        # What it looks at by itself, wherever a few points have put the bounds.
+        strayed = Dataset(service, {**wall.info, "bounds": {"min": [-9999] * 3, "max": [1, 1, 1]}})
+        assert wall.center == strayed.center == wall.info["default_view"]["target"], strayed.center
+        assert wall.pick(480, 270, **next(ring(wall.center, 4, 2, 1)), width=960, height=540)["position"], "nothing is there"
         eyes = [camera["eye"] for camera in ring(wall.center, 4, 2, 1)]
         assert (
             all(abs(math.dist(eye, wall.center) - math.sqrt(5)) < 1e-9 for eye in eyes)
@@ -195,8 +199,17 @@ def test_shell():
         assert (
             pathlib.Path(folder, "a.jpg").read_bytes() == d.view(eye="3,0,1", target="0,0,1", width=64, height=48).body
         )
-        shell(d, "view", "wall", "a.png", "layer=depth", "width=64", "height=48", folder=folder)
-        assert pathlib.Path(folder, "a.png").read_bytes().startswith(b"\x89PNG")
+        for name, more, begin in [
+            ("a.png", ["layer=depth"], b"\x89PNG"),
+            ("c.png", [], b"\x89PNG"),
+            ("d.jpg", ["layer=depth"], JPEG),
+            ("d.jpeg", ["format=jpg"], JPEG),
+            ("d.npy", [], b"\x93NUMPY"),
+            ("plain", ["format=png"], b"\x89PNG"),
+            ("all.zip", ["layers=color,depth"], b"PK"),
+        ]:
+            shell(d, "view", "wall", name, *more, "width=64", "height=48", folder=folder)
+            assert pathlib.Path(folder, name).read_bytes().startswith(begin), name
         found = json.loads(
             shell(d, "pick", "wall", "32", "24", "eye=3,0,1", "target=0,0,1", "width=64", "height=48")[0]
         )
@@ -213,6 +226,9 @@ def test_shell():
             (("view",), 2, "DATASET is missing"),
             (("view", "wall"), 2, "view needs DATASET FILE, and FILE is missing"),
             (("view", "wall", "b.jpg", "lod"), 2, "view: 'lod' is not NAME=VALUE"),
+            (("view", "wall", "b.jpg", "format=png"), 2, "'b.jpg' is no name of a png: give one that ends in .png"),
+            (("view", "wall", "b.jpg", "layers=color,depth"), 2, "give FILE.zip in the place of 'b.jpg'"),
+            (("view", "wall", "b"), 2, "'b' does not say which format"),
             (("pick", "wall"), 2, "X is missing"),
             (("pick", "wall", "32"), 2, "Y is missing; as in\nsplatd.sh datasets\n"),
             (("ring",), 2, "DATASET is missing"),

@@ -210,6 +210,36 @@ def test_plans_and_elevations():
             assert abs(eye - float(found["near"]) - 0.1) < 1e-4 and abs(eye - float(found["far"]) + 0.05) < 1e-4, found
 
 
+def test_front_and_side_do_not_follow_stray_heights():
+    """A few heights of -9999 widen the bounds, not what is framed; a street's length is none of them."""
+    dataset = daemon.ask("/v1/datasets/wall").json()
+    true = dataset["bounds"]
+    dataset["bounds"] = {"min": [true["min"][0], true["min"][1] - 1e4, -9999], "max": true["max"]}
+    told = json.dumps(dataset)
+    script = f"(usual => {{ window.fetch = (path, how) => path === '/v1/datasets/wall' ? Promise.resolve(new Response({json.dumps(told)})) : usual(path, how); }})(fetch)"
+    far_off = far(dataset["default_view"]["eye"], dataset["default_view"]["target"])
+    with page(f"{SITE}/#dataset=wall", before=script) as tab:
+        settled(tab)
+        tab.run("document.querySelector('#side').click()")
+        side = next_link(tab, lambda now: "projection" in now)
+        assert float(side["view_height"]) > 5000, side  # the long way is whole
+        dataset["bounds"]["min"][1] = true["min"][1]
+    script = script.replace(json.dumps(told), json.dumps(json.dumps(dataset)))
+    with page(f"{SITE}/#dataset=wall", before=script) as tab:
+        before = settled(tab)
+        for name in "front", "side":
+            tab.run(f"document.querySelector('#{name}').click()")
+            flat = next_link(tab, lambda now: now.get("projection") == "orthographic")
+            before = settled(tab, before)
+            assert float(flat["view_height"]) < 5 * far_off, flat
+            assert before[1] > 10, "nothing of the wall is there"
+            low, high = (flat["target"][2] + side * float(flat["view_height"]) / 2 for side in (-1, 1))
+            assert low < true["min"][2] and high > true["max"][2], flat
+            tab.run(f"document.querySelector('#{name}').click()")
+            next_link(tab, lambda now: "fov" in now)
+            before = settled(tab)
+
+
 def test_dragging_orbits_and_pans():
     with page() as tab:
         start, digest = link(tab), settled(tab)
@@ -1410,6 +1440,9 @@ def test_embed():
         f"{SITE}/embed/none", ready="!document.querySelector('#notice').hidden", complaints="404", size=(400, 300)
     ) as tab:
         assert "'none'" in tab.text("#notice p")
+    with page(f"{SITE}/embed/wall#eye=3,0,1&target=abc", ready="!document.querySelector('#notice').hidden", size=(400, 300)) as tab:
+        told = "Refused: target of the link is left out: it has to be three numbers, not 'abc'"
+        assert tab.text("#notice p") == told and not tab.run(VIEWS), tab.text("#notice p")
 
 
 def lonlat(world):

@@ -301,6 +301,31 @@ static void test_panoramas(void **state)
         strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
 }
 
+/* What a pack would warn of, once all points are read: heights that mean none, few, or so many that no view is found. */
+static void test_strays(void **state)
+{
+    (void)state;
+    static const struct {
+        int one_of;
+        const char *said;
+    } cases[] = {{0, NULL}, {100, "nearly all points lie between"}, {10, "10 % of all points have z = -9999, "}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        static char text[200000 * 24];
+        size_t used = 0;
+        for (int i = 0; i < 200000; i++)
+            used += (size_t)sprintf(text + used, "%d %d %d\n", i % 500, i / 500,
+                                    cases[k].one_of && i % cases[k].one_of == 0 ? -9999 : i % 7);
+        write_text("strays.xyz", text);
+        json_t *json = json_of("strays.xyz"), *warnings = json_object_get(json_object_get(json, "pack"), "warnings");
+        assert_int_equal(json_array_size(warnings), cases[k].said ? 1 : 0);
+        assert_true(!cases[k].said || strstr(json_string_value(json_array_get(warnings, 0)), cases[k].said));
+        json_decref(json);
+        json = json_of("--no-verify strays.xyz");
+        assert_true(is(json_object_get(json, "pack"), "warnings", "[]"));
+        json_decref(json);
+    }
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -322,6 +347,7 @@ int main(void)
         cmocka_unit_test(test_options), cmocka_unit_test(test_images),
         cmocka_unit_test(test_columns_by_their_values),
         cmocka_unit_test(test_metres_beside_feet), cmocka_unit_test(test_panoramas),
+        cmocka_unit_test(test_strays),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
