@@ -275,6 +275,8 @@ int spl_build(const struct spl_pack_options *options, struct spl_inputs *inputs,
         rc = open_scans(&p, inputs, &said, err);
     if (!rc && options->note && !part)
         spl_scans_tell(&p.scans, options->note, options->progress_context);
+    if (!rc && options->note && !part && !options->unit && !(p.system.unit_m > 0))
+        spl_scans_tell_unit(&p.scans, options->note, options->progress_context);
     if (!rc) {
         spl_build_plan(&p, later);
         rc = stage->spill ? spl_build_begin_spill(&p, later, err) : SPL_OK;

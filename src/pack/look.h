@@ -6,8 +6,8 @@
 #include "pack/strays.h"
 
 /* Opens a scan of the list, and reads it to its end where `read` says so; then points and box are what they are, and
- * `strays` says which points a pack would warn of, or ""; else as far as the header says them. On success the caller owns *out, whose info tells the rest. `batch` is anyone's.
- * Blocks. */
+ * `strays` says what a pack would warn of points far off, or ""; else as far as the header says them. On success the
+ * caller owns *out, whose info tells the rest. `batch` is anyone's. Blocks. */
 int spl_scan_look(const struct spl_scans *scans, struct spl_scan *scan, bool read, struct spl_point_batch *batch,
                   struct spl_stage *stage, char strays[SPL_STRAYS_TEXT_MAX], struct spl_cloud **out,
                   struct spl_error *err);

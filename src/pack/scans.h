@@ -67,6 +67,9 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **text, struct spl_er
 /* Hands that out, for alike scans together. For before reading. */
 void spl_scans_tell(const struct spl_scans *scans, void (*note)(void *context, const char *text), void *context);
 
+/* Of PTX, for scans whose unit nobody has said. */
+void spl_scans_tell_unit(const struct spl_scans *scans, void (*note)(void *context, const char *text), void *context);
+
 /* Takes a scan out of the list. The others' colours are the same until spl_scans_share(). */
 void spl_scans_remove(struct spl_scans *scans, size_t place);
 

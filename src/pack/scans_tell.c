@@ -73,3 +73,14 @@ void spl_scans_tell(const struct spl_scans *scans, void (*note)(void *context, c
         spl_pack_warn(note, context, "%s: %s", spl_names_list(&names), scans->list[i].guess);
     }
 }
+
+void spl_scans_tell_unit(const struct spl_scans *scans, void (*note)(void *context, const char *text), void *context)
+{
+    struct spl_names names = {0};
+    for (size_t i = 0; i < scans->count; i++)
+        if (!strcmp(scans->list[i].format, "PTX"))
+            spl_names_add(&names, scans->list[i].name);
+    if (names.count)
+        spl_pack_warn(note, context, "%s: PTX says no unit, and most are in metres: --unit m says so",
+                      spl_names_list(&names));
+}

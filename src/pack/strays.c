@@ -105,7 +105,7 @@ bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
     return found;
 }
 
-/* Whether the sample of one in 2^`halved` has the point: by chance, for scans are grids whose rows a step would meet. */
+/* Whether the sample of one in 2^`halved` has the point: by chance, for a step would meet the rows of grids. */
 static bool is_drawn(uint64_t point, unsigned halved)
 {
     uint64_t h = (point + 1) * 0x9E3779B97F4A7C15u;

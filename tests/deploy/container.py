@@ -124,6 +124,10 @@ def check(tree):
     expect(re.fullmatch(r"[1-9]\d+:[1-9]\d+", user), f"{DOCKERFILE}: USER {user} is no number but 0")
     expect(f"useradd -u {user.split(':')[0]} " in " ".join(runs), f"{DOCKERFILE}: nobody has the number {user}")
     expect(set(conf) <= set(tree.parameters()), f"{CONF}: unknown {set(conf) - set(tree.parameters())}")
+    loaded = set(re.findall(r"^#?LoadCredential=([^:]+):", tree.read(UNIT), re.M))
+    named = set(re.findall(r"/run/credentials/splatd\.service/(\S+)$", tree.read("deploy/splatd.conf"), re.M))
+    expect(loaded == named and named, f"{UNIT} brings {loaded}, and deploy/splatd.conf names {named}")
+    expect(unit.get("RestartPreventExitStatus") == "2", f"{UNIT}: what would fail again is tried again")
     expect(set(host) <= set(tree.parameters()), f"deploy/splatd.conf: unknown {set(host) - set(tree.parameters())}")
     ports = [conf[name].rsplit(":", 1)[1] for name in ("listen", "ops-listen")]
     expect(
@@ -188,6 +192,8 @@ PLANTED = [
     (CONF, "log-format = json", "allow-anonymous = true"),
     (UNIT, "--config /etc/splatd/splatd.conf", "--config /etc/splatd.conf"),
     (UNIT, "ReadOnlyPaths=/srv/splatd", "ReadOnlyPaths=/srv/scans"),
+    (UNIT, "RestartPreventExitStatus=2", "RestartPreventExitStatus=1"),
+    (UNIT, "LoadCredential=url.key:", "LoadCredential=key:"),
     ("deploy/quickstart.sh", "build run quickstart", "build runtime"),
     (IGNORE, "!shaders", "!shader"),
     (IGNORE, "*\n!LICENSE", "!LICENSE"),

@@ -145,11 +145,18 @@ def test_the_shipped_configuration_is_accepted():
     text = (ROOT / "deploy/splatd.conf").read_text()
     everything = re.sub(r"^#(\w[\w-]* = )", r"\1", text, flags=re.M).replace("require-gpu = true", "")
     assert everything.count("=") >= text.count("=") - 1
-    with tempfile.NamedTemporaryFile("w", suffix=".conf") as file:
+    for name in "tokens", "url-key", "tours", "memory-limit":
+        assert re.search(rf"^{name} = ", everything, re.M), f"{name} is not shown"
+    with tempfile.NamedTemporaryFile("w", suffix=".conf") as file, tempfile.TemporaryDirectory() as folder:
+        token = "a-token-of-the-test"
+        for name, text in ("tokens", f"{token} view,tour,admin"), ("url.key", "k" * 32):
+            pathlib.Path(folder, name).write_text(text)
+        everything = re.sub("/run/credentials/splatd.service|/var/lib/splatd", folder, everything)
         file.write(everything)
         file.flush()
         with Daemon(FAKE, "--config", file.name, "--drain-delay", "0") as d:
-            assert d.status()["parameters"]["log-format"] == "json"
+            told = d.ask("/v1/status", headers={"Authorization": f"Bearer {token}"}).json()["parameters"]
+            assert told["log-format"] == "json" and pathlib.Path(folder, "tours").is_dir(), told
         file.write("\ndeadline = soon\n")
         file.flush()
         done = subprocess.run([FAKE, "--config", file.name, WALL], capture_output=True, text=True, timeout=30)

@@ -261,6 +261,8 @@ static int plan(struct spl_planning *p, struct spl_error *err)
         rc = spl_plan_find_points(p, err);
     if (!rc)
         rc = spl_system_find(&p->system, &p->scans, &said, err);
+    if (!rc && o->note && !o->unit && !(p->system.unit_m > 0))
+        spl_scans_tell_unit(&p->scans, o->note, o->progress_context);
     if (!rc && o->warn)
         spl_scans_compare(&p->scans, o->warn, o->progress_context);
     if (!rc)

@@ -301,7 +301,7 @@ static void test_panoramas(void **state)
         strstr(output, "\n  panoramas     1 and 1 place of yard/panoramas, which become maps of stations\n"));
 }
 
-/* What a pack would warn of, once all points are read: heights that mean none, few, or so many that no view is found. */
+/* What a pack would warn of, once all points are read: heights that mean none, few, or too many to find a view. */
 static void test_strays(void **state)
 {
     (void)state;

@@ -178,7 +178,7 @@ static char *write_lines(const char *name, const char *heading, const char *line
     return path;
 }
 
-static const char *note_two(const char *a, const char *b)
+static const char *note_with_unit(const char *a, const char *b, const char *unit)
 {
     const char *inputs[2] = {a, b};
     struct spl_pack_options options = {.size = sizeof options,
@@ -186,12 +186,18 @@ static const char *note_two(const char *a, const char *b)
                                        .input_count = b ? 2 : 1,
                                        .output = path_of("out.spld"),
                                        .threads = 1,
+                                       .unit = unit,
                                        .note = listen};
     struct spl_error err = {0};
     said[0] = 0;
     if (spl_pack(&options, NULL, &err))
         fail_msg("%s", err.message);
     return said;
+}
+
+static const char *note_two(const char *a, const char *b)
+{
+    return note_with_unit(a, b, NULL);
 }
 
 static void test_guesses_are_noted(void **state)
@@ -288,11 +294,10 @@ static void test_kinds_are_said_and_remembered(void **state)
     assert_null(strstr(pack_two(bare, NULL, false, NULL), "--intensity"));
 }
 
-/* Stations of one PTX: with colours, without. */
-static void test_one_file_may_disagree_with_itself(void **state)
+/* Two stations: with colours, without. */
+static char *write_ptx(const char *name)
 {
-    (void)state;
-    char *path = path_of("both.ptx");
+    char *path = path_of(name);
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
     for (int station = 0; station < 2; station++) {
@@ -301,9 +306,27 @@ static void test_one_file_may_disagree_with_itself(void **state)
             fprintf(f, station ? "%d %d 1 0.5\n" : "%d %d 0 0.5 10 20 30\n", 1 + i % 10, i / 10);
     }
     assert_int_equal(fclose(f), 0);
+    return path;
+}
+
+static void test_one_file_may_disagree_with_itself(void **state)
+{
+    (void)state;
+    char *path = write_ptx("both.ptx");
     assert_non_null(
         strstr(pack_two(path, NULL, false, NULL), "RGB in 1 (both.ptx), grey from intensity in 1 (both.ptx)"));
     assert_string_equal(pack_two(path, NULL, true, NULL), "");
+}
+
+/* A PTX has no unit, which whoever knows it should say; nobody is told who has, or whose other scan does. */
+static void test_that_a_ptx_says_no_unit_is_noted(void **state)
+{
+    (void)state;
+    char *path = write_ptx("a.ptx"), *m = write_las("m.las", &(struct las){.scale = 1, .epsg = 25832, .count = 9});
+    assert_string_equal(note_two(path, NULL), "a.ptx: PTX says no unit, and most are in metres: --unit m says so\n");
+    assert_string_equal(note_with_unit(path, NULL, "m"), "");
+    assert_string_equal(note_with_unit(path, NULL, "unknown"), "");
+    assert_string_equal(note_two(path, m), "");
 }
 
 /* The same intensity is the same grey in both tiles, though the one holds only dark ground. */
@@ -760,6 +783,7 @@ int main(void)
         cmocka_unit_test(test_colours_that_nobody_filled_are_told),
         cmocka_unit_test(test_kinds_are_said_and_remembered),
         cmocka_unit_test(test_one_file_may_disagree_with_itself),
+        cmocka_unit_test(test_that_a_ptx_says_no_unit_is_noted),
         cmocka_unit_test(test_intensities_share_a_scale),
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
