@@ -5,8 +5,7 @@ import {span} from "./clip_terms.js";
 
 const SIDES = ["top", "front", "side"],
   MARGIN = 1.04,
-  FAR = 30, // heights beyond so many times the default view's distance are strays,
-  NEAR = 2; // and those within so many times it are shown where there are any
+  FAR = 30; // times the default view's distance: heights beyond are strays
 
 const towards = ({eye, target}) => unit(sub(target, eye)).map((x) => Number(x.toFixed(6)) + 0);
 
@@ -17,12 +16,12 @@ function seenFrom({camera, home}) {
 }
 
 /** The bounds without heights that mean none (-9999) and put the scan beyond what a picture resolves: of where all but a few
- * points lie, the default view alone knows. Only heights, for streets and tunnels are as long as that. */
+ * points lie, the default view alone knows: it holds them from so far. Only heights, for streets and tunnels are as long as that. */
 export function withoutStrays({min, max}, home) {
   const up = upIndex(home),
     at = home.target[up],
     far = distance(home);
-  const cut = (x) => (Math.abs(x - at) > FAR * far ? at + Math.sign(x - at) * NEAR * far : x);
+  const cut = (x) => (Math.abs(x - at) > FAR * far ? at + Math.sign(x - at) * far : x);
   return {min: min.with(up, cut(min[up])), max: max.with(up, cut(max[up]))};
 }
 

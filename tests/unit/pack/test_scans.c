@@ -178,7 +178,7 @@ static char *write_lines(const char *name, const char *heading, const char *line
     return path;
 }
 
-static const char *note_with_unit(const char *a, const char *b, const char *unit)
+static const char *note_two(const char *a, const char *b, const char *unit)
 {
     const char *inputs[2] = {a, b};
     struct spl_pack_options options = {.size = sizeof options,
@@ -193,11 +193,6 @@ static const char *note_with_unit(const char *a, const char *b, const char *unit
     if (spl_pack(&options, NULL, &err))
         fail_msg("%s", err.message);
     return said;
-}
-
-static const char *note_two(const char *a, const char *b)
-{
-    return note_with_unit(a, b, NULL);
 }
 
 static void test_guesses_are_noted(void **state)
@@ -236,12 +231,12 @@ static void test_guesses_are_noted(void **state)
     };
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        assert_string_equal(note_two(write_lines("a.txt", rows[i].heading, rows[i].line), NULL), rows[i].note);
+        assert_string_equal(note_two(write_lines("a.txt", rows[i].heading, rows[i].line), NULL, NULL), rows[i].note);
     char *a = write_lines("a.txt", "", "%d.5 %d 4 2\n"), *b = write_lines("b.txt", "", "3%d.5 %d 4 7\n");
-    assert_string_equal(note_two(a, b),
+    assert_string_equal(note_two(a, b, NULL),
                         "a.txt, b.txt: columns are x,y,z,intensity by their values; --columns says otherwise\n");
     b = write_lines("b.txt", "x y z foo\n", "3%d.5 %d 4 7\n");
-    assert_non_null(strstr(note_two(a, b), "otherwise\nb.txt: columns not used: foo\n"));
+    assert_non_null(strstr(note_two(a, b, NULL), "otherwise\nb.txt: columns not used: foo\n"));
 }
 
 static const char *grey_fields = "float intensity", *rgb_fields = "uchar red,uchar green,uchar blue";
@@ -319,14 +314,15 @@ static void test_one_file_may_disagree_with_itself(void **state)
 }
 
 /* A PTX has no unit, which whoever knows it should say; nobody is told who has, or whose other scan does. */
-static void test_that_a_ptx_says_no_unit_is_noted(void **state)
+static void test_no_unit_of_ptx_is_noted(void **state)
 {
     (void)state;
     char *path = write_ptx("a.ptx"), *m = write_las("m.las", &(struct las){.scale = 1, .epsg = 25832, .count = 9});
-    assert_string_equal(note_two(path, NULL), "a.ptx: PTX says no unit, and most are in metres: --unit m says so\n");
-    assert_string_equal(note_with_unit(path, NULL, "m"), "");
-    assert_string_equal(note_with_unit(path, NULL, "unknown"), "");
-    assert_string_equal(note_two(path, m), "");
+    assert_string_equal(note_two(path, NULL, NULL),
+                        "a.ptx: PTX says no unit, and most are in metres: --unit m says so\n");
+    assert_string_equal(note_two(path, NULL, "m"), "");
+    assert_string_equal(note_two(path, NULL, "unknown"), "");
+    assert_string_equal(note_two(path, m, NULL), "");
 }
 
 /* The same intensity is the same grey in both tiles, though the one holds only dark ground. */
@@ -368,7 +364,7 @@ static void test_ranges_of_colours(void **state)
     struct las bits10 = {0.001, 0, 0, NULL, 10, 100}, dim = {0.001, 0, 0, NULL, 15, 100};
     text = pack_two(write_las("10.las", &bits10), path_of("16.las"), false, NULL);
     assert_non_null(strstr(text, "colours are 10 bit, none above 1023, in 1 (10.las) and 16 bit in 1 (16.las)"));
-    text = note_two(path_of("10.las"), write_las("dim.las", &dim));
+    text = note_two(path_of("10.las"), write_las("dim.las", &dim), NULL);
     assert_non_null(strstr(text, "10.las: 0 is black and 1023 white by the largest colour\n"));
     assert_non_null(strstr(text, "dim.las: colours are nearly black: 65535 is white, and none is above 1485\n"));
     text = pack_two(path_of("16.las"), write_las("black.las", &black), false, NULL);
@@ -782,8 +778,7 @@ int main(void)
         cmocka_unit_test(test_guesses_are_noted),
         cmocka_unit_test(test_colours_that_nobody_filled_are_told),
         cmocka_unit_test(test_kinds_are_said_and_remembered),
-        cmocka_unit_test(test_one_file_may_disagree_with_itself),
-        cmocka_unit_test(test_that_a_ptx_says_no_unit_is_noted),
+        cmocka_unit_test(test_one_file_may_disagree_with_itself), cmocka_unit_test(test_no_unit_of_ptx_is_noted),
         cmocka_unit_test(test_intensities_share_a_scale),
         cmocka_unit_test(test_ranges_of_colours),
         cmocka_unit_test(test_attributes_and_places),
