@@ -40,6 +40,8 @@ struct request {
     bool abandoned; /* the client has left: close without a reply */
     bool suspended; /* libmicrohttpd does not go on with it */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
+    bool postponed; /* it waits for a turn of the loop that has time for it, */
+    bool admitted;  /* and this is the one */
     uint64_t deadline_ns;
     struct batch *batch;           // may be NULL; the views that it waits for
     struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
@@ -87,5 +89,11 @@ void spl_request_resume(struct request *request);
 void spl_waiting_add(struct request *request, uint64_t deadline_ns); /* suspends it */
 void spl_waiting_resume(struct request *request);                    /* its response is set */
 void spl_waiting_refuse_all(struct spl_service *service);
+
+/* waiting.c: how long one turn of the loop handles requests with bodies. What that took since `began_ns` is added; once
+ * the turn is over, or others wait, a request whose body is there is postponed: then true, and it is handled again. */
+bool spl_turn_is_over(struct spl_service *service);
+void spl_turn_add(struct spl_service *service, uint64_t began_ns);
+bool spl_waiting_postpone(struct request *request);
 
 #endif

@@ -217,10 +217,16 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_change_end(request);
     } else if (!request->response) {
         spl_connection_enter(request->connection, PHASE_WORKING);
+        const bool has_body = request->body_length > 0; // that is kept
+        if (has_body && spl_waiting_postpone(request))
+            return MHD_YES;
+        const uint64_t began_ns = spl_now_ns();
         if (request->body_seen > spl_body_get_most(request))
             refuse_body(request);
         else
             spl_route(request, method);
+        if (has_body)
+            spl_turn_add(request->service, began_ns);
         if (!request->place)
             spl_body_drop(request); // it is read, however long its view takes
     }
@@ -258,7 +264,8 @@ void spl_http_init(struct spl_service *service)
     spl_http_turns_init(&http->turns, service);
     uv_timer_init(&service->loop, &http->wait_timer);
     uv_timer_init(&service->loop, &http->slow_timer);
-    http->wait_timer.data = http->slow_timer.data = service;
+    uv_idle_init(&service->loop, &http->next);
+    http->next.data = http->wait_timer.data = http->slow_timer.data = service;
 }
 
 static void on_timer(uv_timer_t *timer)

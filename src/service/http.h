@@ -63,9 +63,13 @@ struct spl_http {
     size_t body_bytes;  /* of the others, as far as they are counted */
     uv_timer_t slow_timer; /* connections that take too long */
 
-    LIST_HEAD(, request) waiting;
+    LIST_HEAD(, request) waiting; // the last came first
     size_t waiting_count;
     uv_timer_t wait_timer; /* deadlines and departures, while requests wait */
+
+    size_t postponed;             /* of those that wait: for a turn of the loop that has time for them */
+    uv_idle_t next;               /* while there are any */
+    uint64_t turn_ns, handled_ns; /* the turn that was looked at last, and what handling took in it */
 };
 
 /* http.c: the MHD daemon inside the uv loop. init makes what the loop holds, and opens nothing. */

@@ -1,5 +1,9 @@
-/* Requests that wait for views, or for the pool to read a path or look up a coordinate system: their MHD connection is
- * suspended until all is ready, the deadline passes or the client leaves.
+/* Requests that wait for views, for the pool to read a path or look up a coordinate system, or for the loop to have
+ * time for them: their MHD connection is suspended until all is ready, the deadline passes or the client leaves.
+ *
+ * A body of a MiB takes 30 ms to read, and a hundred may end at once: one turn of the loop handles requests with bodies
+ * for 20 ms and ends the last of them; those that come later have the next turns, the oldest first. What has no body
+ * waits for none.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
  * closed its sending side counts as gone, as with nginx. Invariant: request->waits is set exactly while the request is
@@ -11,13 +15,14 @@
 #include "service/exchange.h"
 #include "service/http.h"
 #include "service/ops/counters.h"
+#include "service/ops/ops.h"
 #include "service/place/wait.h"
 #include "service/reply.h"
 #include "service/state.h"
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
-enum { sweep_ms = 20, sweep_sockets = 64 };
+enum { sweep_ms = 20, sweep_sockets = 64, turn_ms = 20 };
 
 static void let_go(struct request *request)
 {
@@ -100,6 +105,8 @@ void spl_waiting_resume(struct request *request)
     struct spl_service *service = request->service;
     LIST_REMOVE(request, link);
     request->waits = false;
+    service->http->postponed -= request->postponed;
+    request->postponed = false;
     if (!--service->http->waiting_count)
         uv_timer_stop(&service->http->wait_timer);
     spl_request_resume(request);
@@ -115,4 +122,60 @@ void spl_waiting_refuse_all(struct spl_service *service)
         let_go(request);
     }
     spl_http_pump(service);
+}
+
+static uint64_t *handled_ns(struct spl_service *service)
+{
+    const uint64_t turn_ns = service->ops->loop_turns.told_ns;
+    if (service->http->turn_ns != turn_ns) {
+        service->http->turn_ns = turn_ns;
+        service->http->handled_ns = 0;
+    }
+    return &service->http->handled_ns;
+}
+
+bool spl_turn_is_over(struct spl_service *service)
+{
+    return *handled_ns(service) >= turn_ms * SPL_NS_PER_MS;
+}
+
+void spl_turn_add(struct spl_service *service, uint64_t began_ns)
+{
+    *handled_ns(service) += spl_now_ns() - began_ns;
+}
+
+static struct request *find_oldest(struct spl_http *http)
+{
+    struct request *request, *oldest = NULL;
+    LIST_FOREACH(request, &http->waiting, link)
+    {
+        if (request->postponed)
+            oldest = request;
+    }
+    return oldest;
+}
+
+static void on_next(uv_idle_t *next)
+{
+    struct spl_service *service = next->data;
+    while (service->http->postponed && !spl_turn_is_over(service)) {
+        struct request *request = find_oldest(service->http);
+        request->admitted = true;
+        spl_waiting_resume(request);
+        spl_http_pump(service);
+    }
+    if (!service->http->postponed)
+        uv_idle_stop(next);
+}
+
+bool spl_waiting_postpone(struct request *request)
+{
+    struct spl_service *service = request->service;
+    if (request->admitted || (!service->http->postponed && !spl_turn_is_over(service)))
+        return false;
+    spl_waiting_add(request, spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
+    request->postponed = true;
+    service->http->postponed++;
+    uv_idle_start(&service->http->next, on_next);
+    return true;
 }

@@ -12,11 +12,13 @@ import os
 import pathlib
 import random
 import re
+import signal
+import socket
 import statistics
 import tempfile
 import time
 
-from harness import FAKE, VIEW, Daemon, counting_s, eventually, run
+from harness import FAKE, PATIENCE_S, VIEW, Daemon, counting_s, eventually, run, slower_than_usual
 
 MIB = 1 << 20
 TOURS = "/v1/datasets/wall/tours"
@@ -133,6 +135,55 @@ def all_shapes():
     for name in "256 views of much that is cut", "the same again":
         yield name, json.dumps({"width": 8, "height": 8, "format": "png", "clip": cut, "soft": cut, "views": [
             {"camera": {"eye": [3, 0, 1 + 1e-3 * i], "target": [0, 0, 1], "fov": 60}} for i in range(256)]}).encode()
+
+
+def held_back(d, name, body, path):
+    """A client that has sent all of a POST but its last byte."""
+    client = socket.create_connection(("127.0.0.1", d.port), PATIENCE_S)
+    client.sendall(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nX-Request-Id: {name}\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body[:-1])
+    return client
+
+
+def all_is_read(d):
+    """What clients have sent is no longer with the kernel, and the daemon has ended the turn in which it read it."""
+    def queued():
+        rows = [row.split() for row in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]]
+        return [row[4] for row in rows if f":{d.port:04X}" in (row[1][-5:], row[2][-5:]) and row[3] == "01"]
+    eventually(lambda: set(queued()) == {"00000000:00000000"})
+    assert d.ops("/healthz").status == 200
+
+
+@thrice
+def test_bodies_that_end_at_once_stall_nobody():
+    """Of so many a turn of the loop reads few, however few of them there would be time for; the others wait in the order
+    in which they came, and who leaves meanwhile is not read."""
+    count, gone, most = 48, 12, 3
+    body = ('{"views":[' + ",".join(['{"clip":"z<2 and polygon:0,0,1,0,1,1,0,1 and z<1"}'] * 15000) + "]}").encode()
+    for path in (VIEW + "s", VIEW):
+        with Daemon(FAKE, "--deadline", "600000", FAKE_FRAME_MS=1, MALLOC_PERTURB_=0) as d:
+            for _ in range(5):
+                assert d.post(body, path).status == 400
+            one, slower = metrics(d)["splatd_loop_stall_cpu_seconds"], slower_than_usual()
+            clients = [held_back(d, f"held-{i}", body, path) for i in range(count)]
+            all_is_read(d)
+            d.process.send_signal(signal.SIGSTOP)
+            for client in clients:
+                client.sendall(body[-1:])
+            for client in clients[-gone:]:
+                client.close()
+            d.process.send_signal(signal.SIGCONT)
+            replies = [client.recv(12) for client in clients[:-gone]]
+            assert set(replies) == {b"HTTP/1.1 400"}, replies
+            busiest = metrics(d)["splatd_loop_stall_cpu_seconds"]
+            print(f"     {path}: one body {1000 * one:.1f} ms, {count} at once {1000 * busiest:.1f} ms")
+            if busiest > most * one + STALL_S * slower:
+                raise Stalled(path, one, busiest, slower)
+            eventually(lambda: d.status()["counters"]["clients_left"] == gone)
+            read = [line for line in d.log(" id=held-", count - gone) if " status=400 " in line]
+            read = [int(re.search(r" id=held-(\d+) ", line)[1]) for line in read]
+            assert read == list(range(count - gone)), read
+            for client in clients:
+                client.close()
 
 
 def paths():

@@ -41,10 +41,16 @@ static void after(uv_work_t *work, int status)
     struct spl_place_wish *wish = work->data;
     struct spl_service *service = wish->service;
     struct request *request = wish->request;
+    if (request && spl_turn_is_over(service)) { // it reads its body again, and many may come back at once
+        uv_queue_work(&service->loop, &wish->work, look_up, after);
+        return;
+    }
     if (request) {
+        const uint64_t began_ns = spl_now_ns();
         request->place = NULL;
         spl_waiting_resume(request);
         wish->handler(request, &wish->call); // finds what was made, or why it was not
+        spl_turn_add(service, began_ns);
         spl_http_pump(service);
     }
     spl_catalog_entry_unref(wish->call.entry);
