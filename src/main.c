@@ -1,4 +1,4 @@
-/* The subcommand table; nothing else. */
+/* The subcommand table, and that what a command printed is written; nothing else. */
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,13 +33,8 @@ static void usage(FILE *out)
                  "  splatd render courtyard.spld -o view.jpg\n");
 }
 
-int main(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-    if (argc < 2) {
-        usage(stderr);
-        return 2;
-    }
-    signal(SIGXFSZ, SIG_IGN); // a file at its limit is an error like a full disk
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
         if (!strcmp(argv[1], commands[i].name))
             return commands[i].run(argc - 1, argv + 1);
@@ -55,4 +50,17 @@ int main(int argc, char **argv)
     fprintf(stderr, "splatd: unknown command '%s'; %s%s%s'splatd --help' lists them\n", argv[1],
             near ? "did you mean " : "", near ? near : "", near ? "? " : "");
     return 2;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        usage(stderr);
+        return 2;
+    }
+    signal(SIGXFSZ, SIG_IGN); // a file at its limit is an error like a full disk
+    int code = run(argc, argv);
+    if ((fflush(stdout) || ferror(stdout)) && !code)
+        code = spl_cmd_fail(&(struct spl_error){.code = SPL_E_IO, .message = "cannot write to stdout"});
+    return code;
 }

@@ -150,6 +150,5 @@ int spl_cmd_info(int argc, char **argv)
         int code = spl_info_print_scans(scans, scan_count, &of_scans);
         worst = code > worst ? code : worst;
     }
-    return fflush(stdout) ? spl_cmd_fail(&(struct spl_error){.code = SPL_E_IO, .message = "cannot write to stdout"})
-                          : worst;
+    return worst;
 }

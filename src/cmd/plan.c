@@ -104,8 +104,6 @@ static int print(const struct arguments *a)
     } else {
         spl_plan_print(stdout, &plan);
     }
-    if (fflush(stdout))
-        spl_fail(&err, SPL_E_IO, "cannot write to stdout");
     return err.code ? spl_cmd_fail(&err) : 0;
 }
 

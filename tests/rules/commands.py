@@ -134,6 +134,16 @@ for figure in told["figures"]:
         wrong.append(f"splatd plan: {file} has no heading {headings!r}")
 if any(line["what"] not in said or not line["value"] >= 0 for line in told["lines"]) or len(told["lines"]) < 25:
     wrong.append(f"splatd plan --json: {told['lines']}")
+with open("/dev/full", "w") as full, tempfile.TemporaryDirectory() as folder:
+    scan = subprocess.run([SPLATD, "synth", "courtyard", "--points", "20000", "-o", folder], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, timeout=600).stdout.split()[0]
+    subprocess.run([SPLATD, "pack", scan, "-o", folder + "/a.spld"], stderr=subprocess.DEVNULL, timeout=600)
+    for arguments in (["--help"], ["--version"], *([command, "--help"] for command in commands), ["serve", "--manual"], ["info", folder + "/a.spld"],
+                      ["info", folder + "/a.spld", "--json"], ["info", scan], ["synth", "--list"], ["synth", "courtyard", "--print-views"],
+                      ["synth", "courtyard", "--points", "20000", "-o", folder + "/b"], ["plan", "--points", "1e9"], ["plan", "--points", "1e9", "--json"],
+                      ["devices"], ["devices", "--json"]):
+        done = subprocess.run([SPLATD, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, timeout=600)
+        if done.returncode != 1 or "written" not in done.stderr and "write to stdout" not in done.stderr:
+            wrong.append(f"splatd {' '.join(arguments)} >/dev/full: exit {done.returncode}, stderr {done.stderr!r}")
 check(["no-such-command"], 2, "stderr")
 check([], 2, "stderr")
 check(["--version"], 0, "stdout")
