@@ -184,6 +184,16 @@ static bool may_pass(CURLcode code)
     }
 }
 
+static const char *explain(const struct server *server, const struct exchange *e, CURLcode code)
+{
+    if (e->stalled)
+        return "nothing came any more";
+    // without a head it is no redirect to another protocol: curl takes what does not begin like one for HTTP/0.9
+    if (code == CURLE_UNSUPPORTED_PROTOCOL && !e->reply->status)
+        return "its server sends what is no answer, or more bytes than the length that it says";
+    return server->curl->curl_easy_strerror(code);
+}
+
 static struct curl_slist *add_header(const struct server *server, struct curl_slist *list, const char *name,
                                      const char *value, bool *refused)
 {
@@ -346,8 +356,7 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
         } else if (code && !(code == CURLE_WRITE_ERROR && e.refused)) { // what was refused is said by its head
             bool partly = reply->status == 206;
             reply->may_pass = may_pass(code) || e.stalled;
-            snprintf(reply->why, sizeof reply->why, "%s",
-                     e.stalled ? "nothing came any more" : server->curl->curl_easy_strerror(code));
+            snprintf(reply->why, sizeof reply->why, "%s", explain(server, &e, code));
             if (!partly || !reply->may_pass)
                 reply->status = 0;
         }

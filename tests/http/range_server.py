@@ -14,7 +14,8 @@ import urllib.parse
 
 class File:
     """What lies at a path. `faults`: what the next requests meet, each once: a status, (status, Retry-After), "reset",
-    "cut" (two thirds of the body), "flip" (a byte of it is wrong), "stall" (no more of it comes). `always`: the same of every
+    "cut" (two thirds of the body), "flip" (a byte of it is wrong), "stall" (no more of it comes), "extra" (bytes before its head,
+    as of an answer before it that was longer than it said). `always`: the same of every
     request; there "drip", too (four bytes a second of it come)."""
 
     def __init__(self, data, etag='"1"', faults=(), always=None, ranges=True, conditions=True, delay_s=0, gzip=False,
@@ -88,6 +89,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             file.gate.wait()
         if file.account and not self.is_signed(file.account):
             return self.refuse(403, b"<Error><Code>SignatureDoesNotMatch</Code></Error>")
+        if fault == "extra":
+            self.wfile.write(b"z" * 100000)
         if fault == "reset":  # RST, not FIN
             self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             self.connection.close()

@@ -93,6 +93,7 @@ def test_what_is_refused_is_a_state():
         "forbidden": (File(DATA, always=403), "answers 403", "credentials"), "empty": (File(b""), "answers 416", "empty"),
         "whole": (File(DATA, ranges=False), "answers 200", "no byte ranges"), "packed": (File(DATA, gzip=True), "packs what it sends", "switch"),
         "text": (File(b"no dataset at all" * 9), "not a packed dataset", "pack"), "short": (File(DATA[:-1000]), "truncated", "missing"),
+        "longer": (File(DATA, always="extra"), "cannot read", "more bytes than the length that it says"),
         "down": (File(DATA, always="reset"), "given up after", "attempts"), "loop": (None, "redirects", ""),
         "spoilt": (File(spoilt), None, ""), "missing": (None, "answers 404 (NoSuchKey)", "path")}
     with Server({f"/s/{name}.spld": file for name, (file, *_) in files.items() if file}, moved={"/s/loop.spld": "/s/loop.spld"}) as server:
