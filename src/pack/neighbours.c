@@ -8,6 +8,7 @@
  * creation: any thread may search. */
 #include "pack/neighbours.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
@@ -71,4 +72,60 @@ void spl_neighbours_destroy(struct spl_neighbours *neighbours)
 void spl_neighbours_find(const struct spl_neighbours *neighbours, size_t i, unsigned k, struct spl_nearest *nearest)
 {
     neighbours->find(&neighbours->boxes, neighbours->points, i, k, nearest);
+}
+
+/* Keeps point j in order of distance, if it is among the k nearest. */
+static void keep_sorted(struct spl_nearest *nearest, unsigned k, size_t j, double squared)
+{
+    unsigned at = nearest->count < k ? nearest->count++ : k - 1;
+    for (; at && nearest->squared[at - 1] > squared; at--) {
+        nearest->squared[at] = nearest->squared[at - 1];
+        nearest->index[at] = nearest->index[at - 1];
+    }
+    nearest->squared[at] = squared;
+    nearest->index[at] = (uint32_t)j;
+}
+
+void spl_neighbours_find_some(const struct spl_neighbours *n, size_t i, unsigned k, double reach,
+                              bool (*takes)(const void *context, size_t point), const void *context,
+                              struct spl_nearest *nearest)
+{
+    const struct spl_boxes *boxes = &n->boxes;
+    struct entry stack[stack_max + 1];
+    unsigned depth = 0, looked = 0;
+    double at[3], bound = reach * reach;
+    spl_points_place(n->points, i, at);
+    nearest->count = 0;
+    stack[depth++] = (struct entry){0, 0, boxes->levels};
+    while (depth && looked < SPL_NEAR_LOOKED) {
+        const struct entry e = stack[--depth];
+        if (e.squared > bound)
+            continue;
+        if (!e.level) {
+            const size_t begin = (size_t)e.box * leaf;
+            const size_t end = begin + leaf < n->points->count ? begin + leaf : n->points->count;
+            for (size_t j = begin; j < end; j++) {
+                double apart[3];
+                spl_points_apart(n->points, at, j, apart);
+                const double squared = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+                if (squared > bound || j == i || (nearest->count == k && squared >= nearest->squared[k - 1]))
+                    continue;
+                looked++;
+                if (takes(context, j))
+                    keep_sorted(nearest, k, j, squared);
+            }
+            bound = nearest->count == k ? nearest->squared[k - 1] : bound;
+            continue;
+        }
+        double squared[fan];
+        unsigned bits = group_distances(&boxes->groups[boxes->first[e.level - 1] + e.box], at, at, bound, squared);
+        unsigned bottom = depth;
+        for (; bits; bits &= bits - 1) {
+            unsigned b = (unsigned)__builtin_ctz(bits), to = depth++;
+            for (; to > bottom && stack[to - 1].squared < squared[b]; to--)
+                stack[to] = stack[to - 1];
+            stack[to] = (struct entry){squared[b], e.box * fan + b, e.level - 1};
+        }
+    }
+    nearest->farthest = nearest->count ? sqrt(nearest->squared[nearest->count - 1]) : 0;
 }

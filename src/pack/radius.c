@@ -166,6 +166,13 @@ static void spread_some(const struct spl_moments *const moments[], unsigned coun
         }
 }
 
+/* More neighbours than are listed, of the point's side as those. */
+static void find_wide(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)
+{
+    spl_neighbours_find(v->neighbours, i, v->wide, near);
+    spl_facing_keep(v->facing, i, v->wide, near);
+}
+
 /* How many of `count` listed neighbours there are. */
 SPL_INLINE unsigned count_listed(const uint32_t *neighbours, unsigned count)
 {
@@ -330,7 +337,7 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
     if (!linear && !place.open)
         return larger(radius, smaller(0.7 * place.gap, 2 * radius));
 
-    spl_neighbours_find(v->neighbours, i, v->wide, near);
+    find_wide(v, i, near);
     if (linear) {
         struct spl_moments moments = spl_moments_of(p, i, near);
         struct spl_spread wide = spread_of(&moments);
@@ -374,7 +381,7 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
 bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)
 {
     double nearest[8];
-    spl_neighbours_find(v->neighbours, i, v->wide, near);
+    find_wide(v, i, near);
     struct spl_moments around = spl_moments_of(v->points, i, near);
     struct spl_spread wide = spread_of(&around);
     if (wide.sigma[1] < linear_below * wide.sigma[2] || roundness(&wide) > 0)

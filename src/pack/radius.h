@@ -2,7 +2,7 @@
 #ifndef SPL_PACK_RADIUS_H
 #define SPL_PACK_RADIUS_H
 
-#include "pack/neighbours.h"
+#include "pack/facing.h"
 
 /* What a point's neighbours sum up to, relative to the point. */
 struct spl_moments {
@@ -19,6 +19,7 @@ struct spl_vicinity {
     size_t begin, end;
     const struct spl_moments *moments; /* one a point of the run */
     const uint32_t *lists;             /* k neighbours a point of the run, unused ones UINT32_MAX */
+    const struct spl_facing *facing;   /* neighbours lie on a point's own side */
     unsigned k, wide;                  /* neighbours that are listed, and that are asked for where those do not tell */
 };
 

@@ -76,6 +76,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         spl_nearest_init(&near);
         for (size_t i = begin; i < end; i++) {
             spl_neighbours_find(s->neighbours, i, s->k, &near);
+            spl_facing_keep(&s->facing, i, s->k, &near);
             uint32_t *list = w->neighbours + (i - begin) * s->k;
             for (unsigned a = 0; a < s->k; a++)
                 list[a] = a < near.count ? near.index[a] : UINT32_MAX;
@@ -88,7 +89,7 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
                 spl_stage_add(s->stage, 4096, worker);
         }
         const struct spl_vicinity vicinity = {s->points,  s->neighbours, begin, end,
-                                              w->moments, w->neighbours, s->k,  s->wide};
+                                              w->moments, w->neighbours, &s->facing, s->k,  s->wide};
         spl_nearest_init(&near);
         struct spl_spreads spreads;
         size_t line_count = 0;
@@ -184,6 +185,7 @@ static int allocate(struct spl_surfaces *s, struct spl_error *err)
     s->neighbours = spl_neighbours_create(p, s->stage->threads, err);
     if (!s->neighbours)
         return SPL_E_NOMEM;
+    s->facing = spl_facing_of(p, s->neighbours);
     if (s->label && p->count > 1) {
         float usual = find_usual_reach(p, s->neighbours, s->k);
         for (unsigned t = 0; t < s->stage->threads; t++)

@@ -32,6 +32,7 @@ struct spl_surface_scratch {     /* of one worker */
 struct spl_surfaces {
     struct spl_points *points;
     struct spl_neighbours *neighbours;
+    struct spl_facing facing;
     struct spl_stage *stage;
     struct spl_surface_scratch *scratch;
     struct spl_surface_block *blocks;
