@@ -133,23 +133,30 @@ paging() {
 
 curl() { LD_LIBRARY_PATH=$root/lib "$root/bin/curl" "$@"; }
 
-# clients, query…: views a second, each a little other than all before, so that no cache has it.
+# clients, query…: views a second, each a little other than all before, so that no cache has it. Those that were refused
+# are no views.
+loads=0
 load() {
     local clients=$1
     shift
+    loads=$((loads + 1))
     cat >"$out/load.lua" <<LUA
 local thread, views = 0, 0
 function setup(t) thread = thread + 1; t:set("own", thread) end
 function request()
     views = views + 1
-    return wrk.format("GET", string.format("/v1/datasets/courtyard/view?$*&margin=1.%07d", own * 100000 + views))
+    return wrk.format("GET", string.format("/v1/datasets/courtyard/view?$*&fov=60.%08d", ($loads * 10 + own) * 100000 + views))
 end
 LUA
     LD_LIBRARY_PATH=$root/lib "$root/bin/wrk" -t "$((clients < 8 ? clients : 8))" -c "$clients" -d "${seconds}s" --latency \
         -s "$out/load.lua" "http://127.0.0.1:$port" 2>&1 |
-        awk -v c="$clients" -v q="$*" '$1 == "50%" { half = $2 } $1 == "99%" { most = $2 } $1 == "Requests/sec:" { rate = $2 }
-            /Non-2xx/ { bad = ", of them failed: " $NF }
-            END { printf "%3d clients  %8.1f views/s  median %9s  99 %% %9s  %s%s\n", c, rate, half, most, q, bad }'
+        awk -v c="$clients" -v q="$*" '$1 == "50%" { half = $2 } $1 == "99%" { most = $2 } $2 == "requests" && $3 == "in" { all = $1 }
+            $1 == "Requests/sec:" { rate = $2 } /Non-2xx/ { refused = $NF }
+            END {
+                views = all ? rate * (all - refused) / all : 0
+                printf "%3d clients  %8.1f views/s  median %9s  99 %% %9s  %s%s\n", c, views, half, most, q,
+                    refused ? ", and " refused " refused" : ""
+            }'
 }
 
 http() {
