@@ -109,7 +109,7 @@ def test_bodies_on_their_way_have_memory_together():
         began, held = time.monotonic(), hold(d, 140)
         while d.post(body).status != 503:  # who was refused for one of these does not come again
             held += hold(d, 2)
-            if time.monotonic() - began > 20:
+            if time.monotonic() - began > 60:
                 raise Skipped("128 MiB take longer than 5 s to send, and whoever is silent for so long gives way")
             assert len(held) < 800 or time.monotonic() - began > 5, "nobody is refused"
         return held
@@ -125,6 +125,10 @@ def test_bodies_on_their_way_have_memory_together():
     def all_are_taken(d):
         return all(head.startswith(b"HTTP/1.1 200 ") for head in finish(hold(d, 128)))
     with Daemon(FAKE, FAKE_FRAME_MS=0) as d:
+        began = time.monotonic()
+        assert all_are_taken(d)
+        if os.environ["SPLATD_SANITIZER"] == "thread" and time.monotonic() - began > 5:  # others may be luckier
+            raise Skipped("128 MiB take longer than 5 s to send, and whoever is silent for so long gives way")
         for _ in range(5):
             began, held = time.monotonic(), fill(d)
             assert d.post(small).status == 200 and d.post(small[:-1] + b" " * 60000 + b"}").status == 200
