@@ -14,7 +14,7 @@ static const double opposite = -0.7; /* cosine between normals of two sides */
 static const double flat = 0.15;     /* sigma_0 / sigma_1 of a plane at most */
 static const double sheet = 0.3;     /* sigma_0 / sigma_1 below which all neighbours are of one side */
 static const double no_line = 0.15;  /* sigma_1 / sigma_2 of a surface at least; radius.c's */
-static const double behind = 0.7;   /* slope out of the plane from which a neighbour lies behind it */
+static const double behind = 0.7;    /* slope out of the plane from which a neighbour lies behind it */
 static const double thick = 2;       /* times sigma_0 */
 static const double near_enough = 8; /* times the distance of the k-th point of any side */
 /* Points that give a plane, that are asked for where they are too few, that are better than those of another side. */
@@ -65,7 +65,7 @@ static inline bool is_below(const double a[3], const double b[3], double cosine)
     return dot(a, b) < cosine * sqrt(dot(a, a) * dot(b, b));
 }
 
-/* Whether point j is seen from about where the side is. */
+/* Whether point j is seen from about where the side is. Of stations alone: normals say their plane themselves. */
 static bool is_seen_alike(const void *context, size_t j)
 {
     const struct side *side = context;

@@ -36,8 +36,8 @@ struct spl_neighbours *spl_neighbours_create(const struct spl_points *points, un
 /* The min(k, points - 1) points nearest to point `i`, itself excluded; among equally far ones, some. Any thread. */
 void spl_neighbours_find(const struct spl_neighbours *neighbours, size_t i, unsigned k, struct spl_nearest *nearest);
 
-/* Those of the k points nearest to point `i` that `takes` takes, nearest first, within `reach`, of the nearest
- * SPL_NEAR_LOOKED or so that there are. Sets count, index, squared and farthest alone. Any thread. */
+/* The k points nearest to point `i` of those that `takes` takes, nearest first, as far as they lie within `reach` and
+ * SPL_NEAR_LOOKED or so that were looked at have them. Sets count, index, squared and farthest alone. Any thread. */
 enum { SPL_NEAR_LOOKED = 2048 };
 void spl_neighbours_find_some(const struct spl_neighbours *neighbours, size_t i, unsigned k, double reach,
                               bool (*takes)(const void *context, size_t point), const void *context,

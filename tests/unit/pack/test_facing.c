@@ -103,33 +103,31 @@ static void check_outside(const struct spl_points *p, double thick, double spaci
 
 static const double both_sides[2][3] = {{-5, 1, 1.5}, {3, 2.5, 1.5}};
 
-static void test_a_wall_is_thinner_than_its_points_are_apart(void **state)
+/* Points so far apart on its outside and its inside. */
+static void check_wall(double thick, double outside, double inside)
 {
-    (void)state;
     struct scene s = begin();
-    add_sheet(&s, (double[3]){0, 0, 0}, (double[3]){0, 4, 4}, 0.25, 0, 1, -1);
-    add_sheet(&s, (double[3]){0.24, 0, 0}, (double[3]){0.24, 4, 4}, 0.05, 1, 1, 1);
+    add_sheet(&s, (double[3]){0, 0, 0}, (double[3]){0, 4, 4}, outside, 0, 1, -1);
+    add_sheet(&s, (double[3]){thick, 0, 0}, (double[3]){thick, 4, 4}, inside, 1, 1, 1);
     for (int told = BY_STATIONS; told <= BY_NORMALS; told++) {
         struct spl_points p = finish(&s, told, both_sides);
-        check_outside(&p, 0.24, 0.25, 0.5);
+        check_outside(&p, thick, outside, 0.5);
         spl_points_finish(&p);
     }
     clear(&s);
+}
+
+static void test_a_wall_is_thinner_than_its_points_are_apart(void **state)
+{
+    (void)state;
+    check_wall(0.24, 0.25, 0.05);
 }
 
 /* All of the nearest 64 and more are the other side's. */
 static void test_a_partition_is_a_twentieth_as_dense_on_one_side(void **state)
 {
     (void)state;
-    struct scene s = begin();
-    add_sheet(&s, (double[3]){0, 0, 0}, (double[3]){0, 4, 4}, 0.1, 0, 1, -1);
-    add_sheet(&s, (double[3]){0.05, 0, 0}, (double[3]){0.05, 4, 4}, 0.0225, 1, 1, 1);
-    for (int told = BY_STATIONS; told <= BY_NORMALS; told++) {
-        struct spl_points p = finish(&s, told, both_sides);
-        check_outside(&p, 0.05, 0.1, 0.5);
-        spl_points_finish(&p);
-    }
-    clear(&s);
+    check_wall(0.05, 0.1, 0.0225);
 }
 
 /* As where one station saw all of it, but for so many. */
