@@ -89,6 +89,22 @@ SPL_INLINE unsigned group_distances(const struct spl_box_group *g, const double 
     return bits;
 }
 
+/* Puts the boxes of a box's group that lie within `bound` onto the stack, the nearest on top; its depth then. */
+SPL_INLINE unsigned push_boxes(const struct spl_boxes *boxes, const struct entry *of, const double at[3], double bound,
+                               struct entry stack[], unsigned depth)
+{
+    double squared[fan];
+    unsigned bits = group_distances(&boxes->groups[boxes->first[of->level - 1] + of->box], at, at, bound, squared);
+    const unsigned bottom = depth;
+    for (; bits; bits &= bits - 1) {
+        unsigned k = (unsigned)__builtin_ctz(bits), to = depth++;
+        for (; to > bottom && stack[to - 1].squared < squared[k]; to--)
+            stack[to] = stack[to - 1];
+        stack[to] = (struct entry){squared[k], of->box * fan + k, of->level - 1};
+    }
+    return depth;
+}
+
 /* A search on its own, nearest boxes first: among the boxes of a group the nearest is on top of the stack. Leaves come
  * off it at once. */
 SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *points, enum spl_points_kind kind,
@@ -101,15 +117,8 @@ SPL_INLINE void walk(const struct spl_boxes *boxes, const struct spl_points *poi
         struct entry e = stack[--depth];
         if (e.squared > c->bound)
             continue;
-        double squared[fan];
-        unsigned bits = group_distances(&boxes->groups[boxes->first[e.level - 1] + e.box], at, at, c->bound, squared);
         unsigned bottom = depth;
-        for (; bits; bits &= bits - 1) {
-            unsigned k = (unsigned)__builtin_ctz(bits), to = depth++;
-            for (; to > bottom && stack[to - 1].squared < squared[k]; to--)
-                stack[to] = stack[to - 1];
-            stack[to] = (struct entry){squared[k], e.box * fan + k, e.level - 1};
-        }
+        depth = push_boxes(boxes, &e, at, c->bound, stack, depth);
         for (; e.level == 1 && depth > bottom; depth--)
             if (stack[depth - 1].squared <= c->bound)
                 scan_leaf(points, kind, (size_t)stack[depth - 1].box * leaf, at, c);

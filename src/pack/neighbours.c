@@ -117,15 +117,7 @@ void spl_neighbours_find_some(const struct spl_neighbours *n, size_t i, unsigned
             bound = nearest->count == k ? nearest->squared[k - 1] : bound;
             continue;
         }
-        double squared[fan];
-        unsigned bits = group_distances(&boxes->groups[boxes->first[e.level - 1] + e.box], at, at, bound, squared);
-        unsigned bottom = depth;
-        for (; bits; bits &= bits - 1) {
-            unsigned b = (unsigned)__builtin_ctz(bits), to = depth++;
-            for (; to > bottom && stack[to - 1].squared < squared[b]; to--)
-                stack[to] = stack[to - 1];
-            stack[to] = (struct entry){squared[b], e.box * fan + b, e.level - 1};
-        }
+        depth = push_boxes(boxes, &e, at, bound, stack, depth);
     }
     nearest->farthest = nearest->count ? sqrt(nearest->squared[nearest->count - 1]) : 0;
 }
