@@ -12,7 +12,8 @@
 
 /* From its first line until its reply is written. */
 struct request {
-    LIST_ENTRY(request) link; // spl_http.waiting, while `waits`
+    LIST_ENTRY(request) link;            // spl_http.waiting, while `waits`
+    TAILQ_ENTRY(request) postponed_link; // spl_http.postponed, while `postponed`
     struct spl_service *service;
     struct MHD_Connection *handle;
     struct connection *connection;
@@ -41,7 +42,8 @@ struct request {
     bool suspended; /* libmicrohttpd does not go on with it */
     bool waits;     /* suspended, until a view is ready or deadline_ns */
     bool postponed; /* it waits for a turn of the loop that has time for it, */
-    bool admitted;  /* and this is the one */
+    bool admitted;  /* and this is the one, if those before it leave time */
+    uint64_t postponed_as; /* its number among these */
     uint64_t deadline_ns;
     struct batch *batch;           // may be NULL; the views that it waits for
     struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
@@ -88,10 +90,10 @@ void spl_request_resume(struct request *request);
 /* waiting.c: requests that wait for views, batches and tours. */
 void spl_waiting_add(struct request *request, uint64_t deadline_ns); /* suspends it */
 void spl_waiting_resume(struct request *request);                    /* its response is set */
-void spl_waiting_refuse_all(struct spl_service *service);
+void spl_waiting_refuse_all(struct spl_service *service);            /* and all that comes later */
 
-/* waiting.c: how long one turn of the loop handles requests with bodies. What that took since `began_ns` is added; once
- * the turn is over, or others wait, a request whose body is there is postponed: then true, and it is handled again. */
+/* waiting.c: how long one turn of the loop handles requests. What that took since `began_ns` is added; once the turn is
+ * over, or others wait, a request that is to be handled is postponed: then true, and it is handled again. */
 bool spl_turn_is_over(struct spl_service *service);
 void spl_turn_add(struct spl_service *service, uint64_t began_ns);
 bool spl_waiting_postpone(struct request *request);

@@ -187,6 +187,16 @@ static bool take_body(struct request *request, const char *data, size_t length)
     return false;
 }
 
+/* Nothing may wait any more: MHD cannot be stopped while a connection is suspended. */
+static enum MHD_Result refuse_as_it_ends(struct request *request)
+{
+    struct spl_error err = {0};
+    spl_fail(&err, SPL_E_CANCELLED, "the service is stopping");
+    spl_change_abandon(request);
+    spl_reply_error(request, &err);
+    return send_reply(request);
+}
+
 static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, const char *url, const char *method,
                                   const char *version, const char *data, size_t *length, void **request_context)
 {
@@ -207,6 +217,8 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
             return MHD_NO;
         return !spl_check_framing(request, method, version) || answer_headers(request) ? send_reply(request) : MHD_YES;
     }
+    if (request->service->http->ends && !request->response)
+        return *length ? MHD_NO : refuse_as_it_ends(request);
     if (*length) {
         request->comes = true;
         bool taken = take_body(request, data, *length);
@@ -217,16 +229,14 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *handle, 
         spl_change_end(request);
     } else if (!request->response) {
         spl_connection_enter(request->connection, PHASE_WORKING);
-        const bool has_body = request->body_length > 0; // that is kept
-        if (has_body && spl_waiting_postpone(request))
+        if (spl_waiting_postpone(request))
             return MHD_YES;
         const uint64_t began_ns = spl_now_ns();
         if (request->body_seen > spl_body_get_most(request))
             refuse_body(request);
         else
             spl_route(request, method);
-        if (has_body)
-            spl_turn_add(request->service, began_ns);
+        spl_turn_add(request->service, began_ns);
         if (!request->place)
             spl_body_drop(request); // it is read, however long its view takes
     }
@@ -261,6 +271,7 @@ void spl_http_init(struct spl_service *service)
 {
     struct spl_http *http = service->http;
     http->listen_fd = -1;
+    TAILQ_INIT(&http->postponed);
     spl_http_turns_init(&http->turns, service);
     uv_timer_init(&service->loop, &http->wait_timer);
     uv_timer_init(&service->loop, &http->slow_timer);

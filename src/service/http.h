@@ -67,9 +67,11 @@ struct spl_http {
     size_t waiting_count;
     uv_timer_t wait_timer; /* deadlines and departures, while requests wait */
 
-    size_t postponed;             /* of those that wait: for a turn of the loop that has time for them */
+    TAILQ_HEAD(, request) postponed; /* those of them that wait for a turn of the loop that has time, oldest first */
+    uint64_t postponed_ever;
     uv_idle_t next;               /* while there are any */
     uint64_t turn_ns, handled_ns; /* the turn that was looked at last, and what handling took in it */
+    bool ends;                    /* what still comes is refused at once */
 };
 
 /* http.c: the MHD daemon inside the uv loop. init makes what the loop holds, and opens nothing. */

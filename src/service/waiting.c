@@ -1,9 +1,9 @@
 /* Requests that wait for views, for the pool to read a path or look up a coordinate system, or for the loop to have
  * time for them: their MHD connection is suspended until all is ready, the deadline passes or the client leaves.
  *
- * A body of a MiB takes 30 ms to read, and a hundred may end at once: one turn of the loop handles requests with bodies
- * for 20 ms and ends the last of them; those that come later have the next turns, the oldest first. What has no body
- * waits for none.
+ * A body of a MiB takes 30 ms to read, a list of a thousand tours as long, and hundreds may be there at once: one turn
+ * of the loop handles requests for 20 ms and ends the last of them; those that come later have the next turns, the
+ * oldest first. MHD looks at all that are suspended whenever some are taken up, so small ones are, many at a time.
  *
  * MHD does not watch suspended connections, so a timer looks at their sockets while there are any. A client that has
  * closed its sending side counts as gone, as with nginx. Invariant: request->waits is set exactly while the request is
@@ -22,7 +22,7 @@
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
-enum { sweep_ms = 20, sweep_sockets = 64, turn_ms = 20 };
+enum { sweep_ms = 20, sweep_sockets = 64, turn_ms = 20, small_bytes = 4096, small_at_once = 64 };
 
 static void let_go(struct request *request)
 {
@@ -105,7 +105,8 @@ void spl_waiting_resume(struct request *request)
     struct spl_service *service = request->service;
     LIST_REMOVE(request, link);
     request->waits = false;
-    service->http->postponed -= request->postponed;
+    if (request->postponed)
+        TAILQ_REMOVE(&service->http->postponed, request, postponed_link);
     request->postponed = false;
     if (!--service->http->waiting_count)
         uv_timer_stop(&service->http->wait_timer);
@@ -114,6 +115,7 @@ void spl_waiting_resume(struct request *request)
 
 void spl_waiting_refuse_all(struct spl_service *service)
 {
+    service->http->ends = true;
     while (!LIST_EMPTY(&service->http->waiting)) {
         struct spl_error err = {0};
         spl_fail(&err, SPL_E_CANCELLED, "the service is stopping");
@@ -144,38 +146,56 @@ void spl_turn_add(struct spl_service *service, uint64_t began_ns)
     *handled_ns(service) += spl_now_ns() - began_ns;
 }
 
-static struct request *find_oldest(struct spl_http *http)
+/* The oldest, and as many small ones as come after it. True: there was one. */
+static bool admit(struct spl_http *http)
 {
-    struct request *request, *oldest = NULL;
-    LIST_FOREACH(request, &http->waiting, link)
-    {
-        if (request->postponed)
-            oldest = request;
+    size_t count = 0;
+    for (struct request *request; (request = TAILQ_FIRST(&http->postponed)); count++) {
+        const bool large = request->body_length > small_bytes;
+        if (count && (large || count == small_at_once))
+            break;
+        request->admitted = true;
+        spl_waiting_resume(request);
+        if (large)
+            return true;
     }
-    return oldest;
+    return count;
 }
 
 static void on_next(uv_idle_t *next)
 {
     struct spl_service *service = next->data;
-    while (service->http->postponed && !spl_turn_is_over(service)) {
-        struct request *request = find_oldest(service->http);
-        request->admitted = true;
-        spl_waiting_resume(request);
+    const uint64_t until_ns = spl_now_ns() + turn_ms * SPL_NS_PER_MS; // MHD's own part of it counts, too
+    while (!spl_turn_is_over(service) && spl_now_ns() < until_ns && admit(service->http))
         spl_http_pump(service);
-    }
-    if (!service->http->postponed)
+    if (TAILQ_EMPTY(&service->http->postponed))
         uv_idle_stop(next);
+}
+
+/* Behind those that came before it, also where it was taken up and found no time. */
+static void line_up(struct spl_http *http, struct request *request)
+{
+    struct request *later = request->admitted ? TAILQ_FIRST(&http->postponed) : NULL;
+    if (!request->admitted)
+        request->postponed_as = ++http->postponed_ever;
+    while (later && later->postponed_as < request->postponed_as)
+        later = TAILQ_NEXT(later, postponed_link);
+    if (later)
+        TAILQ_INSERT_BEFORE(later, request, postponed_link);
+    else
+        TAILQ_INSERT_TAIL(&http->postponed, request, postponed_link);
+    request->postponed = true;
 }
 
 bool spl_waiting_postpone(struct request *request)
 {
     struct spl_service *service = request->service;
-    if (request->admitted || (!service->http->postponed && !spl_turn_is_over(service)))
+    struct spl_http *http = service->http;
+    if (!spl_turn_is_over(service) && (request->admitted || TAILQ_EMPTY(&http->postponed)))
         return false;
-    spl_waiting_add(request, spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
-    request->postponed = true;
-    service->http->postponed++;
-    uv_idle_start(&service->http->next, on_next);
+    spl_waiting_add(request, request->admitted ? request->deadline_ns
+                                               : spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
+    line_up(http, request);
+    uv_idle_start(&http->next, on_next);
     return true;
 }

@@ -137,9 +137,9 @@ def all_shapes():
             {"camera": {"eye": [3, 0, 1 + 1e-3 * i], "target": [0, 0, 1], "fov": 60}} for i in range(256)]}).encode()
 
 
-def held_back(d, name, body, path):
+def held_back(d, name, body, path, client=None):
     """A client that has sent all of a POST but its last byte."""
-    client = socket.create_connection(("127.0.0.1", d.port), PATIENCE_S)
+    client = client or socket.create_connection(("127.0.0.1", d.port), PATIENCE_S)
     client.sendall(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nX-Request-Id: {name}\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body[:-1])
     return client
 
@@ -184,6 +184,71 @@ def test_bodies_that_end_at_once_stall_nobody():
             assert read == list(range(count - gone)), read
             for client in clients:
                 client.close()
+
+
+def read_replies(client, count, status):
+    """The heads of so many; what is left of the last one's body comes with the next."""
+    head, got = f"HTTP/1.1 {status}".encode(), b""
+    while got.count(head) < count:
+        piece = client.recv(1 << 20)
+        assert piece, got[-200:]
+        got += piece
+
+
+@thrice
+def test_requests_without_bodies_that_come_at_once_stall_nobody():
+    """Lists of what there is, a few on each of many connections; and bodies of one byte, of which a turn takes up many."""
+    count, each = 600, 5
+    for method, path, length, status in ("GET", "/v1/methods", 0, 200), ("POST", VIEW, 1, 400):
+        one = f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {length}\r\n\r\n{'{' * length}".encode()
+        with Daemon(FAKE, "--deadline", "600000", "--connections", "1000", "--connections-per-address", "1000", "--log-rate", "1") as d:
+            slower = slower_than_usual()
+            clients = [socket.create_connection(("127.0.0.1", d.port), PATIENCE_S) for _ in range(count)]
+            for client in clients:
+                client.sendall(one)
+                read_replies(client, 1, status)
+            before = metrics(d)["splatd_loop_stall_cpu_seconds"]
+            d.process.send_signal(signal.SIGSTOP)
+            for client in clients:
+                client.sendall(one * each)
+            d.process.send_signal(signal.SIGCONT)
+            for client in clients:
+                read_replies(client, each, status)
+            busiest = metrics(d)["splatd_loop_stall_cpu_seconds"]
+            print(f"     {method} {path}: {1000 * before:.1f} ms one by one, {count * each} at once {1000 * busiest:.1f} ms")
+            for client in clients:
+                client.close()
+            if busiest > before + 2 * STALL_S * slower:
+                raise Stalled(path, before, busiest, slower)
+
+
+def test_bodies_that_end_as_a_drain_does_are_refused():
+    """What ends while all that waits is refused can wait no more: libmicrohttpd aborts where it is stopped then."""
+    body = ('{"views":[' + ",".join(['{"clip":"z<2 and polygon:0,0,1,0,1,1,0,1 and z<1"}'] * 15000) + "]}").encode()
+    deadline_s, grace_s, count = 1, 4, 110
+    d = Daemon(FAKE, "--deadline", str(1000 * deadline_s))
+    clients = [socket.create_connection(("127.0.0.1", d.port), PATIENCE_S) for _ in range(count)]
+    for client in clients:
+        client.sendall(b"GET /v1/methods HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        read_replies(client, 1, 200)
+    d.process.send_signal(signal.SIGTERM)
+    ends = time.monotonic() + deadline_s + grace_s
+    for i in range(2):  # so that it does not end before
+        held_back(d, f"slow-{i}", b"{ ", VIEW, clients[i])
+        time.sleep(1.4)  # whoever is silent for two seconds is cut meanwhile
+    time.sleep(max(0, ends - 1.8 - time.monotonic()))
+    for i, client in enumerate(clients[2:]):
+        held_back(d, f"held-{i}", body, VIEW + "s", client)
+    time.sleep(max(0, ends - 0.25 - time.monotonic()))
+    for client in clients[2:]:  # faster than they are read
+        try:
+            client.sendall(body[-1:])
+        except OSError:
+            break
+        time.sleep(0.005)
+    assert d.wait_exit() == 0, d.lines[-1]
+    for client in clients:
+        client.close()
 
 
 def paths():

@@ -33,7 +33,8 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
         snprintf(tag, sizeof tag, "\"%016llx\"", (unsigned long long)slot->current->info->version);
     LIST_FOREACH(change, &service->library->changes, link)
     changes++;
-    if (service->draining || changes == changes_max || (slot && slot->busy)) {
+    const bool busy = slot && (slot->busy || (slot->current && slot->current->saving));
+    if (service->draining || changes == changes_max || busy) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
                        id);
     } else if (slot && !slot->in_directory) {
