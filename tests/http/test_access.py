@@ -396,13 +396,27 @@ def test_who_asks_too_often_waits():
 
 
 def test_each_view_of_a_batch_counts():
-    for flag in ("--rate-limit", "--rate-limit-total"):
-        with Daemon(FAKE, flag, "1", FAKE_FRAME_MS=0) as d:
-            batch = {"width": 16, "height": 16, "container": "zip", "views": [{"lod": 1 + i / 100} for i in range(200)]}
-            assert d.post({**batch, "views": [5]}, VIEW + "s").status == 400  # which costs one
-            assert d.post(batch, VIEW + "s").status == 200
-            refused = d.ask(SMALL)
-            assert refused.status == 429 and int(refused.headers["Retry-After"]) > 50, refused.headers
+    with Daemon(FAKE, "--rate-limit", "1", FAKE_FRAME_MS=0) as d:
+        batch = {"width": 16, "height": 16, "container": "zip", "views": [{"lod": 1 + i / 100} for i in range(200)]}
+        assert d.post({**batch, "views": [5]}, VIEW + "s").status == 400  # which costs one
+        assert d.post(batch, VIEW + "s").status == 200
+        refused = d.ask(SMALL)
+        assert refused.status == 429 and int(refused.headers["Retry-After"]) > 50, refused.headers
+
+
+def test_a_batch_has_no_more_of_what_all_may_ask_than_others():
+    """Its views wait until there is one for each, and whoever asks meanwhile waits no longer for that."""
+    with Daemon(FAKE, "--rate-limit-total", "20", FAKE_FRAME_MS=0) as d:
+        batch = {"width": 16, "height": 16, "container": "zip", "views": [{"lod": 1 + i / 100} for i in range(100)]}
+        began, replies = time.monotonic(), []
+        maker = threading.Thread(target=lambda: replies.append(d.post(batch, VIEW + "s")))
+        maker.start()
+        others = []
+        while maker.is_alive():
+            others.append(d.ask(SMALL))
+            time.sleep(0.02)
+        assert replies[0].status == 200 and time.monotonic() - began > (100 - 2 * 20) / 20
+        assert {reply.headers["Retry-After"] for reply in others} <= {None, "1"} and 200 in {reply.status for reply in others}
 
 
 def test_connections_are_capped():

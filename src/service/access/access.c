@@ -143,22 +143,8 @@ static void fill_key(struct request *request, uint8_t key[SPL_BUCKET_KEY])
 
 static const uint8_t everybody[SPL_BUCKET_KEY];
 
-static bool is_within_rates(struct request *request)
+static bool refuse_rate(struct request *request, const char *whose, unsigned wait_s)
 {
-    struct spl_access *access = request->service->access;
-    uint8_t key[SPL_BUCKET_KEY];
-    unsigned wait_s = 0;
-    const char *whose = "this address asks";
-    if (access->addresses) {
-        fill_key(request, key);
-        wait_s = spl_buckets_take(access->addresses, key, spl_now_ns());
-    }
-    if (!wait_s && access->all) {
-        wait_s = spl_buckets_take(access->all, everybody, spl_now_ns());
-        whose = "all clients together ask";
-    }
-    if (!wait_s)
-        return true;
     char detail[128], seconds[16];
     snprintf(detail, sizeof detail, "%s more often than the service allows; come back after %u s", whose, wait_s);
     snprintf(seconds, sizeof seconds, "%u", wait_s);
@@ -169,16 +155,39 @@ static bool is_within_rates(struct request *request)
     return false;
 }
 
-void spl_access_charge(struct request *request, unsigned count)
+static const char one_asks[] = "this address asks", all_ask[] = "all clients together ask";
+
+static bool is_within_rates(struct request *request)
 {
     struct spl_access *access = request->service->access;
     uint8_t key[SPL_BUCKET_KEY];
-    if (access && access->addresses) {
+    unsigned wait_s = 0;
+    if (access->addresses) {
         fill_key(request, key);
-        spl_buckets_charge(access->addresses, key, count);
+        wait_s = spl_buckets_take(access->addresses, key, spl_now_ns());
     }
-    if (access && access->all)
-        spl_buckets_charge(access->all, everybody, count);
+    if (wait_s)
+        return refuse_rate(request, one_asks, wait_s);
+    if (access->all)
+        wait_s = spl_buckets_take(access->all, everybody, spl_now_ns());
+    return !wait_s || refuse_rate(request, all_ask, wait_s);
+}
+
+bool spl_access_charge(struct request *request, unsigned count)
+{
+    struct spl_access *access = request->service->access;
+    uint8_t key[SPL_BUCKET_KEY];
+    if (!access || !access->addresses)
+        return true;
+    fill_key(request, key);
+    const unsigned wait_s = spl_buckets_charge(access->addresses, key, count);
+    return !wait_s || refuse_rate(request, one_asks, wait_s);
+}
+
+bool spl_access_take_one(struct spl_service *service)
+{
+    struct spl_access *access = service->access;
+    return !access || !access->all || !spl_buckets_take(access->all, everybody, spl_now_ns());
 }
 
 /* Does no token decide about the request? One that is shown does, right or wrong, where there are tokens. */

@@ -59,6 +59,11 @@ static struct bucket *find(struct spl_buckets *buckets, const uint8_t key[SPL_BU
     return oldest;
 }
 
+static unsigned get_wait_s(const struct spl_buckets *buckets, const struct bucket *bucket)
+{
+    return 1 + (unsigned)((1 - bucket->left) / buckets->per_second);
+}
+
 unsigned spl_buckets_take(struct spl_buckets *buckets, const uint8_t key[SPL_BUCKET_KEY], uint64_t now_ns)
 {
     struct bucket *bucket = find(buckets, key);
@@ -73,12 +78,15 @@ unsigned spl_buckets_take(struct spl_buckets *buckets, const uint8_t key[SPL_BUC
         bucket->left--;
         return 0;
     }
-    return 1 + (unsigned)((1 - bucket->left) / buckets->per_second);
+    return get_wait_s(buckets, bucket);
 }
 
-void spl_buckets_charge(struct spl_buckets *buckets, const uint8_t key[SPL_BUCKET_KEY], unsigned count)
+unsigned spl_buckets_charge(struct spl_buckets *buckets, const uint8_t key[SPL_BUCKET_KEY], unsigned count)
 {
     struct bucket *bucket = find(buckets, key);
+    if (bucket->at_ns && bucket->left < 0)
+        return get_wait_s(buckets, bucket);
     if (bucket->at_ns) // else another address has its place
         bucket->left -= count;
+    return 0;
 }

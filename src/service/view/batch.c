@@ -1,8 +1,9 @@
 /* Many views for one request: POST …/views.
  *
  * A batch has at most `seats` views on their way at a time, so that the device is never idle for it and other people's
- * views get between; where the queue is full it tries again with the next sweep. Parts are in the order of the request;
- * one that failed is a problem document in its place. Once all are there, a thread of libuv puts them together.
+ * views get between; where the queue is full, or all clients together ask too often, it tries again with the next
+ * sweep. Parts are in the order of the request; one that failed is a problem document in its place. Once all are there,
+ * a thread of libuv puts them together.
  * Invariant: a batch belongs to its request until it is abandoned or bundled; while it is being bundled it is freed by
  * finish() alone. Owned by the loop's thread, but `parts` and `bundle` while a thread has them. */
 #include <stdio.h>
@@ -45,6 +46,7 @@ struct batch {
     struct item *items;
     size_t next, done, failed, bytes;
     struct seat seats[seats];
+    bool may_begin; /* the next one is counted; the first was with the request */
     bool bundling;
     uv_work_t work;
     struct spl_part *parts;
@@ -199,9 +201,11 @@ void spl_batch_go_on(struct batch *batch)
         return;
     for (struct seat *seat; batch->next < batch->views.count && (seat = find_seat(batch));) {
         struct spl_error err = {0};
-        int rc = begin(batch, seat, batch->next, &err);
+        batch->may_begin = batch->may_begin || spl_access_take_one(batch->service);
+        int rc = batch->may_begin ? begin(batch, seat, batch->next, &err) : SPL_E_BUSY;
         if (rc == SPL_E_BUSY)
             return; // the next sweep tries again
+        batch->may_begin = false;
         if (rc)
             settle(batch, batch->next, NULL, &err);
         batch->next++;
@@ -251,6 +255,7 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         goto refuse;
     batch->service = service;
     batch->request = request;
+    batch->may_begin = true;
     batch->entry = spl_catalog_entry_ref(call->entry);
     struct spl_pipeline_status status;
     spl_fleet_get_status(service->views->fleet, &status);
@@ -259,7 +264,10 @@ void spl_make_views(struct request *request, const struct spl_call *call)
         spl_fail(&err, SPL_E_BUSY, "the queue of views is full; come back later");
         goto refuse;
     }
-    spl_access_charge(request, (unsigned)batch->views.count - 1);
+    if (!spl_access_charge(request, (unsigned)batch->views.count - 1)) {
+        destroy(batch);
+        return;
+    }
     request->batch = batch;
     spl_waiting_add(request, spl_now_ns() + (batch->views.count + 1) * service->options->deadline_ms * SPL_NS_PER_MS);
     spl_batch_go_on(batch);

@@ -366,7 +366,8 @@ static void buckets_empty_and_fill_again(void **state)
     assert_int_equal(spl_buckets_take(buckets, a, now), 1);
     now += 1000 * SPL_NS_PER_S;
     assert_int_equal(spl_buckets_take(buckets, a, now), 0);
-    spl_buckets_charge(buckets, a, 49); // 20 - 50: a debt of 30, and 1 to go on
+    assert_int_equal(spl_buckets_charge(buckets, a, 49), 0); // 20 - 50: a debt of 30, and 1 to go on
+    assert_int_equal(spl_buckets_charge(buckets, a, 49), 1 + 3); // nothing on top of a debt
     assert_int_equal(spl_buckets_take(buckets, a, now), 1 + 3);
     assert_int_equal(spl_buckets_take(buckets, b, now), 0);
     assert_int_equal(spl_buckets_take(buckets, a, now + 3 * SPL_NS_PER_S), 1);
