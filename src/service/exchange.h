@@ -46,7 +46,8 @@ struct request {
     uint64_t postponed_as; /* its number among these */
     uint64_t deadline_ns;
     struct batch *batch;           // may be NULL; the views that it waits for
-    struct spl_tour_wish *wish;    // may be NULL; the tour that it waits for
+    struct spl_tour_wish *wish;    // may be NULL; the path being read that it waits for
+    struct spl_tour *tour;         // may be NULL; the tour that it made or removed, until that is on the disk
     struct spl_place_wish *place;  // may be NULL; the coordinate system that it waits for
     struct spl_saving *saving;     // may be NULL; the view being saved that it waits for
     bool wants_body;               /* it is routed again once its body is there */

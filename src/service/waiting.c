@@ -29,6 +29,7 @@ static void let_go(struct request *request)
     spl_ticket_drop(&request->ticket);
     spl_batch_abandon(request->batch);
     spl_tour_wish_abandon(request->wish);
+    spl_tour_abandon(request);
     spl_place_abandon(request->place);
     spl_ray_wish_abandon(request->ray_wish);
     spl_saving_abandon(request->saving);

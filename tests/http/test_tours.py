@@ -7,6 +7,7 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import tempfile
 import threading
@@ -414,7 +415,7 @@ def test_a_tour_of_the_version_before_goes_on():
         with Daemon(FAKE, "--tours", str(folder), **Hold().environment) as d:
             tour = begin(d, depth_tour(6))
             file = folder / tour["name"] / "tour.json"
-            eventually(file.exists)
+            assert file.exists()  # what was promised outlives everything
             d.process.send_signal(signal.SIGKILL)
             d.wait_exit()
         state = json.loads(file.read_text())
@@ -432,20 +433,44 @@ def test_a_client_that_leaves_while_its_path_is_read():
         with Daemon(FAKE, "--tours", str(folder), "--deadline", "6000", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
                     SLOW_DISK_NAME="tour.json", UV_THREADPOOL_SIZE=1) as d:
             gate.unlink()
-            first = begin(d, body(2))  # its state is being written by the pool's one thread
+            first = d.connect()
+            first.request("POST", TOURS, json.dumps(body(2)))
             try:
+                eventually(lambda: d.ask("/v1/tours").json()["tours"])  # its state is being written by the pool's one thread
+                uri = d.ask("/v1/tours").json()["tours"][0]["uri"]
+                assert d.ask(uri, "DELETE").status == 503  # whoever made it has no reply yet
                 leaving = d.connect()
                 leaving.request("POST", TOURS, json.dumps(body(3)))
-                eventually(lambda: b"\nsplatd_requests_open 1\n" in d.ops("/metrics").body)
+                eventually(lambda: b"\nsplatd_requests_open 2\n" in d.ops("/metrics").body)
                 leaving.close()
                 eventually(lambda: d.status()["counters"]["clients_left"] == 1)
                 assert "deadline" in begin(d, body(4), 503)["detail"]
                 assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2]
             finally:
                 gate.touch()
-            ended(d, first["uri"])
+            ended(d, uri)
             ended(d, begin(d, body(5))["uri"])
             assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2, 5]
+
+
+def test_what_is_removed_while_it_is_read_counts_until_then():
+    """No restart takes it up, and the quota has no room for more before its files are gone."""
+    settings = {"width": 640, "height": 480, "format": "raw"}
+    with Folder() as folder, Daemon(FAKE, "--tours", str(folder), "--tour-disk", "20M", FAKE_FRAME_MS=0) as d:
+        tour = ended(d, begin(d, body(10, settings=settings))["uri"])
+        reader = socket.socket()
+        reader.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        reader.connect(("127.0.0.1", d.port))
+        reader.sendall(f"GET {tour['zip']} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        assert reader.recv(100).startswith(b"HTTP/1.1 200")
+        assert d.ask(tour["uri"], "DELETE").status == 204 and not (folder / tour["name"] / "tour.json").exists()
+        kept = d.ask("/v1/tours").json()
+        assert kept["tours"] == [] and kept["bytes"] > 10 * 640 * 480 * 3, kept
+        again = ended(d, begin(d, body(10, settings=settings))["uri"], "failed")
+        assert "may" in again["error"] and d.ask(again["uri"], "DELETE").status == 204
+        reader.close()
+        eventually(lambda: d.ask("/v1/tours").json()["bytes"] == 0 and not list(folder.iterdir()))
+        ended(d, begin(d, body(10, settings=settings))["uri"])
 
 
 def test_a_tour_has_failed_when_its_last_frame_is_written():

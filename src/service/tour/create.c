@@ -1,6 +1,8 @@
 /* POST …/tours. A path can be a MiB of numbers and become a hundred thousand cameras, so a thread of the pool reads it
  * while the request waits like one for a view; the loop looks whether there is room before and again after.
  *
+ * The reply is sent when tour.json is on the disk: what was promised is there after a crash, too.
+ *
  * Invariant: what is asked for belongs to the pool until after(), whether its request still waits or not. Owned by the
  * loop's thread, but for read_path(). */
 #include <stdlib.h>
@@ -36,26 +38,57 @@ static void read_path(uv_work_t *work)
     spl_tour_spec_from_text(wish->body, wish->body_length, &wish->defaults, &wish->limits, &wish->spec, &wish->err);
 }
 
-static void reply(struct request *request, struct spl_tour_wish *wish)
+static void tell(struct request *request, const struct spl_tour *tour)
+{
+    char location[64];
+    spl_reply_json(request, spl_tour_describe(tour));
+    request->status = MHD_HTTP_ACCEPTED;
+    snprintf(location, sizeof location, "/v1/tours/%s", tour->name);
+    if (request->response)
+        MHD_add_response_header(request->response, MHD_HTTP_HEADER_LOCATION, location);
+}
+
+void spl_tour_answer(struct spl_tour *tour, const struct spl_error *why)
+{
+    struct request *request = tour->asker;
+    if (!request)
+        return;
+    spl_tour_abandon(request);
+    if (why->code)
+        spl_reply_error(request, why);
+    else if (tour->removed)
+        spl_reply_empty(request);
+    else
+        tell(request, tour);
+    spl_waiting_resume(request);
+    spl_http_pump(request->service);
+}
+
+void spl_tour_abandon(struct request *request)
+{
+    if (request->tour)
+        request->tour->asker = NULL;
+    request->tour = NULL;
+}
+
+/* True: the request has its reply, else it waits until the tour is on the disk. */
+static bool reply(struct request *request, struct spl_tour_wish *wish)
 {
     const char *id = wish->entry->info->id;
     const struct spl_catalog_entry *entry = spl_catalog_find(&request->service->library->catalog, id);
     struct spl_error *err = &wish->err;
     struct spl_tour *tour;
-    char location[64];
     if (!err->code && (!entry || entry->info->version != wish->entry->info->version))
         spl_fail_field(err, SPL_E_NOT_FOUND, "id", "dataset '%s' was replaced or dropped just now", id);
     if (!err->code)
         spl_view_check_part(&wish->spec.view, entry->info, "settings", err);
     if (err->code || spl_tours_add(wish->tours, entry, &wish->body, wish->body_length, &wish->spec, &tour, err)) {
         spl_reply_error(request, err);
-        return;
+        return true;
     }
-    spl_reply_json(request, spl_tour_describe(tour));
-    request->status = MHD_HTTP_ACCEPTED;
-    snprintf(location, sizeof location, "/v1/tours/%s", tour->name);
-    if (request->response)
-        MHD_add_response_header(request->response, MHD_HTTP_HEADER_LOCATION, location);
+    request->tour = tour;
+    tour->asker = request;
+    return false;
 }
 
 static void destroy(struct spl_tour_wish *wish)
@@ -77,9 +110,10 @@ static void after(uv_work_t *work, int status)
     wish->tours->service->library->tasks--;
     if (request) {
         request->wish = NULL;
-        reply(request, wish);
-        spl_waiting_resume(request);
-        spl_http_pump(request->service);
+        if (reply(request, wish)) {
+            spl_waiting_resume(request);
+            spl_http_pump(request->service);
+        }
     }
     destroy(wish);
 }

@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/datasets/library.h"
+#include "service/exchange.h"
 #include "service/ops/counters.h"
 #include "service/state.h"
 #include "service/tour/fade.h"
@@ -35,10 +36,13 @@ static void changed(struct spl_tour *tour)
 /* A file of `now` bytes is there instead of one of `before`. */
 static void account(struct spl_tour *tour, uint64_t before, uint64_t now)
 {
-    if (tour->removed)
-        return;
     tour->bytes += now - before;
     tour->tours->bytes += now - before;
+}
+
+void spl_tour_give_back(struct spl_tour *tour)
+{
+    account(tour, tour->bytes, 0);
 }
 
 static void end(struct spl_tour *tour, enum spl_tour_state state)
@@ -176,8 +180,10 @@ static void take_job(struct spl_job *job)
         tour->writing++;
         tours->writing_bytes += job->encoded.length;
         spl_count(tours->service->counters, tour_frames);
-        if (!job->stats.complete) /* pages had no room, or their tile or server could not be read */
+        if (!job->stats.complete) { /* pages had no room, or their tile or server could not be read */
             tour->frames[job->frame_number] = SPL_FRAME_PART;
+            spl_tour_note_part(tour, job->frame_number);
+        }
         spl_tour_work_frame(tour, job->frame_number, &job->encoded);
     }
     spl_job_destroy(job);
@@ -194,10 +200,6 @@ void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, c
         reopen(tour, frame, err);
     } else {
         tour->failures = 0;
-        if (tour->frames[frame] == SPL_FRAME_PART) {
-            spl_tour_note_part(tour, frame);
-            spl_tour_work_state(tour);
-        }
         tour->frames[frame] = SPL_FRAME_DONE;
         tour->frames_done++;
         account(tour, 0, bytes);
@@ -230,6 +232,8 @@ void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct sp
     } else {
         spl_tour_fail(tour, err);
     }
+    if (!tour->removed)
+        spl_tour_answer(tour, &(struct spl_error){0}); // which says where it has failed
 }
 
 /* A camera's faces differ from frame to frame, and tracing those of all would take too long where the tour is taken. */
@@ -324,15 +328,21 @@ void spl_tours_pump(struct spl_tours *tours)
     }
 }
 
-void spl_tours_remove(struct spl_tour *tour)
+void spl_tours_remove(struct spl_tour *tour, struct request *asker)
 {
     struct spl_tours *tours = tour->tours;
+    spl_assert(!tour->asker);
     TAILQ_REMOVE(&tours->all, tour, link);
     tours->count--;
-    tours->bytes -= tour->bytes;
-    tour->bytes = 0;
     tour->removed = true;
     atomic_store(&tour->cancelled, true);
+    if (asker) {
+        asker->tour = tour;
+        tour->asker = asker;
+        spl_waiting_add(asker, spl_now_ns() + tours->service->options->deadline_ms * SPL_NS_PER_MS);
+    }
+    if (!tour->state_writing) // else once it is written
+        spl_tour_work_forget(tour);
     drop_jobs(tour);
     changed(tour);
     spl_tour_let_go(tour);

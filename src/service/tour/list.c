@@ -90,11 +90,11 @@ void spl_tours_sweep(struct spl_tours *tours)
     uint64_t now = spl_now_ns();
     for (tour = TAILQ_FIRST(&tours->all); tour; tour = next) {
         next = TAILQ_NEXT(tour, link);
-        if (!spl_tour_has_ended(tour) ||
+        if (!spl_tour_has_ended(tour) || tour->asker ||
             tour->age_s + (now - tour->ended_ns) / SPL_NS_PER_S < tours->service->options->tour_age_s)
             continue;
         spl_log_info("tour %s: old enough to be removed", tour->name);
-        spl_tours_remove(tour);
+        spl_tours_remove(tour, NULL);
     }
     spl_tours_pump(tours); // a submission that found no memory is tried again
 }

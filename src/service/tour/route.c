@@ -102,11 +102,13 @@ void spl_show_tour(struct request *request, const struct spl_call *call)
 void spl_remove_tour(struct request *request, const struct spl_call *call)
 {
     struct spl_tour *tour = get_tour(request, call);
-    if (!tour)
-        return;
-    spl_tours_remove(tour);
-    request->status = MHD_HTTP_NO_CONTENT;
-    request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT);
+    struct spl_error err = {0};
+    if (tour && tour->asker) {
+        spl_fail_field(&err, SPL_E_BUSY, "name", "the tour is only being begun; come back later");
+        spl_reply_error(request, &err);
+    } else if (tour) {
+        spl_tours_remove(tour, request);
+    }
 }
 
 void spl_show_tour_events(struct request *request, const struct spl_call *call)
@@ -147,7 +149,10 @@ void spl_show_tour_frame(struct request *request, const struct spl_call *call)
     if (!tour)
         return;
     size_t digits = strspn(call->number, "0123456789"), frame = strtoul(call->number, NULL, 10);
-    if (!digits || digits > 9 || call->number[digits] || frame >= tour->spec.frames) {
+    if (!tour->spec.frames) {
+        spl_fail_field(&err, SPL_E_NOT_FOUND, "n", "the tour's folder is not understood: it has no frames");
+        spl_reply_error(request, &err);
+    } else if (!digits || digits > 9 || call->number[digits] || frame >= tour->spec.frames) {
         spl_fail_field(&err, SPL_E_NOT_FOUND, "n", "there is no frame '%.20s'; the tour's are 0 to %zu", call->number,
                        tour->spec.frames - 1);
         spl_reply_error(request, &err);

@@ -155,6 +155,19 @@ static bool is_ours(DIR *dir)
     return !others;
 }
 
+int spl_tour_store_forget(const char *directory, const char *name, struct spl_error *err)
+{
+    DIR *dir = spl_tour_folder_open(directory, name);
+    if (!dir && errno == ENOENT)
+        return 0;
+    int rc = 0;
+    if (!dir || (unlinkat(dirfd(dir), state_name, 0) && errno != ENOENT) || fsync(dirfd(dir)))
+        rc = spl_fail_errno(err, errno, "the tour's %s cannot be removed", state_name);
+    if (dir)
+        closedir(dir);
+    return rc;
+}
+
 /* tour.json goes first: no restart takes up a tour half removed, and one that finds none goes on removing. */
 void spl_tour_store_remove(const char *directory, const char *name, bool wanted)
 {

@@ -35,6 +35,7 @@ enum spl_frame_state { SPL_FRAME_OPEN, SPL_FRAME_IN_FLIGHT, SPL_FRAME_PART, SPL_
 
 struct spl_tour_stream;
 struct spl_tour_wish;
+struct work;
 
 struct spl_tour {
     TAILQ_ENTRY(spl_tour) link; // spl_tours.all, oldest first
@@ -53,6 +54,8 @@ struct spl_tour {
     uint64_t ended_ns, age_s;        /* monotonic time and age when it ended, or was taken up as ended */
     uint64_t began_ns, began_done;   /* this process's share, for the time that is left */
     uint64_t changes;                /* of anything a client sees */
+    struct request *asker;           // may be NULL; waits until tour.json is there, or is removed
+    struct work *held;               // may be NULL; frames that wait until tour.json says that they are not complete
     size_t works, readers;           /* file works and replies that hold it */
     bool state_writing, state_again; /* tour.json is being written; has changed since */
     bool without_late_tiles;         /* frames do without tiles whose server has not answered for long enough */
@@ -112,8 +115,9 @@ int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl
 int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry, char **body, size_t body_length,
                   struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err);
 
-/* Cancels what is going on and takes the tour off the list and the disk. */
-void spl_tours_remove(struct spl_tour *tour);
+/* Cancels what is going on and takes the tour, which has no asker, off the list and the disk: tour.json at once, then
+ * `asker`, which may be NULL, has its reply; frames when nobody reads them any more, and until then they count against the quota. */
+void spl_tours_remove(struct spl_tour *tour, struct request *asker);
 
 /* Frees a removed tour once nothing holds it; call after works, in_flight or readers went down. */
 void spl_tour_let_go(struct spl_tour *tour);
@@ -158,6 +162,8 @@ void spl_tour_file_close(struct spl_tour_file *file); /* idempotent */
 /* Removes a tour's files and, once it is empty, its folder; a link, or what is no tour's, stays, and is told. Not
  * `wanted` by a client, as what a crash left: nothing where there is more than a tour has. */
 void spl_tour_store_remove(const char *directory, const char *name, bool wanted);
+/* Its tour.json alone, so that no restart takes it up. */
+int spl_tour_store_forget(const char *directory, const char *name, struct spl_error *err);
 /* A tour's own folder; NULL where it is none, a link among them: errno says why. closedir() it. */
 DIR *spl_tour_folder_open(const char *directory, const char *name);
 /* Is it a file of a tour: a frame, its state, its video, or one of these while it is written? */
@@ -169,6 +175,7 @@ bool spl_tour_name_is_valid(const char *name);
 void spl_tour_work_state(struct spl_tour *tour);
 void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded *encoded); /* takes the bytes */
 void spl_tour_work_video(struct spl_tour *tour);
+void spl_tour_work_forget(struct spl_tour *tour);
 void spl_tour_work_remove(struct spl_tour *tour);
 void spl_tour_work_take_up(struct spl_tour *tour, struct spl_catalog_entry *entry);
 
@@ -176,6 +183,7 @@ void spl_tour_work_take_up(struct spl_tour *tour, struct spl_catalog_entry *entr
 void spl_tour_frame_written(struct spl_tour *tour, size_t frame, size_t bytes, const struct spl_error *err);
 void spl_tour_video_made(struct spl_tour *tour, uint64_t bytes, const struct spl_error *err);
 void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct spl_error *err);
+void spl_tour_give_back(struct spl_tour *tour); /* its files are as good as removed: the quota has their bytes again */
 
 /* describe.c: what clients see; new reference. */
 json_t *spl_tour_describe(const struct spl_tour *tour);
@@ -193,6 +201,9 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
 /* create.c: has a thread of the pool read the request's body; the request waits, and gets 202 or why not. */
 void spl_tour_wish_add(struct request *request, struct spl_tours *tours, struct spl_catalog_entry *entry);
 void spl_tour_wish_abandon(struct spl_tour_wish *wish); /* its request no longer waits for it; NULL-safe */
+/* The tour's asker gets 202 or 204, or `why`; nothing without one. abandon: the request no longer waits for a tour. */
+void spl_tour_answer(struct spl_tour *tour, const struct spl_error *why);
+void spl_tour_abandon(struct request *request);
 
 /* route.c */
 void spl_create_tour(struct request *request, const struct spl_call *call);

@@ -20,6 +20,7 @@
 
 struct work {
     uv_work_t uv;
+    struct work *next; // of those that a tour holds
     struct spl_tour *tour; // held; NULL for a removal
     struct spl_tours *tours;
     char name[SPL_TOUR_NAME + 1], file[32];
@@ -27,7 +28,7 @@ struct work {
     uint64_t reserved;          /* of tours->writing_bytes, for the state */
     struct spl_encoded encoded; // owned
     size_t length, frame;
-    uint64_t video_bytes;
+    uint64_t bytes;                  /* of the video; of a tour that is removed */
     struct spl_catalog_entry *entry; /* one reference; that a tour is taken up with */
     struct spl_tour_spec spec;       /* the same */
     struct spl_error err;
@@ -86,6 +87,17 @@ static void write_state(uv_work_t *uv)
     free(text);
 }
 
+static void after_frame(uv_work_t *uv, int status);
+
+/* Frames that tour.json says to be incomplete by now; a restart keeps what lies on the disk. */
+static void release_held(struct spl_tour *tour)
+{
+    for (struct work *work; (work = tour->held);) {
+        tour->held = work->next;
+        queue(work, write_frame, after_frame);
+    }
+}
+
 static void after_state(uv_work_t *uv, int status)
 {
     (void)status;
@@ -94,8 +106,12 @@ static void after_state(uv_work_t *uv, int status)
     tour->state_writing = false;
     tour->tours->writing_bytes -= work->reserved;
     spl_tour_state_written(tour, work->length, &work->err);
-    if (tour->state_again && !tour->removed)
+    if (tour->removed)
+        spl_tour_work_forget(tour);
+    else if (tour->state_again)
         spl_tour_work_state(tour);
+    if (!tour->state_writing)
+        release_held(tour);
     finish(work);
 }
 
@@ -144,7 +160,13 @@ void spl_tour_work_frame(struct spl_tour *tour, size_t frame, struct spl_encoded
     work->length = work->encoded.length;
     work->frame = frame;
     spl_tour_file_name(tour, frame, work->file);
-    queue(work, write_frame, after_frame);
+    if (tour->frames[frame] != SPL_FRAME_PART) {
+        queue(work, write_frame, after_frame);
+        return;
+    }
+    work->next = tour->held;
+    tour->held = work;
+    spl_tour_work_state(tour);
 }
 
 static int add_frames(struct work *work, struct spl_video *video)
@@ -184,14 +206,14 @@ static void make_video(uv_work_t *uv)
     if (rc)
         unlink(temporary);
     else
-        work->video_bytes = (uint64_t)status.st_size;
+        work->bytes = (uint64_t)status.st_size;
 }
 
 static void after_video(uv_work_t *uv, int status)
 {
     (void)status;
     struct work *work = uv->data;
-    spl_tour_video_made(work->tour, work->video_bytes, &work->err);
+    spl_tour_video_made(work->tour, work->bytes, &work->err);
     finish(work);
 }
 
@@ -205,6 +227,31 @@ void spl_tour_work_video(struct spl_tour *tour)
         spl_tour_video_made(tour, 0, &err);
 }
 
+static void forget(uv_work_t *uv)
+{
+    struct work *work = uv->data;
+    spl_tour_store_forget(work->tours->directory, work->name, &work->err);
+}
+
+static void after_forget(uv_work_t *uv, int status)
+{
+    (void)status;
+    struct work *work = uv->data;
+    if (work->err.code)
+        spl_log_warn("tour %s: %s; a restart takes it up again", work->name, work->err.message);
+    if (!work->tour->readers)
+        spl_tour_give_back(work->tour);
+    spl_tour_answer(work->tour, &work->err);
+    finish(work);
+}
+
+void spl_tour_work_forget(struct spl_tour *tour)
+{
+    struct work *work = begin(tour, NULL); // without memory the asker waits until its deadline
+    if (work)
+        queue(work, forget, after_forget);
+}
+
 static void remove_files(uv_work_t *uv)
 {
     struct work *work = uv->data;
@@ -214,7 +261,9 @@ static void remove_files(uv_work_t *uv)
 static void after_remove(uv_work_t *uv, int status)
 {
     (void)status;
-    finish(uv->data);
+    struct work *work = uv->data;
+    work->tours->bytes -= work->bytes; // that were being read
+    finish(work);
 }
 
 void spl_tour_work_remove(struct spl_tour *tour)
@@ -225,6 +274,7 @@ void spl_tour_work_remove(struct spl_tour *tour)
         return;
     }
     tour->works--;
+    work->bytes = tour->bytes;
     work->tour = NULL; // the tour itself is freed now
     queue(work, remove_files, after_remove);
 }
