@@ -20,7 +20,7 @@
 static void clean_up_on_signals(const char *output)
 {
     char path[4096];
-    int length = snprintf(path, sizeof path, "%s.part-%ld", output, (long)getpid());
+    int length = snprintf(path, sizeof path, "%s.splatd-%ld", output, (long)getpid());
     if (length >= 0 && (size_t)length < sizeof path)
         spl_cmd_remove_unfinished(path);
 }

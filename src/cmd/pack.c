@@ -19,15 +19,15 @@ static void clean_up_on_signals(const char *output)
     static const char *const of[2] = {"scan", "points"};
     long pid = (long)getpid();
     char path[4096];
-    int length = snprintf(path, sizeof path, "%s.part-%ld-points.part-%ld", output, pid, pid); /* the longest */
+    int length = snprintf(path, sizeof path, "%s.splatd-%ld-points.splatd-%ld", output, pid, pid); /* the longest */
     if (length < 0 || (size_t)length >= sizeof path)
         return;
-    snprintf(path, sizeof path, "%s.part-%ld", output, pid);
+    snprintf(path, sizeof path, "%s.splatd-%ld", output, pid);
     spl_cmd_remove_unfinished(path);
     for (int i = 0; i < 2; i++) {
-        snprintf(path, sizeof path, "%s.part-%ld-%s", output, pid, of[i]);
+        snprintf(path, sizeof path, "%s.splatd-%ld-%s", output, pid, of[i]);
         spl_cmd_remove_unfinished(path);
-        snprintf(path, sizeof path, "%s.part-%ld-%s.part-%ld", output, pid, of[i], pid);
+        snprintf(path, sizeof path, "%s.splatd-%ld-%s.splatd-%ld", output, pid, of[i], pid);
         spl_cmd_remove_unfinished(path);
     }
 }

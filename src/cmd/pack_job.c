@@ -138,9 +138,9 @@ void spl_cmd_pack_clean_up_on_signals(const char *output)
     const long pid = (long)getpid();
     for (int i = 0; i < 3; i++) {
         char path[4096];
-        int length = i == 0   ? snprintf(path, sizeof path, "%s.part-%ld", output, pid)
-                     : i == 1 ? snprintf(path, sizeof path, "%s.part-%ld-tiles", output, pid)
-                              : snprintf(path, sizeof path, "%s.part-%ld-tiles.part-%ld", output, pid, pid);
+        int length = i == 0   ? snprintf(path, sizeof path, "%s.splatd-%ld", output, pid)
+                     : i == 1 ? snprintf(path, sizeof path, "%s.splatd-%ld-tiles", output, pid)
+                              : snprintf(path, sizeof path, "%s.splatd-%ld-tiles.splatd-%ld", output, pid, pid);
         if (length >= 0 && (size_t)length < sizeof path)
             spl_cmd_remove_unfinished(path);
     }

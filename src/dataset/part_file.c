@@ -1,4 +1,4 @@
-/* Everything goes into PATH.part-PID, which the file's own lock says is in use; a rename makes it PATH. In containers
+/* Everything goes into PATH.splatd-PID, which the file's own lock says is in use; a rename makes it PATH. In containers
  * that share a folder every process has the number 1: where the name is in use, another one is taken. Owned by one
  * thread at a time. */
 #include "dataset/part_file.h"
@@ -18,8 +18,8 @@ enum { names_most = 64 };
 
 static int name(const char *path, unsigned in_use, char **out)
 {
-    int length = in_use ? asprintf(out, "%s.part-%ld-%u", path, (long)getpid(), in_use)
-                        : asprintf(out, "%s.part-%ld", path, (long)getpid());
+    int length = in_use ? asprintf(out, "%s.splatd-%ld-%u", path, (long)getpid(), in_use)
+                        : asprintf(out, "%s.splatd-%ld", path, (long)getpid());
     if (length >= 0)
         return SPL_OK;
     *out = NULL;
@@ -40,7 +40,7 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
 {
     *file = (struct spl_part_file){.path = strdup(path), .fd = -1};
     int rc = SPL_E_NOMEM;
-    spl_file_sweep(path, ".part-[0-9]*");
+    spl_file_sweep(path, ".splatd-[0-9]*");
     for (unsigned in_use = 0;;) { /* again where another's sweep came before our lock */
         struct stat st;
         free(file->part_path);

@@ -1,4 +1,4 @@
-/* A file that is there as a whole or not at all, written in pieces at any offset: it lies in PATH.part-PID until it is
+/* A file that is there as a whole or not at all, written in pieces at any offset: it lies in PATH.splatd-PID until it is
  * committed. Owned by one thread at a time. */
 #ifndef SPL_DATASET_PART_FILE_H
 #define SPL_DATASET_PART_FILE_H
@@ -15,7 +15,7 @@ struct spl_part_file {
     bool committed;
 };
 
-/* Creates PATH.part-PID beside `path`, PATH.part-PID-N where another process of this number writes there too, and
+/* Creates PATH.splatd-PID beside `path`, PATH.splatd-PID-N where another process of this number writes there too, and
  * removes those that killed processes left of it. On failure there is nothing to finish. */
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err);
 

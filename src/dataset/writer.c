@@ -1,6 +1,6 @@
 /* Writing a .spld file: pages go out as they fill, everything that describes them follows (a directory, and a head of
  * each page), the header comes last, over the zeroes at the file's start. Until the rename all of it lies in
- * PATH.part-PID; the header is missing there until everything else is written, so that even a stray part file never
+ * PATH.splatd-PID; the header is missing there until everything else is written, so that even a stray part file never
  * opens as a dataset. One page is held in memory. Owned by one thread at a time. */
 #include "dataset/writer_parts.h"
 

@@ -14,7 +14,7 @@
 
 struct spl_dataset_writer;
 
-/* Creates PATH.part-PID beside `path`, and removes those that killed processes left of it. */
+/* Creates PATH.splatd-PID beside `path`, and removes those that killed processes left of it. */
 int spl_dataset_writer_create(const char *path, struct spl_dataset_writer **out, struct spl_error *err);
 
 /* Pages of about so many bytes, instead of SPL_PAGE_BYTES: for tests that want many of them. */

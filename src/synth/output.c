@@ -1,4 +1,4 @@
-/* A file appears under its name when all of it is on the disk, and not before: until then it is NAME.part-PID, which
+/* A file appears under its name when all of it is on the disk, and not before: until then it is NAME.splatd-PID, which
  * spl_output_finish() removes. What was there under the name stays until it is replaced as a whole.
  *
  * Invariant: fd >= 0 only between open and commit or finish. Owned by one thread. */
@@ -22,7 +22,7 @@ int spl_output_open(struct spl_output *out, const char *directory, const char *n
         out->path = NULL;
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }
-    if (asprintf(&out->temporary, "%s.part-%ld", out->path, (long)getpid()) < 0) {
+    if (asprintf(&out->temporary, "%s.splatd-%ld", out->path, (long)getpid()) < 0) {
         out->temporary = NULL;
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }

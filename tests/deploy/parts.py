@@ -176,7 +176,7 @@ def check_leftovers(survey, command, whole, parts):
     first = whole.read_bytes()
     others = [*command[:3], "2", *command[4:]]
     parts.mkdir()
-    for name in "part-3.spld", "part-7.empty", f"part-3.spld.part-{2**22 + 1}", f".job.json.{2**22 + 1}-0":
+    for name in "part-3.spld", "part-7.empty", f"part-3.spld.splatd-{2**22 + 1}", f".job.json.{2**22 + 1}-0":
         (parts / name).write_text("of a plan before")
     (parts / "job.json").write_text("{}")
     assert subprocess.run(others, stderr=subprocess.DEVNULL).returncode == 0 and not parts.exists(), list(parts.iterdir())

@@ -55,7 +55,7 @@ static int parts(bool remove)
     int count = 0;
     DIR *d = opendir(folder);
     for (struct dirent *e; (e = readdir(d));)
-        if (strstr(e->d_name, ".part-")) {
+        if (strstr(e->d_name, ".splatd-")) {
             char path[512];
             snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
             count++;
@@ -148,14 +148,16 @@ static void test_a_limit_of_files_is_an_error(void **state)
     assert_int_equal(parts(false), 0);
 }
 
-/* What a killed pack leaves is gone after the next one; what a living one writes stays. */
+/* What a killed pack leaves is gone after the next one; what a living one writes stays, and what split(1) made. */
 static void test_leftovers_are_swept(void **state)
 {
     (void)state;
-    char dead[96], living[96], other[96];
-    snprintf(dead, sizeof dead, "%s.part-1", output);
-    snprintf(living, sizeof living, "%s.part-2", output);
-    snprintf(other, sizeof other, "%s/other.spld.part-1", folder);
+    char dead[96], living[96], other[96], piece[96];
+    snprintf(dead, sizeof dead, "%s.splatd-1", output);
+    snprintf(living, sizeof living, "%s.splatd-2", output);
+    snprintf(other, sizeof other, "%s/other.spld.splatd-1", folder);
+    snprintf(piece, sizeof piece, "%s.part-10", output);
+    assert_int_equal(close(open(piece, O_CREAT | O_WRONLY, 0600)), 0);
     assert_int_equal(close(open(dead, O_CREAT | O_WRONLY, 0600)), 0);
     assert_int_equal(close(open(other, O_CREAT | O_WRONLY, 0600)), 0);
     int fd = open(living, O_CREAT | O_WRONLY, 0600);
@@ -164,6 +166,7 @@ static void test_leftovers_are_swept(void **state)
     assert_int_equal(access(dead, F_OK), -1);
     assert_int_equal(access(living, F_OK), 0);
     assert_int_equal(access(other, F_OK), 0);
+    assert_int_equal(unlink(piece), 0);
     close(fd);
     parts(true);
 }

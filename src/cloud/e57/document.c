@@ -20,7 +20,7 @@
 #include "cloud/e57/parser.h"
 #include "cloud/fields.h"
 
-enum { xml_bytes_max = 64 << 20, depth_max = 32, block = 1 << 16 };
+enum { xml_bytes_max = 64 << 20, depth_max = 32, block = 1 << 16, token_max = 1 << 20 };
 
 static const char scan_path[] = "/e57Root/data3D/vectorChild", image_path[] = "/e57Root/images2D/vectorChild";
 
@@ -287,6 +287,9 @@ static int parse(struct spl_e57_parser *p, struct spl_e57_pages *pages)
             return spl_source_fail(p->source, SPL_E_INPUT, "", p->err, "line %lu of its XML: %s",
                                    (unsigned long)XML_GetCurrentLineNumber(p->xml),
                                    XML_ErrorString(XML_GetErrorCode(p->xml)));
+        /* expat begins again with each block at what is not whole yet */
+        if (p->code == SPL_OK && (int64_t)(at - pages->xml_at) - XML_GetCurrentByteIndex(p->xml) > token_max)
+            return spl_e57_parser_fail(p, "", "a tag, a name or a comment of more than %d bytes", token_max);
     }
     return p->code;
 }

@@ -42,7 +42,7 @@ int spl_job_lock(const char *path, int *lock, struct spl_error *err)
 
 static bool is_of_a_job(const char *name)
 {
-    static const char *const patterns[] = {"part-[0-9]*.spld", "part-[0-9]*.empty", "part-[0-9]*.spld.part-[0-9]*",
+    static const char *const patterns[] = {"part-[0-9]*.spld", "part-[0-9]*.empty", "part-[0-9]*.spld.splatd-[0-9]*",
                                            ".part-[0-9]*.empty.*", "." SPL_JOB_FILE ".*"};
     bool is = false;
     for (size_t i = 0; i < sizeof patterns / sizeof *patterns; i++)

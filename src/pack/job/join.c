@@ -53,13 +53,14 @@ static bool has_text(const json_t *list, const char *text)
     return false;
 }
 
-/* What the parts were packed without, each name once. */
+/* What the parts were packed without, each name once; spl_scans_describe_left_out() names no more. */
 static void add_skipped(json_t *skipped, const json_t *more)
 {
     json_t *one;
     size_t i;
     json_array_foreach(more, i, one)
-        if (json_string_value(one) && !has_text(skipped, json_string_value(one)))
+        if (i <= SPL_NAMES_KEPT && json_array_size(skipped) <= SPL_NAMES_KEPT && json_string_value(one) &&
+            !has_text(skipped, json_string_value(one)))
             json_array_append(skipped, one);
 }
 
@@ -74,7 +75,8 @@ static int check_dataset(const struct spl_job *job, uint32_t number, const char 
     if (!rc)
         rc = spl_part_recognise(job, number, spl_dataset_get_meta(dataset), path, &older, err);
     if (!rc) {
-        *points += spl_dataset_get_info(dataset)->points;
+        const uint64_t more = spl_dataset_get_info(dataset)->points;
+        *points = more > UINT64_MAX - *points ? UINT64_MAX : *points + more;
         add_skipped(skipped, json_object_get(spl_dataset_get_meta(dataset), "skipped"));
     }
     spl_dataset_close(dataset);
@@ -215,7 +217,7 @@ int spl_job_merge(const struct spl_job *job, const struct spl_collect_options *o
         return rc;
     rc = open_parts(job, &parts, err);
     json_t *sources = spl_names_describe(name_of_input, job, job->input_count);
-    if (!rc && (!sources || asprintf(&collection, "%s.part-%ld-tiles", options->output, (long)getpid()) < 0))
+    if (!rc && (!sources || asprintf(&collection, "%s.splatd-%ld-tiles", options->output, (long)getpid()) < 0))
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the names of the scans");
     if (!rc) {
         struct spl_collect_options o = complete(job, options, &parts);

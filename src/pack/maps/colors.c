@@ -13,16 +13,24 @@ enum { block = 8, columns_max = 64 };
 /* Weights: of a splat's colour; the least of a picture's, which leaves a splat none beside it. */
 static const float splat_weight = 1e-30f, picture_weight = 1e-22f;
 static const double farther = 1.25, margin = 0.01, cubic_up_to = 1.5; /* pixels a texel */
+/* Texels of a map a pixel of its station's pictures: as fine as these all around where they show a 64th of that, a
+ * camera of 30 degrees; what longer lenses show is coarser, or a stamp would become a map of gigabytes. */
+static const double texels_most = 64, sides = 6;
 
 uint32_t spl_colors_find_side(const struct spl_stations *stations, const struct spl_view_list *views, uint32_t station)
 {
-    double finest = 0;
-    for (size_t v = 0; v < views->count; v++)
-        if (stations->of_view[v] == station && views->views[v].photograph)
-            finest = fmax(finest, fmax(views->views[v].camera.fx, views->views[v].camera.fy));
+    double finest = 0, pixels = 0;
+    for (size_t v = 0; v < views->count; v++) {
+        const struct spl_camera *camera = &views->views[v].camera;
+        if (stations->of_view[v] != station || !views->views[v].photograph)
+            continue;
+        finest = fmax(finest, fmax(camera->fx, camera->fy));
+        pixels += (double)camera->width * camera->height;
+    }
     if (!(finest > 0))
         return 0;
-    double steps = floor(finest * M_PI / 2 / SPL_MAP_SIDE_STEP + 0.25); /* a pixel of a face is rounded, too */
+    const double side = fmin(finest * M_PI / 2, sqrt(texels_most * pixels / sides));
+    double steps = floor(side / SPL_MAP_SIDE_STEP + 0.25); /* a pixel of a face is rounded, too */
     return SPL_MAP_SIDE_STEP * (uint32_t)fmin(fmax(steps, 1), SPL_MAP_SIDE_MAX / SPL_MAP_SIDE_STEP);
 }
 

@@ -7,8 +7,8 @@
 #include "pack/maps/hits.h"
 #include "pack/maps/ranges.h"
 
-/* Texels of a side that are as wide as the pixels in the middle of the finest of the station's pictures, a multiple of
- * SPL_MAP_SIDE_STEP; 0 without pictures. */
+/* Texels of a side that are as wide as the pixels in the middle of the finest of the station's pictures, where these
+ * show enough to be worth it, a multiple of SPL_MAP_SIDE_STEP; 0 without pictures. */
 uint32_t spl_colors_find_side(const struct spl_stations *stations, const struct spl_view_list *views, uint32_t station);
 
 /* Adds what the station's splats are painted in, of next to no weight beside pictures, over the factors that the

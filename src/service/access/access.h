@@ -24,9 +24,9 @@ void spl_access_reload(struct spl_service *service);
 bool spl_access_admit(struct request *request, const char *method);
 bool spl_access_check(struct request *request, enum spl_scope scope, const struct spl_call *call);
 
-/* Counts an admitted request as `count` more of its address, for what it wants costs as much; false, and it has its reply,
- * where others of that address came in between. Of what all may do together each takes one with take_one(), when it is
- * its turn: false, later. */
+/* Counts an admitted request as `count` more of its address, for what it wants costs as much; false, and it has its
+ * reply, where others of that address came in between. Of what all may do together each takes one with take_one(), when
+ * it is its turn: false, later. */
 bool spl_access_charge(struct request *request, unsigned count);
 bool spl_access_take_one(struct spl_service *service);
 

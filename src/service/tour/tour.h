@@ -116,7 +116,8 @@ int spl_tours_add(struct spl_tours *tours, const struct spl_catalog_entry *entry
                   struct spl_tour_spec *spec, struct spl_tour **out, struct spl_error *err);
 
 /* Cancels what is going on and takes the tour, which has no asker, off the list and the disk: tour.json at once, then
- * `asker`, which may be NULL, has its reply; frames when nobody reads them any more, and until then they count against the quota. */
+ * `asker`, which may be NULL, has its reply; the rest when nobody reads it any more, and until then that counts against
+ * the quota. */
 void spl_tours_remove(struct spl_tour *tour, struct request *asker);
 
 /* Frees a removed tour once nothing holds it; call after works, in_flight or readers went down. */

@@ -644,6 +644,12 @@ static void what_the_xml_must_not_say(void **state)
     refused_xml("<!DOCTYPE e57Root [<!ENTITY a \"aaaa\">]><e57Root>&a;</e57Root>", "DOCTYPE", "none is taken");
     refused_xml("<!DOCTYPE e57Root SYSTEM \"/etc/passwd\"><e57Root/>", "DOCTYPE", "none is taken");
     refused_xml(SCAN("<points/>"), "points", "CompressedVector");
+    enum { token = 3 << 19 };
+    char *long_one = calloc(token + 64, 1); /* expat would look at it anew with each block */
+    strcpy(long_one, "<e57Root a=\"");
+    memset(long_one + strlen(long_one), 'x', token);
+    refused_xml(strcat(long_one, "\"/>"), "", "more than 1048576 bytes");
+    free(long_one);
     refused_xml(SCAN("<points type=\"CompressedVector\" recordCount=\"1\"/>"), "points", "fileOffset is missing");
     refused_xml(POINTS("fileOffset=\"48\" recordCount=\"-1\"", ""), "recordCount", "-1");
     refused_xml(POINTS("fileOffset=\"48\" recordCount=\"9223372036854775808\"", ""), "recordCount", "64 bits");

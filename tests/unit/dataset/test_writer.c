@@ -282,7 +282,7 @@ int main(void)
     };
     make_folder(folder);
     snprintf(path, sizeof path, "%s/target.spld", folder);
-    snprintf(part_path, sizeof part_path, "%s.part-%ld", path, (long)getpid());
+    snprintf(part_path, sizeof part_path, "%s.splatd-%ld", path, (long)getpid());
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     return rmdir(folder) ? 1 : failed;
 }

@@ -16,6 +16,7 @@
 #include "dataset/dataset.h"
 #include "pack/maps/agree.h"
 #include "pack/maps/atlas.h"
+#include "pack/maps/colors.h"
 #include "pack/maps/even.h"
 #include "pack/maps/ranges.h"
 #include "pack/maps/sees.h"
@@ -266,6 +267,30 @@ static void tolerances_are_as_documented(void **state)
     for (int i = 0; i < 3; i++) /* 85 degrees, 90, and beyond */
         assert_float_equal(spl_map_tolerance(&row, 2, 0, (double[]){cos(85 * M_PI / 180), 0, -0.1}[i]),
                            0.004 + 2 * texel * most, 1e-2 * texel);
+}
+
+/* A map is as fine as its pictures, but no stamp through a telescope makes one of gigabytes. */
+static void maps_are_as_fine_as_their_pictures_are_worth(void **state)
+{
+    (void)state;
+    static char file[] = "a.jpg";
+    uint32_t of[] = {0};
+    struct spl_named_view view = {.photograph = file};
+    struct spl_view_list views = {.views = &view, .count = 1};
+    const struct spl_stations stations = {.count = 1, .of_view = of};
+    const struct {
+        uint32_t width, height;
+        double f, side;
+    } cases[] = {{600, 450, 600, 600 * M_PI / 2}, /* 53 degrees */
+                {64, 64, 1e5, sqrt(64. / 6) * 64},
+                {4000, 3000, 40000, SPL_MAP_SIDE_MAX}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        view.camera = (struct spl_camera){
+            .width = cases[i].width, .height = cases[i].height, .fx = cases[i].f, .fy = cases[i].f};
+        const double side = spl_colors_find_side(&stations, &views, 0), most = cases[i].side + SPL_MAP_SIDE_STEP / 4.;
+        assert_true(side <= most && side > most - SPL_MAP_SIDE_STEP);
+    }
+    assert_int_equal(spl_colors_find_side(&stations, &views, 1), 0);
 }
 
 static void what_a_scan_in_part_did_not_look_at_is_not_sky(void **state)
@@ -687,6 +712,7 @@ int main(void)
         cmocka_unit_test(aprons_repeat_their_texels),
         cmocka_unit_test(ranges_are_those_of_the_room),
         cmocka_unit_test(tolerances_are_as_documented),
+        cmocka_unit_test(maps_are_as_fine_as_their_pictures_are_worth),
         cmocka_unit_test(what_a_scan_in_part_did_not_look_at_is_not_sky),
         cmocka_unit_test(few_hits_make_a_map_all_the_same),
         cmocka_unit_test(a_shift_is_found_to_the_millimetre),
