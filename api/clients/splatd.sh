@@ -58,13 +58,14 @@ query() { local IFS='&'; echo "$*" | sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/+/%
 
 # FILE NAME=VALUE…: `said` is what FILE's ending adds to the query; a FILE that would hold something else is refused.
 say_format() {
-    local file=$1 ending='' named='' given='' several='' pair
+    local file=$1 ending='' named='' given='' several='' container='' pair
     [[ ${file##*/} == ?*.* ]] && ending=${file##*.}
     shift
     for pair in "$@"; do
         case $pair in
         format=*) given=${pair#*=} ;;
-        layers=* | container=*) several=$pair ;;
+        container=*) several=$pair container=${pair#*=} ;;
+        layers=*) several=$pair ;;
         esac
     done
     case $ending in
@@ -75,7 +76,8 @@ say_format() {
     given=${given/%jpg/jpeg} given=${given/%tif/tiff}
     said=()
     if [ "$named" = zip ]; then
-        [[ $several == container=* ]] || said=(container=zip)
+        [ -n "$container" ] || said=(container=zip)
+        [ "${container:-zip}" = zip ] || usage "$command: '$file' is no name of 'container=$container': give one without .zip"
     elif [ -n "$several" ]; then
         [ -z "$named" ] || usage "$command: '$several' is several images: give FILE.zip in the place of '$file'"
     elif [ -z "$named$given" ]; then

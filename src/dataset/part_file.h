@@ -1,5 +1,5 @@
-/* A file that is there as a whole or not at all, written in pieces at any offset: it lies in PATH.splatd-PID until it is
- * committed. Owned by one thread at a time. */
+/* A file that is there as a whole or not at all, written in pieces at any offset: it lies in PATH.splatd-PID until it
+ * is committed. Owned by one thread at a time. */
 #ifndef SPL_DATASET_PART_FILE_H
 #define SPL_DATASET_PART_FILE_H
 

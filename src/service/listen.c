@@ -43,7 +43,10 @@ static int look_up(const char *field, const char *address, struct addrinfo **fou
                               address);
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV};
     int rc = getaddrinfo(host, port, &hints, found);
-    return rc ? spl_fail_field(err, SPL_E_USAGE, field, "cannot find the address '%s': %s", host, gai_strerror(rc)) : 0;
+    // what a server of names does not know yet, a later try may find: no usage
+    return rc ? spl_fail_field(err, rc == EAI_AGAIN ? SPL_E_IO : SPL_E_USAGE, field, "cannot find the address '%s': %s",
+                               host, gai_strerror(rc))
+              : 0;
 }
 
 bool spl_sockaddr_is_local(const struct sockaddr *address)

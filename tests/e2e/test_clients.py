@@ -228,6 +228,8 @@ def test_shell():
             (("view", "wall", "b.jpg", "lod"), 2, "view: 'lod' is not NAME=VALUE"),
             (("view", "wall", "b.jpg", "format=png"), 2, "'b.jpg' is no name of a png: give one that ends in .png"),
             (("view", "wall", "b.jpg", "layers=color,depth"), 2, "give FILE.zip in the place of 'b.jpg'"),
+            (("view", "wall", "b.zip", "layers=color", "container=multipart"), 2, "'b.zip' is no name of 'container=multipart'"),
+            (("view", "wall", "b.zip", "container=multipart", "layers=color"), 2, "'b.zip' is no name of 'container=multipart'"),
             (("view", "wall", "b"), 2, "'b' does not say which format"),
             (("pick", "wall"), 2, "X is missing"),
             (("pick", "wall", "32"), 2, "Y is missing; as in\nsplatd.sh datasets\n"),

@@ -226,7 +226,7 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
                                               "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
                                               "-o NAME.spld' makes one from a scan",
                                               paths[i])
-                                   : spl_fail(err, SPL_E_USAGE, "cannot open '%s': %s", paths[i], strerror(errno));
+                                   : spl_fail_errno(err, errno, "cannot open '%s'", paths[i]);
     }
     return 0;
 }
