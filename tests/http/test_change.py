@@ -307,6 +307,19 @@ def test_one_change_of_a_dataset_at_a_time():
         assert small(d, "a").status == 200
 
 
+def test_no_dataset_is_removed_while_a_view_of_it_is_saved():
+    """Both would be told that it was done, and the next dataset of this name have the view."""
+    view = b'{"eye": [3, 0, 1], "target": [0, 0, 1], "fov": 60}'
+    with serving() as d:
+        for _ in range(40):
+            assert put(d, "a", WALL_1).status == 201
+            asked = [lambda: put(d, "a/views/secret", view, {**AUTH, "Content-Type": "application/json"}), lambda: delete(d, "a")]
+            saved, removed = (reply.status for reply in together(2, lambda i: asked[i]()))
+            assert saved in (201, 404, 503) and removed in (204, 503), (saved, removed)
+            eventually(lambda: delete(d, "a").status in (204, 404))
+            assert not list(d.home.glob("*.views.json")), (saved, removed)
+
+
 def test_a_file_that_was_named_itself_is_the_operators():
     with serving(named=[WALL]) as d:
         assert put(d, "wall", WALL_2).status == 409 and delete(d, "wall").status == 409
