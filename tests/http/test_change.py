@@ -2,6 +2,7 @@
 import contextlib
 import os
 import pathlib
+import select
 import socket
 import struct
 import tempfile
@@ -305,6 +306,23 @@ def test_one_change_of_a_dataset_at_a_time():
             s.sendall(WALL_1[1000:])
             assert b" 201 " in s.recv(4096)
         assert small(d, "a").status == 200
+
+
+def test_bodies_that_dawdle_give_way():
+    with serving() as d:
+        dawdling = []
+        for i in range(4):
+            dawdling.append(socket.create_connection(("127.0.0.1", d.port), 150))
+            dawdling[-1].sendall(f"PUT /v1/datasets/slow-{i} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
+                                 f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
+        eventually(lambda: sum(dataset["state"] == "loading" for dataset in listed(d).values()) == 4)
+        assert put(d, "a", WALL_1).status == 503  # nobody has dawdled yet
+        while put(d, "a", WALL_1).status == 503:
+            time.sleep(0.3)
+        cut = select.select(dawdling, [], [], 0)[0]
+        assert len(cut) == 1 and b" 408 " in cut[0].recv(4096), len(cut)
+        for s in dawdling:
+            s.close()
 
 
 def test_no_dataset_is_removed_while_a_view_of_it_is_saved():

@@ -38,9 +38,13 @@ def read(folder):
 
 
 def tests_of(root):
-    """Names that a fault may call: those that meson files of tests spell out, and those of both devices."""
-    text = "\n".join(path.read_text(encoding="utf-8") for path in (root / "tests").rglob("meson.build"))
-    names = set(re.findall(r"'([\w./-]+)'", text))
+    """Names that a fault may call: those that meson files of tests spell out, of some rooms behind the room's name, and
+    those of both devices."""
+    names = set()
+    for path in (root / "tests").rglob("meson.build"):
+        text, room = path.read_text(encoding="utf-8"), path.parent.name
+        prefix = f"{room}-" if f"test('{room}-' + name" in text else ""
+        names |= {prefix + name for name in re.findall(r"'([\w./-]+)'", text)}
     return names | {f"{name}-{device}" for name in names for device in ("vulkan", "egl")}
 
 

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "service/exchange.h"
@@ -29,6 +30,7 @@ struct change *spl_change_begin(struct request *request, struct spl_catalog_slot
     }
     change->service = request->service;
     change->request = request;
+    change->stepped_ns = spl_now_ns();
     change->fresh = !slot->current;
     memcpy(change->id, slot->id, sizeof change->id);
     LIST_INSERT_HEAD(&request->service->library->changes, change, link);

@@ -7,17 +7,48 @@
 #include <strings.h>
 
 #include "base/array.h"
+#include "base/clock.h"
 #include "service/datasets/change.h"
 #include "service/exchange.h"
 #include "service/http.h"
+#include "service/ops/counters.h"
 #include "service/reply.h"
 #include "service/state.h"
 
-enum { step_bytes = 1 << 20, changes_max = 4 };
+enum { step_bytes = 1 << 20, changes_max = 4, slow_bytes = 256 << 10, patience_s = 5 };
 
 static void reply_conflict(struct request *request, const char *detail)
 {
     spl_reply_problem(request, MHD_HTTP_CONFLICT, "conflict", "id", detail);
+}
+
+static size_t count_changes(struct spl_service *service)
+{
+    struct change *change;
+    size_t count = 0;
+    LIST_FOREACH(change, &service->library->changes, link)
+    count++;
+    return count;
+}
+
+/* Of bodies that others wait for, the one that has dawdled longest is cut, as those are that are kept in memory
+ * (bodies.c). Its place is free once what there is of its file has been removed. */
+static void cut_dawdler(struct spl_service *service)
+{
+    struct change *change, *slowest = NULL;
+    uint64_t before = spl_now_ns() - patience_s * SPL_NS_PER_S;
+    LIST_FOREACH(change, &service->library->changes, link)
+    {
+        bool comes = change->request && change->step == SPL_CHANGE_APPEND && !change->working;
+        if (comes && change->stepped_ns < (slowest ? slowest->stepped_ns : before))
+            slowest = change;
+    }
+    if (!slowest)
+        return;
+    spl_count(service->counters, slow_closed);
+    spl_refuse_on_socket(slowest->request, MHD_HTTP_REQUEST_TIMEOUT, "body",
+                         "the body comes too slowly to keep its place among uploads, which another wants");
+    spl_change_abandon(slowest->request);
 }
 
 /* The slot that the change may have, made where there is none; NULL when the request has its reply. */
@@ -25,16 +56,14 @@ static struct spl_catalog_slot *claim(struct request *request, const char *id, b
 {
     struct spl_service *service = request->service;
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
-    struct change *change;
     struct spl_error err = {0};
-    size_t changes = 0;
     char tag[24] = "";
     if (slot && slot->current)
         snprintf(tag, sizeof tag, "\"%016llx\"", (unsigned long long)slot->current->info->version);
-    LIST_FOREACH(change, &service->library->changes, link)
-    changes++;
+    if (count_changes(service) == changes_max)
+        cut_dawdler(service);
     const bool busy = slot && (slot->busy || (slot->current && slot->current->saving));
-    if (service->draining || changes == changes_max || busy) {
+    if (service->draining || count_changes(service) == changes_max || busy) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
                        id);
     } else if (slot && !slot->in_directory) {
@@ -127,6 +156,10 @@ bool spl_change_take(struct request *request, const char *data, size_t length)
     struct change *change = request->change;
     spl_assert(!change->working);
     change->seen += length;
+    if (change->seen / slow_bytes != change->steps) {
+        change->steps = change->seen / slow_bytes;
+        change->stepped_ns = spl_now_ns();
+    }
     if (change->seen > request->service->options->max_upload) {
         refuse_size(request, change->seen);
         spl_change_finish(change);
