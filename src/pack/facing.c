@@ -1,7 +1,8 @@
-/* What lies on the other side is told by the plane through those neighbours that are seen from about where the point
- * is: the other side's are seen from its back and lie behind it, by more than the surface is thick. What two stations
- * see of one floor does not lie behind, whichever way they look. Where normals were given, the point's own is the
- * plane's. Leaves and wires have no plane, and keep their neighbours. */
+/* What lies on the other side is told by the plane through those neighbours that the point's own station saw: the other
+ * side's stations are behind it, however aslant they look, and so are their points, by more than the surface is thick.
+ * What two stations see of one floor does not lie behind, whichever way they look. Where normals were given, the
+ * point's own is the plane's. Leaves lie within the thickness of theirs and wires have none: they keep their
+ * neighbours. */
 #include "pack/facing.h"
 
 #include <math.h>
@@ -9,15 +10,13 @@
 
 #include "geom/eigen.h"
 
-static const double about = 0.7;     /* cosine between directions from which one side is seen */
 static const double opposite = -0.7; /* cosine between normals of two sides */
-static const double flat = 0.15;     /* sigma_0 / sigma_1 of a plane at most */
 static const double sheet = 0.3;     /* sigma_0 / sigma_1 below which all neighbours are of one side */
 static const double no_line = 0.15;  /* sigma_1 / sigma_2 of a surface at least; radius.c's */
 static const double behind = 0.7;    /* slope out of the plane from which a neighbour lies behind it */
-static const double thick = 2;       /* times sigma_0 */
+static const double thick = 4;       /* times sigma_0 */
 static const double near_enough = 8; /* times the distance of the k-th point of any side */
-/* Points that give a plane, that are asked for where they are too few, that are better than those of another side. */
+/* Neighbours that give a plane, that are asked for where they are fewer, that are better than those of another side. */
 enum { enough = 5, asked = 8, least = 3 };
 
 /* The side that point i is of, while others are held against it. */
@@ -65,16 +64,11 @@ static inline bool is_below(const double a[3], const double b[3], double cosine)
     return dot(a, b) < cosine * sqrt(dot(a, a) * dot(b, b));
 }
 
-/* Whether point j is seen from about where the side is. Of stations alone: normals say their plane themselves. */
-static bool is_seen_alike(const void *context, size_t j)
+static bool is_of_station(const void *context, size_t j)
 {
     const struct side *side = context;
-    const struct spl_points *p = side->facing->points;
-    double at[3], seen[3];
-    if (p->station[j] == p->station[side->point])
-        return true;
-    spl_points_place(p, j, at);
-    return find_seen(side->facing, j, at, seen) && !is_below(side->seen, seen, about);
+    const uint16_t *station = side->facing->points->station;
+    return station[j] == station[side->point];
 }
 
 /* How far point j of the other side lies behind the plane; 0: it is of this side. */
@@ -99,18 +93,16 @@ static bool is_of_side(const void *context, size_t j)
     return find_behind(context, j) <= 0;
 }
 
-/* Which neighbours are summed up. */
-enum which { ALL, ALIKE };
-
-/* The spread of the point and its neighbours: xx xy xz yy yz zz; false: these are too few for a plane. */
-static bool find_spread(const struct side *side, const struct spl_nearest *near, enum which which, double m[6])
+/* The spread of the point and its neighbours, or those of its station alone: xx xy xz yy yz zz; false: these are too
+ * few for a plane. */
+static bool find_spread(const struct side *side, const struct spl_nearest *near, bool own, double m[6])
 {
     static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
     double sum[3] = {0}, n = 1;
     memset(m, 0, 6 * sizeof *m);
     for (unsigned a = 0; a < near->count; a++) {
         double d[3];
-        if (which == ALIKE && !is_seen_alike(side, near->index[a]))
+        if (near->index[a] == side->point || (own && !is_of_station(side, near->index[a])))
             continue;
         spl_points_apart(side->facing->points, side->at, near->index[a], d);
         n++;
@@ -135,7 +127,7 @@ static bool is_sheet(const double m[6])
     return all * trace < sheet * sheet * pairs * pairs;
 }
 
-/* The plane of a spread, which looks to where the point is seen from; false: it is none. */
+/* The plane of a spread, which looks to where the point is seen from; false: it is a line. */
 static bool fit(struct side *side, const double m[6])
 {
     double sigma[3], most[3];
@@ -146,10 +138,11 @@ static bool fit(struct side *side, const double m[6])
     for (int c = 0; c < 3; c++)
         side->normal[c] *= sign;
     side->depth = thick * sigma[0];
-    return sigma[0] < flat * sigma[1] && sigma[1] > no_line * sigma[2];
+    return sigma[1] > no_line * sigma[2];
 }
 
-/* The plane of a point's side, of the neighbours that are there or of farther ones; false: there is none. */
+/* The plane of a point's side, through what its station saw of the neighbours that are there, or farther away; false:
+ * there is none. */
 static bool find_plane(struct side *side, const struct spl_nearest *near)
 {
     double m[6];
@@ -159,44 +152,37 @@ static bool find_plane(struct side *side, const struct spl_nearest *near)
             side->normal[c] = side->seen[c] / length;
         return true;
     }
-    if (find_spread(side, near, ALIKE, m))
-        return fit(side, m);
+    if (find_spread(side, near, true, m) && fit(side, m))
+        return true;
     struct spl_nearest farther;
-    spl_neighbours_find_some(side->facing->neighbours, side->point, asked, near_enough * near->farthest, is_seen_alike,
+    spl_neighbours_find_some(side->facing->neighbours, side->point, asked, near->farthest, near_enough, is_of_station,
                              side, &farther);
-    return find_spread(side, &farther, ALL, m) && fit(side, m);
+    return find_spread(side, &farther, false, m) && fit(side, m);
 }
 
-/* Whether the point's neighbours are no sheet of one side, and some of them are seen from elsewhere. */
+/* Whether the point's neighbours are no sheet of one side, and some are another station's. */
 static bool may_lie_behind(const struct side *side, const struct spl_nearest *near)
 {
-    const struct spl_points *p = side->facing->points;
-    bool others = side->facing->from == SPL_FACING_NORMALS, unlike = others;
+    bool others = side->facing->from == SPL_FACING_NORMALS;
     double m[6];
     for (unsigned a = 0; a < near->count && !others; a++)
-        others = p->station[near->index[a]] != p->station[side->point];
+        others = !is_of_station(side, near->index[a]);
     if (!others)
         return false;
-    find_spread(side, near, ALL, m);
-    if (is_sheet(m))
-        return false;
-    for (unsigned a = 0; a < near->count && !unlike; a++)
-        unlike = !is_seen_alike(side, near->index[a]);
-    return unlike;
+    find_spread(side, near, false, m);
+    return !is_sheet(m);
 }
 
-/* Whether point j, behind the side, is of a sheet along it: of a face around an edge it is not. */
-static bool is_along(const struct side *side, size_t j, double reach)
+/* Whether point j, so deep behind the side, is of a sheet along it, and the two clear of each other however rough they
+ * are: of a face around an edge it is not. */
+static bool is_along(const struct side *side, size_t j, double depth, const struct spl_nearest *near)
 {
     struct side other = {.facing = side->facing, .point = j};
-    struct spl_nearest near;
-    double m[6];
-    spl_points_place(side->facing->points, j, other.at);
     if (side->facing->from == SPL_FACING_NORMALS)
         return true; /* its normal has said so */
+    spl_points_place(side->facing->points, j, other.at);
     find_seen(side->facing, j, other.at, other.seen);
-    spl_neighbours_find_some(side->facing->neighbours, j, asked, reach, is_seen_alike, &other, &near);
-    return find_spread(&other, &near, ALL, m) && fit(&other, m) && dot(side->normal, other.normal) < opposite;
+    return find_plane(&other, near) && dot(side->normal, other.normal) < opposite && depth > side->depth + other.depth;
 }
 
 void spl_facing_keep(const struct spl_facing *facing, size_t i, unsigned k, struct spl_nearest *near)
@@ -216,13 +202,12 @@ void spl_facing_keep(const struct spl_facing *facing, size_t i, unsigned k, stru
             first = near->index[a];
         }
     }
-    const double reach = near_enough * near->farthest;
-    if (!(depth < INFINITY) || !is_along(&side, first, reach))
+    if (!(depth < INFINITY) || !is_along(&side, first, depth, near))
         return;
     side.depth = depth / 2; /* of that sheet, however far aside */
     side.slope = 0;
     struct spl_nearest own;
-    spl_neighbours_find_some(facing->neighbours, i, k, reach, is_of_side, &side, &own);
+    spl_neighbours_find_some(facing->neighbours, i, k, near->farthest, near_enough, is_of_side, &side, &own);
     if (own.count < least)
         return;
     near->count = own.count;

@@ -7,10 +7,21 @@
 #include "pack/near_set.h"
 #include "pack/neighbours.h"
 
-/* Searches as files of their own have them. */
+/* The k points that `takes` takes, within a squared distance. */
+struct spl_near_some {
+    unsigned k;
+    double bound;
+    spl_neighbours_takes *takes;
+    const void *context;
+};
+
+/* Searches as files of their own have them. The second says how many points it looked at. */
 typedef void spl_near_find_of(const struct spl_boxes *boxes, const struct spl_points *points, size_t i, unsigned k,
                               struct spl_nearest *nearest);
+typedef unsigned spl_near_find_some_of(const struct spl_boxes *boxes, const struct spl_points *points, size_t i,
+                                       const struct spl_near_some *some, struct spl_nearest *nearest);
 spl_near_find_of spl_near_find_avx2, spl_near_find_avx512;
+spl_near_find_some_of spl_near_find_some_avx2, spl_near_find_some_avx512;
 
 enum { leaf = SPL_BOXES_LEAF, fan = SPL_BOXES_FAN, stack_max = SPL_BOXES_LEVELS * fan };
 _Static_assert((int)leaf <= (int)SPL_POINTS_PAD, "the last leaf is read whole");
@@ -46,18 +57,25 @@ SPL_INLINE spl_vec point_distances(const struct spl_points *p, enum spl_points_k
     return dx * dx + dy * dy + dz * dz;
 }
 
+/* Appends the points of the leaf from `first` on that lie within `bound` to `n` of them; how many there are then. */
+SPL_INLINE unsigned list_leaf(const struct spl_points *p, enum spl_points_kind kind, size_t first, const double at[3],
+                              double bound, unsigned n, double squared[], uint32_t index[])
+{
+    const unsigned used = p->count - first < leaf ? (unsigned)(p->count - first) : leaf;
+    for (unsigned k = 0; k < leaf; k += SPL_LANES) {
+        spl_vec distances = point_distances(p, kind, first + k, at);
+        unsigned bits = spl_bits_within(distances, bound);
+        bits &= used >= k + SPL_LANES ? ~0u : used > k ? (1u << (used - k)) - 1 : 0;
+        n = spl_near_put(squared, index, n, bits, distances, spl_indices((uint32_t)first + k));
+    }
+    return n;
+}
+
 SPL_INLINE void scan_leaf(const struct spl_points *p, enum spl_points_kind kind, size_t first, const double at[3],
                           struct spl_near_set *c)
 {
-    unsigned n = c->count, used = p->count - first < leaf ? (unsigned)(p->count - first) : leaf;
-    for (unsigned k = 0; k < leaf; k += SPL_LANES) {
-        spl_vec distances = point_distances(p, kind, first + k, at);
-        unsigned bits = spl_bits_within(distances, c->bound);
-        bits &= used >= k + SPL_LANES ? ~0u : used > k ? (1u << (used - k)) - 1 : 0;
-        n = spl_near_put(c->squared, c->index, n, bits, distances, spl_indices((uint32_t)first + k));
-    }
-    c->count = n;
-    if (n > c->wanted + SPL_NEAR_SET_SPARE)
+    c->count = list_leaf(p, kind, first, at, c->bound, c->count, c->squared, c->index);
+    if (c->count > c->wanted + SPL_NEAR_SET_SPARE)
         spl_near_set_reduce(c);
 }
 
@@ -287,6 +305,61 @@ SPL_INLINE void spl_near_find(const struct spl_boxes *boxes, const struct spl_po
         find_kind(boxes, p, SPL_POINTS_FLOATS, i, k, nearest);
     else
         find_kind(boxes, p, SPL_POINTS_STEPS, i, k, nearest);
+}
+
+/* Keeps point j in order of distance, if it is among the k nearest. */
+SPL_INLINE void keep_sorted(struct spl_nearest *nearest, unsigned k, uint32_t j, double squared)
+{
+    unsigned at = nearest->count < k ? nearest->count++ : k - 1;
+    for (; at && nearest->squared[at - 1] > squared; at--) {
+        nearest->squared[at] = nearest->squared[at - 1];
+        nearest->index[at] = nearest->index[at - 1];
+    }
+    nearest->squared[at] = squared;
+    nearest->index[at] = j;
+}
+
+SPL_INLINE unsigned find_some_kind(const struct spl_boxes *boxes, const struct spl_points *p, enum spl_points_kind kind,
+                                   size_t i, const struct spl_near_some *some, struct spl_nearest *nearest)
+{
+    struct entry stack[stack_max + 1];
+    unsigned depth = 0, looked = 0;
+    double at[3], bound = some->bound, squared[leaf + SPL_LANES];
+    uint32_t index[leaf + SPL_LANES];
+    spl_points_place(p, i, at);
+    nearest->count = 0;
+    stack[depth++] = (struct entry){0, 0, boxes->levels};
+    while (depth && looked < SPL_NEAR_LOOKED) {
+        const struct entry e = stack[--depth];
+        if (e.squared > bound)
+            continue;
+        if (e.level) {
+            depth = push_boxes(boxes, &e, at, bound, stack, depth);
+            continue;
+        }
+        const unsigned n = list_leaf(p, kind, (size_t)e.box * leaf, at, bound, 0, squared, index);
+        for (unsigned a = 0; a < n; a++) {
+            if (index[a] == i || (nearest->count == some->k && squared[a] >= bound))
+                continue;
+            looked++;
+            if (some->takes(some->context, index[a]))
+                keep_sorted(nearest, some->k, index[a], squared[a]);
+            if (nearest->count == some->k)
+                bound = nearest->squared[some->k - 1];
+        }
+    }
+    return looked;
+}
+
+/* As spl_neighbours_find_some(), within one distance. */
+SPL_INLINE unsigned spl_near_find_some(const struct spl_boxes *boxes, const struct spl_points *p, size_t i,
+                                       const struct spl_near_some *some, struct spl_nearest *nearest)
+{
+    if (p->kind == SPL_POINTS_DOUBLES)
+        return find_some_kind(boxes, p, SPL_POINTS_DOUBLES, i, some, nearest);
+    if (p->kind == SPL_POINTS_FLOATS)
+        return find_some_kind(boxes, p, SPL_POINTS_FLOATS, i, some, nearest);
+    return find_some_kind(boxes, p, SPL_POINTS_STEPS, i, some, nearest);
 }
 
 #endif

@@ -18,6 +18,7 @@ struct spl_neighbours {
     const struct spl_points *points;
     struct spl_boxes boxes;
     spl_near_find_of *find;
+    spl_near_find_some_of *find_some;
 };
 
 static _Atomic enum spl_neighbours_set most_set = SPL_NEIGHBOURS_AVX512; /* for tests */
@@ -26,6 +27,12 @@ static void find_base(const struct spl_boxes *boxes, const struct spl_points *po
                       struct spl_nearest *nearest)
 {
     spl_near_find(boxes, points, i, k, nearest);
+}
+
+static unsigned find_some_base(const struct spl_boxes *boxes, const struct spl_points *points, size_t i,
+                               const struct spl_near_some *some, struct spl_nearest *nearest)
+{
+    return spl_near_find_some(boxes, points, i, some, nearest);
 }
 
 enum spl_neighbours_set spl_neighbours_limit(enum spl_neighbours_set most)
@@ -49,11 +56,15 @@ struct spl_neighbours *spl_neighbours_create(const struct spl_points *points, un
         return NULL;
     n->points = points;
     n->find = find_base;
+    n->find_some = find_some_base;
 #if defined(__x86_64__)
     enum spl_neighbours_set set = spl_neighbours_limit(most_set);
     n->find = set == SPL_NEIGHBOURS_AVX512 ? spl_near_find_avx512
               : set == SPL_NEIGHBOURS_AVX2 ? spl_near_find_avx2
                                            : find_base;
+    n->find_some = set == SPL_NEIGHBOURS_AVX512 ? spl_near_find_some_avx512
+                   : set == SPL_NEIGHBOURS_AVX2 ? spl_near_find_some_avx2
+                                                : find_some_base;
 #endif
     if (!spl_boxes_init(&n->boxes, points, threads, err))
         return n;
@@ -74,50 +85,16 @@ void spl_neighbours_find(const struct spl_neighbours *neighbours, size_t i, unsi
     neighbours->find(&neighbours->boxes, neighbours->points, i, k, nearest);
 }
 
-/* Keeps point j in order of distance, if it is among the k nearest. */
-static void keep_sorted(struct spl_nearest *nearest, unsigned k, size_t j, double squared)
+void spl_neighbours_find_some(const struct spl_neighbours *n, size_t i, unsigned k, double distance, double most,
+                              spl_neighbours_takes *takes, const void *context, struct spl_nearest *nearest)
 {
-    unsigned at = nearest->count < k ? nearest->count++ : k - 1;
-    for (; at && nearest->squared[at - 1] > squared; at--) {
-        nearest->squared[at] = nearest->squared[at - 1];
-        nearest->index[at] = nearest->index[at - 1];
-    }
-    nearest->squared[at] = squared;
-    nearest->index[at] = (uint32_t)j;
-}
-
-void spl_neighbours_find_some(const struct spl_neighbours *n, size_t i, unsigned k, double reach,
-                              bool (*takes)(const void *context, size_t point), const void *context,
-                              struct spl_nearest *nearest)
-{
-    const struct spl_boxes *boxes = &n->boxes;
-    struct entry stack[stack_max + 1];
-    unsigned depth = 0, looked = 0;
-    double at[3], bound = reach * reach;
-    spl_points_place(n->points, i, at);
-    nearest->count = 0;
-    stack[depth++] = (struct entry){0, 0, boxes->levels};
-    while (depth && looked < SPL_NEAR_LOOKED) {
-        const struct entry e = stack[--depth];
-        if (e.squared > bound)
-            continue;
-        if (!e.level) {
-            const size_t begin = (size_t)e.box * leaf;
-            const size_t end = begin + leaf < n->points->count ? begin + leaf : n->points->count;
-            for (size_t j = begin; j < end; j++) {
-                double apart[3];
-                spl_points_apart(n->points, at, j, apart);
-                const double squared = apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-                if (squared > bound || j == i || (nearest->count == k && squared >= nearest->squared[k - 1]))
-                    continue;
-                looked++;
-                if (takes(context, j))
-                    keep_sorted(nearest, k, j, squared);
-            }
-            bound = nearest->count == k ? nearest->squared[k - 1] : bound;
-            continue;
-        }
-        depth = push_boxes(boxes, &e, at, bound, stack, depth);
+    struct spl_near_some some = {.k = k, .takes = takes, .context = context};
+    unsigned looked = 0;
+    for (double times = 2; times <= most && looked < SPL_NEAR_LOOKED; times *= 2) {
+        some.bound = times * distance * times * distance;
+        looked = n->find_some(&n->boxes, n->points, i, &some, nearest);
+        if (nearest->count == k)
+            break;
     }
     nearest->farthest = nearest->count ? sqrt(nearest->squared[nearest->count - 1]) : 0;
 }

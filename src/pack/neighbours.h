@@ -36,11 +36,13 @@ struct spl_neighbours *spl_neighbours_create(const struct spl_points *points, un
 /* The min(k, points - 1) points nearest to point `i`, itself excluded; among equally far ones, some. Any thread. */
 void spl_neighbours_find(const struct spl_neighbours *neighbours, size_t i, unsigned k, struct spl_nearest *nearest);
 
-/* The k points nearest to point `i` of those that `takes` takes, nearest first, as far as they lie within `reach` and
- * SPL_NEAR_LOOKED or so that were looked at have them. Sets count, index, squared and farthest alone. Any thread. */
+/* The k points nearest to point `i` of those that `takes` takes, nearest first, as far as they lie within 2, 4, 8 times
+ * `distance`, the first of these that has them, up to `most`, and SPL_NEAR_LOOKED or so that were looked at have them.
+ * Sets count, index, squared and farthest alone. Any thread. */
 enum { SPL_NEAR_LOOKED = 2048 };
-void spl_neighbours_find_some(const struct spl_neighbours *neighbours, size_t i, unsigned k, double reach,
-                              bool (*takes)(const void *context, size_t point), const void *context,
+typedef bool spl_neighbours_takes(const void *context, size_t point);
+void spl_neighbours_find_some(const struct spl_neighbours *neighbours, size_t i, unsigned k, double distance,
+                              double most, spl_neighbours_takes *takes, const void *context,
                               struct spl_nearest *nearest);
 
 /* NULL-safe. */

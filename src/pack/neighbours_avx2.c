@@ -8,6 +8,13 @@ SPL_NEAR_TARGET void spl_near_find_avx2(const struct spl_boxes *boxes, const str
 {
     spl_near_find(boxes, points, i, k, nearest);
 }
+
+SPL_NEAR_TARGET unsigned spl_near_find_some_avx2(const struct spl_boxes *boxes, const struct spl_points *points,
+                                                 size_t i, const struct spl_near_some *some,
+                                                 struct spl_nearest *nearest)
+{
+    return spl_near_find_some(boxes, points, i, some, nearest);
+}
 #else
 typedef int spl_no_avx2; /* a file has something in it */
 #endif

@@ -1,5 +1,7 @@
 /* Two sides of a wall, of which one is scanned less densely than the wall is thick: each keeps to its own points, where
- * stations or normals tell them apart; what lies on one side, though others see it, stays together. */
+ * stations or normals tell them apart, however rough the other side is and however aslant both are seen; what lies on
+ * one side, though others see it, stays together. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,7 +14,7 @@
 #include "pack/order.h"
 
 enum { points_most = 100000 };
-static const double noise = 0.002;
+static const double smooth = 0.002;
 
 struct scene {
     double (*position)[3];
@@ -33,9 +35,9 @@ static struct scene begin(void)
 }
 
 /* The rectangle from `low` to `high`, which are the same in one coordinate, of so many stations by turns from the first
- * on; its normal is `sign` along that coordinate. */
-static void add_sheet(struct scene *s, const double low[3], const double high[3], double spacing, int first,
-                      int stations, int sign)
+ * on; its normal is `sign` along that coordinate, where points are off by `noise` at most. */
+static void add_rough_sheet(struct scene *s, const double low[3], const double high[3], double spacing, int first,
+                            int stations, int sign, double noise)
 {
     int flat = low[0] == high[0] ? 0 : low[1] == high[1] ? 1 : 2, u = (flat + 1) % 3, v = (flat + 2) % 3;
     for (double a = low[u]; a <= high[u]; a += spacing)
@@ -49,6 +51,12 @@ static void add_sheet(struct scene *s, const double low[3], const double high[3]
             s->station[s->count] = (uint16_t)(first + (int)(s->count % (size_t)stations));
             s->count++;
         }
+}
+
+static void add_sheet(struct scene *s, const double low[3], const double high[3], double spacing, int first,
+                      int stations, int sign)
+{
+    add_rough_sheet(s, low, high, spacing, first, stations, sign, smooth);
 }
 
 enum told { BY_STATIONS, BY_NORMALS, BY_ONE_STATION };
@@ -130,6 +138,35 @@ static void test_a_partition_is_a_twentieth_as_dense_on_one_side(void **state)
     check_wall(0.05, 0.1, 0.0225);
 }
 
+/* Standard deviations of 0.2 and 0.3 of the spacing: its own neighbours lie in no plane. */
+static void test_the_other_side_is_rough(void **state)
+{
+    (void)state;
+    for (int tenths = 2; tenths <= 3; tenths++) {
+        struct scene s = begin();
+        add_sheet(&s, (double[3]){0, 0, 0}, (double[3]){0, 4, 4}, 0.1, 0, 1, -1);
+        add_rough_sheet(&s, (double[3]){0.12, 0, 0}, (double[3]){0.12, 4, 4}, 0.02, 1, 1, 1,
+                        0.02 * tenths / 10 * sqrt(3));
+        struct spl_points p = finish(&s, BY_STATIONS, both_sides);
+        check_outside(&p, 0.12, 0.1, 0.5);
+        spl_points_finish(&p);
+        clear(&s);
+    }
+}
+
+/* From stations 1 m off the wall and 4 m aside: both look at it in nearly one direction. */
+static void test_both_sides_are_seen_aslant(void **state)
+{
+    (void)state;
+    struct scene s = begin();
+    add_sheet(&s, (double[3]){0, 0, 0}, (double[3]){0, 4, 4}, 0.1, 0, 1, -1);
+    add_sheet(&s, (double[3]){0.12, 0, 0}, (double[3]){0.12, 4, 4}, 0.0225, 1, 1, 1);
+    struct spl_points p = finish(&s, BY_STATIONS, (const double[2][3]){{-1, -4, 2}, {1.12, -4, 2}});
+    check_outside(&p, 0.12, 0.1, 0.5);
+    spl_points_finish(&p);
+    clear(&s);
+}
+
 /* As where one station saw all of it, but for so many. */
 static void check_same(const struct scene *s, const double stations[2][3], size_t but)
 {
@@ -173,6 +210,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_a_wall_is_thinner_than_its_points_are_apart),
         cmocka_unit_test(test_a_partition_is_a_twentieth_as_dense_on_one_side),
+        cmocka_unit_test(test_the_other_side_is_rough),
+        cmocka_unit_test(test_both_sides_are_seen_aslant),
         cmocka_unit_test(test_a_floor_between_stations_stays_together),
         cmocka_unit_test(test_faces_around_an_edge_are_neighbours),
     };
