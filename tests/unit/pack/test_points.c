@@ -305,18 +305,32 @@ static void test_neighbours_against_brute_force(void **state)
         }
 }
 
-/* The lists of all points with the instructions of a set. */
+static bool is_third(const void *context, size_t point)
+{
+    (void)context;
+    return point % 3 == 0;
+}
+
+/* The lists of all points with the instructions of a set: of each the nearest, and the nearest of every third. */
 static uint32_t *find_all(const struct spl_points *p, unsigned k, enum spl_neighbours_set set)
 {
     spl_neighbours_limit(set);
     struct spl_neighbours *n = spl_neighbours_create(p, 1, NULL);
-    uint32_t *all = calloc(p->count, k * sizeof *all);
-    struct spl_nearest nearest;
+    uint32_t *all = calloc(p->count, 2 * k * sizeof *all);
+    size_t listed = 0;
+    struct spl_nearest nearest, third;
     spl_nearest_init(&nearest);
     for (size_t i = 0; i < p->count; i++) {
         spl_neighbours_find(n, i, k, &nearest);
-        memcpy(all + i * k, nearest.index, nearest.count * sizeof *all);
+        memcpy(all + 2 * i * k, nearest.index, nearest.count * sizeof *all);
+        spl_neighbours_find_some(n, i, k, nearest.farthest, 4, is_third, NULL, &third);
+        assert_true(third.count <= k);
+        listed += third.count;
+        for (unsigned a = 0; a < third.count; a++)
+            assert_true(third.index[a] % 3 == 0 && third.index[a] != i);
+        memcpy(all + (2 * i + 1) * k, third.index, third.count * sizeof *all);
     }
+    assert_true(listed > p->count * k / 3);
     spl_neighbours_destroy(n);
     return all;
 }
@@ -336,7 +350,7 @@ static void test_neighbours_of_every_set(void **state)
             uint32_t *base = find_all(&p, ks[k], SPL_NEIGHBOURS_BASE);
             for (int set = SPL_NEIGHBOURS_AVX2; set <= (int)most; set++) {
                 uint32_t *other = find_all(&p, ks[k], (enum spl_neighbours_set)set);
-                assert_memory_equal(base, other, p.count * ks[k] * sizeof *base);
+                assert_memory_equal(base, other, 2 * p.count * ks[k] * sizeof *base);
                 free(other);
             }
             free(base);
