@@ -55,13 +55,13 @@ static void cut_dawdler(struct spl_service *service)
 static struct spl_catalog_slot *claim(struct request *request, const char *id, bool make)
 {
     struct spl_service *service = request->service;
+    if (count_changes(service) == changes_max)
+        cut_dawdler(service); // slots move where one goes
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
     struct spl_error err = {0};
     char tag[24] = "";
     if (slot && slot->current)
         snprintf(tag, sizeof tag, "\"%016llx\"", (unsigned long long)slot->current->info->version);
-    if (count_changes(service) == changes_max)
-        cut_dawdler(service);
     const bool busy = slot && (slot->busy || (slot->current && slot->current->saving));
     if (service->draining || count_changes(service) == changes_max || busy) {
         spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
