@@ -22,7 +22,8 @@
 #include "service/tour/tour.h"
 #include "service/view/views.h"
 
-enum { sweep_ms = 20, sweep_sockets = 64, turn_ms = 20, small_bytes = 4096, small_at_once = 64 };
+enum { sweep_ms = 20, sweep_sockets = 64, turn_ms = 20, small_bytes = 4096, small_at_once = 64,
+       turn_deadline_ms = 60000 };
 
 static void let_go(struct request *request)
 {
@@ -194,8 +195,10 @@ bool spl_waiting_postpone(struct request *request)
     struct spl_http *http = service->http;
     if (!spl_turn_is_over(service) && (request->admitted || TAILQ_EMPTY(&http->postponed)))
         return false;
-    spl_waiting_add(request, request->admitted ? request->deadline_ns
-                                               : spl_now_ns() + service->options->deadline_ms * SPL_NS_PER_MS);
+    uint64_t patience_ms = service->options->deadline_ms; // as a view's; what waits for no view is in less of a hurry
+    if (!request->body_length && patience_ms < turn_deadline_ms)
+        patience_ms = turn_deadline_ms;
+    spl_waiting_add(request, request->admitted ? request->deadline_ns : spl_now_ns() + patience_ms * SPL_NS_PER_MS);
     line_up(http, request);
     uv_idle_start(&http->next, on_next);
     return true;
