@@ -39,7 +39,9 @@ static void cut_dawdler(struct spl_service *service)
     uint64_t before = spl_now_ns() - patience_s * SPL_NS_PER_S;
     LIST_FOREACH(change, &service->library->changes, link)
     {
-        bool comes = change->request && change->step == SPL_CHANGE_APPEND && !change->working;
+        if (!change->request) // its place is free soon
+            return;
+        bool comes = change->step == SPL_CHANGE_APPEND && !change->working;
         if (comes && change->stepped_ns < (slowest ? slowest->stepped_ns : before))
             slowest = change;
     }
