@@ -16,6 +16,11 @@ int spl_write_all(int fd, const void *bytes, size_t length);
  * Permissions are those of a new file (0666 less the umask). Errors name `path`. Any thread; blocks on disk. */
 int spl_file_replace(const char *path, const void *bytes, size_t length, struct spl_error *err);
 
+/* Behind a file's name while it is written, for printf with the process's number: no name that a user, split(1) or a
+ * download gives; and what matches it, for spl_file_sweep(). */
+#define SPL_UNFINISHED ".splatd-%ld"
+#define SPL_UNFINISHED_ANY ".splatd-[0-9]*"
+
 /* Removes what killed writers left under the names `begin` and then the pattern `end`, of glob(7): files on which
  * nobody holds a lock. What cannot be opened stays. Any thread; blocks on disk. */
 void spl_file_sweep(const char *begin, const char *end);

@@ -9,6 +9,7 @@
 
 #include <splatd/collect.h>
 
+#include "base/file.h"
 #include "cmd/output.h"
 #include "cmd/pack_report.h"
 #include "cmd/progress.h"
@@ -20,7 +21,7 @@
 static void clean_up_on_signals(const char *output)
 {
     char path[4096];
-    int length = snprintf(path, sizeof path, "%s.splatd-%ld", output, (long)getpid());
+    int length = snprintf(path, sizeof path, "%s" SPL_UNFINISHED, output, (long)getpid());
     if (length >= 0 && (size_t)length < sizeof path)
         spl_cmd_remove_unfinished(path);
 }

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/pack_job.h"
@@ -19,15 +20,16 @@ static void clean_up_on_signals(const char *output)
     static const char *const of[2] = {"scan", "points"};
     long pid = (long)getpid();
     char path[4096];
-    int length = snprintf(path, sizeof path, "%s.splatd-%ld-points.splatd-%ld", output, pid, pid); /* the longest */
+    int length = snprintf(path, sizeof path, "%s" SPL_UNFINISHED "-points" SPL_UNFINISHED, output, pid,
+                          pid); /* the longest */
     if (length < 0 || (size_t)length >= sizeof path)
         return;
-    snprintf(path, sizeof path, "%s.splatd-%ld", output, pid);
+    snprintf(path, sizeof path, "%s" SPL_UNFINISHED, output, pid);
     spl_cmd_remove_unfinished(path);
     for (int i = 0; i < 2; i++) {
-        snprintf(path, sizeof path, "%s.splatd-%ld-%s", output, pid, of[i]);
+        snprintf(path, sizeof path, "%s" SPL_UNFINISHED "-%s", output, pid, of[i]);
         spl_cmd_remove_unfinished(path);
-        snprintf(path, sizeof path, "%s.splatd-%ld-%s.splatd-%ld", output, pid, of[i], pid);
+        snprintf(path, sizeof path, "%s" SPL_UNFINISHED "-%s" SPL_UNFINISHED, output, pid, of[i], pid);
         spl_cmd_remove_unfinished(path);
     }
 }

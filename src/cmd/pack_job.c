@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/unfinished.h"
@@ -138,9 +139,10 @@ void spl_cmd_pack_clean_up_on_signals(const char *output)
     const long pid = (long)getpid();
     for (int i = 0; i < 3; i++) {
         char path[4096];
-        int length = i == 0   ? snprintf(path, sizeof path, "%s.splatd-%ld", output, pid)
-                     : i == 1 ? snprintf(path, sizeof path, "%s.splatd-%ld-tiles", output, pid)
-                              : snprintf(path, sizeof path, "%s.splatd-%ld-tiles.splatd-%ld", output, pid, pid);
+        int length = i == 0   ? snprintf(path, sizeof path, "%s" SPL_UNFINISHED, output, pid)
+                     : i == 1 ? snprintf(path, sizeof path, "%s" SPL_UNFINISHED "-tiles", output, pid)
+                              : snprintf(path, sizeof path, "%s" SPL_UNFINISHED "-tiles" SPL_UNFINISHED, output, pid,
+                                         pid);
         if (length >= 0 && (size_t)length < sizeof path)
             spl_cmd_remove_unfinished(path);
     }

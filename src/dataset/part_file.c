@@ -18,8 +18,8 @@ enum { names_most = 64 };
 
 static int name(const char *path, unsigned in_use, char **out)
 {
-    int length = in_use ? asprintf(out, "%s.splatd-%ld-%u", path, (long)getpid(), in_use)
-                        : asprintf(out, "%s.splatd-%ld", path, (long)getpid());
+    int length = in_use ? asprintf(out, "%s" SPL_UNFINISHED "-%u", path, (long)getpid(), in_use)
+                        : asprintf(out, "%s" SPL_UNFINISHED, path, (long)getpid());
     if (length >= 0)
         return SPL_OK;
     *out = NULL;
@@ -40,7 +40,7 @@ int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_
 {
     *file = (struct spl_part_file){.path = strdup(path), .fd = -1};
     int rc = SPL_E_NOMEM;
-    spl_file_sweep(path, ".splatd-[0-9]*");
+    spl_file_sweep(path, SPL_UNFINISHED_ANY);
     for (unsigned in_use = 0;;) { /* again where another's sweep came before our lock */
         struct stat st;
         free(file->part_path);

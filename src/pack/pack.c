@@ -64,11 +64,11 @@ static int pack_passes(struct spl_passes *p, struct spl_inputs *inputs, struct s
     uint64_t begin_ns = spl_now_ns();
     char *part = NULL, *points = NULL;
     int rc = spl_passes_load(p, err);
-    if (!rc && asprintf(&part, "%s.splatd-%ld-scan", options->output, (long)getpid()) < 0) {
+    if (!rc && asprintf(&part, "%s" SPL_UNFINISHED "-scan", options->output, (long)getpid()) < 0) {
         part = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }
-    if (!rc && options->maps && asprintf(&points, "%s.splatd-%ld-points", options->output, (long)getpid()) < 0) {
+    if (!rc && options->maps && asprintf(&points, "%s" SPL_UNFINISHED "-points", options->output, (long)getpid()) < 0) {
         points = NULL;
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", options->output);
     }

@@ -22,7 +22,7 @@ int spl_output_open(struct spl_output *out, const char *directory, const char *n
         out->path = NULL;
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }
-    if (asprintf(&out->temporary, "%s.splatd-%ld", out->path, (long)getpid()) < 0) {
+    if (asprintf(&out->temporary, "%s" SPL_UNFINISHED, out->path, (long)getpid()) < 0) {
         out->temporary = NULL;
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }

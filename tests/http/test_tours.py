@@ -607,6 +607,19 @@ def test_what_is_no_tours_stays():
             d.log(f"{mixed.name} is left")
 
 
+def test_no_more_frames_are_incomplete_than_there_are():
+    """More than are named are only counted: some of these a crash kept from the disk, and they are drawn again."""
+    with Folder() as folder:
+        with Daemon(FAKE, "--tours", str(folder), FAKE_FRAME_MS=0) as d:
+            tour = ended(d, begin(d, body(130))["uri"])
+        file = folder / tour["name"] / "tour.json"
+        file.write_text(json.dumps({**json.loads(file.read_text()), "incomplete": {"count": 125, "first": list(range(100))}}))
+        for i in range(120, 130):
+            next((folder / tour["name"]).glob(f"{i:06}.*")).unlink()
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            assert d.ask(tour["uri"]).json()["incomplete_frames"] == {"count": 120, "first": list(range(100))}
+
+
 def test_frames_that_are_not_complete_are_named():
     """A tile of a collection is gone: frames that show it are as it is from afar, and the tour says which, also after a restart."""
     away, near = [[[x + 20, -15, 8], [x + 20, 30, 0]] for x in (-20, 60)]  # eye and target

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "pack/job/job.h"
 
 /* The lock is the folder's own; one that was removed meanwhile is made and taken again. */
@@ -42,8 +43,9 @@ int spl_job_lock(const char *path, int *lock, struct spl_error *err)
 
 static bool is_of_a_job(const char *name)
 {
-    static const char *const patterns[] = {"part-[0-9]*.spld", "part-[0-9]*.empty", "part-[0-9]*.spld.splatd-[0-9]*",
-                                           ".part-[0-9]*.empty.*", "." SPL_JOB_FILE ".*"};
+    static const char *const patterns[] = {"part-[0-9]*.spld", "part-[0-9]*.empty",
+                                           "part-[0-9]*.spld" SPL_UNFINISHED_ANY, ".part-[0-9]*.empty.*",
+                                           "." SPL_JOB_FILE ".*"};
     bool is = false;
     for (size_t i = 0; i < sizeof patterns / sizeof *patterns; i++)
         is |= !fnmatch(patterns[i], name, 0);

@@ -217,7 +217,7 @@ int spl_job_merge(const struct spl_job *job, const struct spl_collect_options *o
         return rc;
     rc = open_parts(job, &parts, err);
     json_t *sources = spl_names_describe(name_of_input, job, job->input_count);
-    if (!rc && (!sources || asprintf(&collection, "%s.splatd-%ld-tiles", options->output, (long)getpid()) < 0))
+    if (!rc && (!sources || asprintf(&collection, "%s" SPL_UNFINISHED "-tiles", options->output, (long)getpid()) < 0))
         rc = spl_fail(err, SPL_E_NOMEM, "out of memory for the names of the scans");
     if (!rc) {
         struct spl_collect_options o = complete(job, options, &parts);

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
@@ -18,7 +19,7 @@ int spl_textures_init(struct spl_textures *textures, const char *output, uint64_
 {
     char *path = NULL;
     *textures = (struct spl_textures){.fd = -1, .size = size, .values = spl_texture_values(size)};
-    if (asprintf(&path, "%s.splatd-%ld-textures", output, (long)getpid()) < 0)
+    if (asprintf(&path, "%s" SPL_UNFINISHED "-textures", output, (long)getpid()) < 0)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", output);
     int rc = SPL_OK;
     textures->fd = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);

@@ -158,6 +158,7 @@ static void go_on(struct change *change)
         spl_change_finish(change);
         return;
     }
+    change->stepped_ns = spl_now_ns(); // the client is not to blame for how long the disk took
     spl_connection_enter(change->request->connection, PHASE_UPLOADING);
     spl_request_resume(change->request);
 }

@@ -25,8 +25,8 @@ struct change {
     bool fresh;                /* there was no such dataset */
     bool working;              /* a thread has it */
     enum spl_change_step step; /* that the thread does, or did last */
-    uint64_t seen;              /* bytes of the body */
-    uint64_t steps, stepped_ns; /* how far it has come, and when */
+    uint64_t seen;             /* bytes of the body */
+    uint64_t steps, stepped_ns; // how far it has come, and when
 
     /* Owned by: the pool while `working`. */
     struct spl_incoming incoming;

@@ -63,7 +63,7 @@ void spl_tour_note_part(struct spl_tour *tour, size_t frame)
         at--;
     if (at < named && tour->first_parts[at] == frame)
         return;
-    tour->parts++;
+    tour->parts += tour->parts < tour->spec.frames; // of unnamed ones some may be drawn again after a crash
     if (at == SPL_TOUR_PARTS)
         return;
     size_t behind = named - at - (named == SPL_TOUR_PARTS);
@@ -189,6 +189,8 @@ static void take_parts(struct spl_tour *tour, const json_t *parts)
             spl_tour_note_part(tour, (size_t)frame);
     }
     tour->parts += tour->parts == SPL_TOUR_PARTS ? (size_t)count - named : 0;
+    if (tour->parts > tour->frames_done) // some were on their way to the disk
+        tour->parts = tour->frames_done;
 }
 
 /* Which frames lie there, and how large everything is. What lies there is listed, not looked for: of a thousand tours

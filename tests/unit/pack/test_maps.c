@@ -282,8 +282,8 @@ static void maps_are_as_fine_as_their_pictures_are_worth(void **state)
         uint32_t width, height;
         double f, side;
     } cases[] = {{600, 450, 600, 600 * M_PI / 2}, /* 53 degrees */
-                {64, 64, 1e5, sqrt(64. / 6) * 64},
-                {4000, 3000, 40000, SPL_MAP_SIDE_MAX}};
+                 {64, 64, 1e5, sqrt(64. / 6) * 64},
+                 {4000, 3000, 40000, SPL_MAP_SIDE_MAX}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         view.camera = (struct spl_camera){
             .width = cases[i].width, .height = cases[i].height, .fx = cases[i].f, .fy = cases[i].f};
