@@ -304,7 +304,6 @@ void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_ti
 {
     enum { turns_max = 16, rest_ms = 1 };
     MHD_UNSIGNED_LONG_LONG timeout_ms;
-    turns->passes++;
     MHD_run(daemon);
     bool wants = MHD_get_timeout(daemon, &timeout_ms) == MHD_YES;
     bool again = wants && !timeout_ms && ++turns->eager % turns_max;

@@ -48,7 +48,6 @@ struct spl_http_turns {
     uv_timer_t timer; /* its own timeouts */
     uv_idle_t again;  /* it has more to do at once */
     unsigned eager;   /* times that it had */
-    uint64_t passes;  /* turns so far */
 };
 
 struct spl_http {

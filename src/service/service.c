@@ -126,7 +126,9 @@ static void on_signal(uv_signal_t *handle, int number)
 static void on_hangup(uv_signal_t *handle, int number)
 {
     (void)number;
-    spl_access_reload(handle->data);
+    struct spl_service *service = handle->data;
+    spl_access_reload(service);
+    spl_listing_forget(&service->library->listing); // which knows those who see it by their tokens
 }
 
 static void announce(struct spl_service *service)
@@ -315,7 +317,7 @@ done:
     spl_tours_stop(service->tours);
     spl_library_stop(service);
     spl_page_cache_let_go(service->library->page_cache);
-    spl_listing_finish(&service->library->listing);
+    spl_listing_forget(&service->library->listing);
     spl_catalog_finish(&service->library->catalog); // before the pipeline, which lets go of what nobody refers to
     spl_views_finish(service);
     spl_access_finish(service);

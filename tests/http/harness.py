@@ -120,6 +120,12 @@ class Daemon:
     def status(self):
         return self.ask("/v1/status").json()
 
+    def processor_s(self):
+        """What it has taken of processors so far."""
+        with open(f"/proc/{self.process.pid}/stat") as file:
+            fields = file.read().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
     def wait_exit(self, timeout=PATIENCE_S):
         """Its code, once all that it said is in `lines`."""
         try:

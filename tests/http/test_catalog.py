@@ -412,8 +412,7 @@ def test_a_knot_is_opened_like_any_other():
         subprocess.run([os.environ["SPLATD_MAKE_WALL"], "--knot", os.path.join(home, ".knot")], check=True)
         os.rename(os.path.join(home, ".knot"), os.path.join(home, "knot.spld"))
         eventually(lambda: listed(d).get("knot", {}).get("state") == "ready")
-        fields = pathlib.Path(f"/proc/{d.process.pid}/stat").read_text().rpartition(")")[2].split()
-        assert (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") < 60, "two minutes of work, whoever else works here"
+        assert d.processor_s() < 60, "two minutes of work, whoever else works here"
         assert d.stop() == 0
 
 

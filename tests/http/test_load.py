@@ -2,7 +2,6 @@
 every reply is 200 or says when to come back, and none is dropped."""
 import http.client
 import os
-import pathlib
 import re
 import signal
 import socket
@@ -13,12 +12,6 @@ import time
 from harness import FAKE, PATIENT, REAL, VIEW, WALL, Daemon, Hold, eventually, fresh, run, together
 
 SMALL = VIEW + "?width=16&height=16"
-
-
-def processor_s(d):
-    """What the daemon has taken of processors so far."""
-    fields = pathlib.Path(f"/proc/{d.process.pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def statuses(replies):
@@ -257,7 +250,7 @@ def test_a_second_signal_ends_at_once():
 def test_slow_requests_are_cut_and_cost_nothing():
     with Daemon(FAKE) as d:
         slow = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(50)]
-        began, busy_s, cut = time.monotonic(), processor_s(d), 0
+        began, busy_s, cut = time.monotonic(), d.processor_s(), 0
         while cut < len(slow) and time.monotonic() - began < 60:
             cut = 0
             for s in slow:
@@ -271,7 +264,7 @@ def test_slow_requests_are_cut_and_cost_nothing():
                     cut += 1
             assert d.ask(fresh(SMALL)).status == 200
             time.sleep(0.5)
-        took, busy_s = time.monotonic() - began, processor_s(d) - busy_s
+        took, busy_s = time.monotonic() - began, d.processor_s() - busy_s
         assert cut == len(slow), cut
         assert took > 8, "cut although they had time left"
         assert busy_s < 0.2 * took, (busy_s, took)

@@ -19,7 +19,7 @@ struct spl_token;
 /* The last text of GET /v1/datasets (list_route.c). */
 struct spl_listing {
     struct spl_listed *last;         // may be NULL
-    uint64_t turn;                   /* of libmicrohttpd, in which it was made */
+    uint64_t made_ns;                /* it tells of what there was then */
     const struct spl_token *seen_by; // may be NULL; what those show who see what it has; compared alone
 };
 
@@ -77,7 +77,7 @@ void spl_saving_abandon(struct spl_saving *saving); /* its request no longer wai
 /* profile_route.c: /v1/datasets/{id}/profile. */
 void spl_show_profile(struct request *request, const struct spl_call *call);
 void spl_list_datasets(struct request *request, const struct spl_call *call);
-void spl_listing_finish(struct spl_listing *listing); /* idempotent */
+void spl_listing_forget(struct spl_listing *listing); /* the next is made anew; idempotent */
 void spl_show_legend(struct request *request, const struct spl_call *call);
 
 /* describe.c: new references; NULL without memory. */

@@ -1,9 +1,10 @@
-/* GET /v1/datasets: what there is, and what it is doing. Of a thousand datasets that is megabytes, for which many may
- * ask at once and then read slowly. So it is made once in a turn of the loop for all who see the same, and whoever is
- * sent the same text shares it. Owned by the loop's thread. */
+/* GET /v1/datasets: what there is, and what it is doing. Of a thousand datasets that is megabytes and tenths of a
+ * second, for which many may ask at once and then read slowly. So it is made once for all who see the same and had
+ * asked before, and whoever is sent the same text shares it. Owned by the loop's thread. */
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "geom/json.h"
 #include "service/access/access.h"
@@ -63,12 +64,14 @@ void spl_list_datasets(struct request *request, const struct spl_call *call)
 {
     (void)call;
     struct spl_listing *listing = &request->service->library->listing;
-    const uint64_t turn = request->service->http->turns.passes;
-    const bool again = listing->last && listing->turn == turn && listing->seen_by == request->token;
+    const uint64_t now_ns = spl_now_ns();
+    const bool again =
+        listing->last && request->began_ns <= listing->made_ns && listing->seen_by == request->token;
     struct spl_listed *listed = again ? listing->last : keep(listing, print(request));
     if (!listed)
         return;
-    listing->turn = turn;
+    if (!again)
+        listing->made_ns = now_ns;
     listing->seen_by = request->token;
     listed->references++;
     spl_reply_bytes(request, listed->text, listed->length, let_go, listed);
@@ -78,7 +81,7 @@ void spl_list_datasets(struct request *request, const struct spl_call *call)
         let_go(listed);
 }
 
-void spl_listing_finish(struct spl_listing *listing)
+void spl_listing_forget(struct spl_listing *listing)
 {
     let_go(listing->last);
     listing->last = NULL;
