@@ -77,7 +77,7 @@ static int load(const struct arguments *a, const char *path, struct spl_image im
         enum spl_layer layer;
         const char *ending;
     } places[] = {
-        {SPL_LAYER_COLOR, "png"}, {SPL_LAYER_COLOR, "jpg"},  {SPL_LAYER_DEPTH, "npy"},
+        {SPL_LAYER_COLOR, "png"}, {SPL_LAYER_COLOR, "jpg"},  {SPL_LAYER_COLOR, "jpeg"},   {SPL_LAYER_DEPTH, "npy"},
         {SPL_LAYER_DEPTH, "png"}, {SPL_LAYER_NORMAL, "npy"}, {SPL_LAYER_COVERAGE, "npy"},
     };
     char name[4096];

@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <splatd/image.h>
+
 #include "base/file.h"
 #include "base/text.h"
 
@@ -65,6 +67,16 @@ const char *spl_cmd_ending(const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
     return dot && dot > name && strcmp(name, "..") ? dot + 1 : "";
+}
+
+int spl_cmd_format_of(const char *path)
+{
+    char name[8];
+    size_t n = 0;
+    for (const char *p = spl_cmd_ending(path); *p && n + 1 < sizeof name; p++)
+        name[n++] = (char)tolower((unsigned char)*p);
+    name[n] = 0;
+    return spl_format_from_name(name);
 }
 
 int spl_cmd_check_png(const char *option, const char *path, struct spl_error *err)

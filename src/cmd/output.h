@@ -25,6 +25,9 @@ const char *spl_cmd_group(uint64_t value, char text[32]);
  * ".c", "a.b/" and "..". Borrows from `path`. */
 const char *spl_cmd_ending(const char *path);
 
+/* The enum spl_format that a file's ending means, in whatever case (".jpg", ".JPEG"); -1: none. */
+int spl_cmd_format_of(const char *path);
+
 /* Fails with SPL_E_USAGE, naming `option`, where `path` does not end in ".png", so that what is written is not taken
  * for something else and is not written over something else. "-" and what is no regular file has any name. */
 int spl_cmd_check_png(const char *option, const char *path, struct spl_error *err);

@@ -7,6 +7,7 @@
 #include <jansson.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 #include <splatd/render.h>
@@ -24,7 +25,7 @@
 
 static int read_rays(struct spl_cmd_render *a, struct spl_error *err)
 {
-    const bool json = !strcmp(spl_cmd_ending(a->rays_file), "json");
+    const bool json = !strcasecmp(spl_cmd_ending(a->rays_file), "json");
     FILE *file = fopen(a->rays_file, "rb");
     struct stat status;
     if (!file || fstat(fileno(file), &status)) {

@@ -5,6 +5,7 @@
 #include <getopt.h>
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "cmd/output.h"
 #include "geom/ray_list.h"
@@ -164,13 +165,13 @@ static int resolve_format(struct spl_cmd_render *a, struct spl_error *err)
     if (!a->drawing.output)
         return spl_fail(err, SPL_E_USAGE, "render needs a file to write to: -o OUT.jpg, .png or .npy");
     const char *ending = spl_cmd_ending(a->drawing.output);
-    int named = spl_format_from_name(ending);
-    a->listed = a->rays_file && a->drawing.format < 0 && !strcmp(ending, "json");
+    int named = spl_cmd_format_of(a->drawing.output);
+    a->listed = a->rays_file && a->drawing.format < 0 && !strcasecmp(ending, "json");
     if (a->listed)
         named = SPL_FORMAT_RAW;
     if (a->drawing.format < 0)
         a->drawing.format = named;
-    else if ((named >= 0 && named != a->drawing.format) || !strcmp(ending, "spld"))
+    else if ((named >= 0 && named != a->drawing.format) || !strcasecmp(ending, "spld"))
         return spl_fail(err, SPL_E_USAGE, "'%s' is no name of a %s: give one that ends in .%s, or another --format",
                         a->drawing.output, spl_format_name((enum spl_format)a->drawing.format),
                         spl_format_name((enum spl_format)a->drawing.format));

@@ -33,10 +33,18 @@ writes() {
 }
 writes a.jpg ffd8ff
 writes a.jpeg ffd8ff --layer depth
+writes a.JPG ffd8ff
+writes a.PNG 89504e47
+writes a.Npy 934e554d5059 --layer depth
 writes a.png 89504e47 --eye 0,-2,1.6 --target=-1,5,2 --fov 60 --background '#ff000080' --supersample 2
 writes a.png 89504e47 --layer depth --depth-scale 5000 --fx 60 --fy 61 --cx 30 --cy 20.5
 writes a.npy 934e554d5059 --layer normal --method points --lod 0
 writes a.dat 89504e47 --format png --background White --margin 2 --near 0.5 --far 100 --no-verify
+
+echo '[[0, 0, 1], [1, 0, 0]]' >directions.JSON
+"$splatd" render courtyard.spld --rays directions.JSON -o ranges.JSON 2>messages && grep -q '^\[' ranges.JSON ||
+    fail "--rays and -o of .JSON: $(cat messages)"
+rm -f directions.JSON ranges.JSON messages
 
 bytes=$("$splatd" render courtyard.spld --size 8x4 --layer id --format raw -o - 2>/dev/null | wc -c)
 [ "$bytes" = 128 ] || fail "stdout got $bytes bytes instead of 128"
