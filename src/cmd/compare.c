@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 
 #include <jansson.h>
@@ -20,8 +21,7 @@ struct arguments {
     const char *image, *truth, *map; /* map may be NULL */
     double tolerance;
     uint32_t threads;
-    int kind; /* place in `kinds` */
-    enum spl_layer layer; /* of a single file */
+    int kind; /* place in `kinds`, of single files; -1: what they are called */
     bool json;
 };
 
@@ -37,7 +37,8 @@ static int take_map(void *arguments, const char *option, char *text, struct spl_
 static const struct spl_cmd_option options[] = {
     {"tolerance", "D", "depth that may be off, the dataset's unit; the splat radius is apt", .fallback = "0",
      SPL_CMD_REAL(struct arguments, tolerance, 0, 1e12)},
-    {"layer", "LAYER", "of single files: color, depth, normal or coverage", .fallback = "color",
+    {"layer", "LAYER", "of single files: color, depth, normal or coverage",
+     .otherwise = "what their names say, depth.npy or east.depth.npy, else color",
      SPL_CMD_CHOICE(struct arguments, kind, kinds)},
     {"error-map", "FILE", "8 times the difference of the colours, as PNG", .take = take_map},
     {"json", NULL, "one object, null where a figure is undefined; psnr is null for equal images, too",
@@ -57,11 +58,39 @@ static const struct spl_cmd_table table = {
         "All layers of a view against the exact ones, depth within 2 cm:\n"
         "  splatd compare out/east scan/truth/east --tolerance 0.02\n"
         "One depth image, for a script:\n"
-        "  splatd compare depth.npy truth.npy --layer depth --json\n\n",
+        "  splatd compare rendered.npy truth.npy --layer depth --json\n\n",
     .after = "\nFigures go to stdout, messages to stderr. What each means: api/measures.md.\n",
     .options = options,
     .count = sizeof options / sizeof *options,
 };
+
+/* As the files of a stem are called: "east.depth.npy", and without one "depth.npy". */
+static enum spl_layer find_layer(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *end = strrchr(name, '.');
+    for (size_t i = 0; end && i < sizeof layers / sizeof *layers; i++) {
+        const size_t length = strlen(kinds[i]), before = (size_t)(end - name);
+        if (before >= length && !strncmp(end - length, kinds[i], length) &&
+            (before == length || end[-(ptrdiff_t)length - 1] == '.'))
+            return layers[i];
+    }
+    return SPL_LAYER_COLOR;
+}
+
+/* Numbers that no name says the layer of are no broken colours. */
+static int load_file(const struct arguments *a, const char *path, struct spl_image images[SPL_LAYER_COUNT],
+                     struct spl_error *err)
+{
+    const enum spl_layer layer = a->kind < 0 ? find_layer(path) : layers[a->kind];
+    struct spl_error why = {0};
+    int rc = spl_image_load(path, layer, &images[layer], &why);
+    if (rc && a->kind < 0 && layer == SPL_LAYER_COLOR && !strcmp(why.field, "descr"))
+        return spl_fail_field(err, SPL_E_USAGE, "layer",
+                              "%s: holds no colours, and its name does not say what else: --layer depth, normal or "
+                              "coverage does",
+                              path);
+    return rc ? spl_fail_field(err, rc, why.field, "%s", why.message) : SPL_OK;
+}
 
 static bool is_file(const char *path)
 {
@@ -83,7 +112,7 @@ static int load(const struct arguments *a, const char *path, struct spl_image im
     char name[4096];
     int found = 0, rc = SPL_OK;
     if (is_file(path))
-        return spl_image_load(path, a->layer, &images[a->layer], err);
+        return load_file(a, path, images, err);
     for (size_t i = 0; !rc && i < sizeof places / sizeof *places; i++) {
         struct spl_image *image = &images[places[i].layer];
         int length = snprintf(name, sizeof name, "%s.%s.%s", path, spl_layer_name(places[i].layer), places[i].ending);
@@ -204,7 +233,7 @@ static int compare(const struct arguments *a, struct spl_error *err)
 
 int spl_cmd_compare(int argc, char **argv)
 {
-    struct arguments a = {0};
+    struct arguments a = {.kind = -1};
     struct spl_error err = {0};
     int rc = spl_cmd_table_parse(&table, argc, argv, &a, &err);
     if (rc == SPL_CMD_DONE)
@@ -216,7 +245,6 @@ int spl_cmd_compare(int argc, char **argv)
                       argc - optind == 1 ? ", which is missing" : "");
     if (rc)
         return spl_cmd_fail(&err);
-    a.layer = layers[a.kind];
     a.image = argv[optind];
     a.truth = argv[optind + 1];
     return compare(&a, &err) ? spl_cmd_fail(&err) : 0;

@@ -103,6 +103,18 @@ with tempfile.TemporaryDirectory() as folder:
     figures = json.loads(run("east.depth.npy", "truth/east.depth.npy", "--layer", "depth", "--json"))
     check("depth_rmse of files", figures["depth_rmse"], math.sqrt(300 * 0.0625 / 1140))
 
+    # What a file is called says its layer, where --layer does not; numbers of a nameless one are no broken colours.
+    for first, second in (("east.depth.npy", "truth/east.depth.npy"), ("east.depth.npy", "truth/east"), ("depth.npy", "truth/east.depth.npy")):
+        os.path.exists("depth.npy") or os.link("east.depth.npy", "depth.npy")
+        figures = json.loads(run(first, second, "--json"))
+        check(f"depth_rmse of {first} and {second}", figures["depth_rmse"], math.sqrt(300 * 0.0625 / 1140))
+    os.link("east.depth.npy", "numbers.npy")
+    run("numbers.npy", "truth/east.depth.npy", code=2, words="numbers.npy: holds no colours, and its name does not say what else: --layer depth")
+    run("numbers.npy", "truth/east.depth.npy", "--layer", "normal", code=2, words="layer normal has the shape")
+    run("east.color.png", "east.depth.npy", code=2, words="have no layer in common")
+    check("depth_rmse by --layer", json.loads(run("numbers.npy", "truth/east.depth.npy", "--layer", "depth", "--json"))["depth_rmse"],
+          math.sqrt(300 * 0.0625 / 1140))
+
     png("small.png", bytes(4 * COUNT), WIDTH * 2)
     run("small.png", "east.color.png", code=2, words="80 x 15 pixels, not 40 x 30")
     run("nowhere", "truth/east", code=2, words="nowhere.color.png")
