@@ -88,6 +88,7 @@ def test_methods_are_those_of_the_document():
         assert [name for name, method in methods.items() if method["normals"]] == ["fill"]
         assert methods["splat"]["parameters"] == ["margin", "atoms", "maps", "primitives"] + SOFT + COLORS
         assert methods["points"]["parameters"] == SOFT + COLORS
+        assert "not measured" in methods["fill"]["description"]
         for parameter in table["parameters"]:
             name, schema = parameter["name"], document[parameter["name"]]
             assert {k: parameter.get(k) for k in ("default", "maximum", "enum")} == \

@@ -30,6 +30,8 @@ for command in commands:
     text = check([command, "--help"], 0, "stdout")
     if re.search(r" $", text, re.MULTILINE):
         wrong.append(f"splatd {command} --help has lines that end in blanks")
+    if "--method fill" in text and "not measured" not in re.sub(r"\s+", " ", text.split("--method fill")[1].split("--")[0]):
+        wrong.append(f"splatd {command} --help does not say that what method fill closes is not measured")
     if len(re.findall(rf"^\s+(?:\S+ )*splatd {command}\b", text, re.MULTILINE)) < 2:
         wrong.append(f"splatd {command} --help shows fewer than two examples")
     check([command, "--no-such-option"], 2, "stderr")

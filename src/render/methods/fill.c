@@ -56,7 +56,8 @@ static int record(struct spl_tile *tile, uint32_t group, bool first, struct spl_
 
 const struct spl_method_row spl_method_fill = {
     .info = {.name = "fill",
-             .help = "one pixel each, hidden ones removed and holes filled in screen space",
+             .help = "one pixel each, hidden ones removed and holes filled in screen space: their depth is a mean of "
+                     "what is around them on the image, not measured",
              .params = SPL_PARAMS_OF_ALL | SPL_PARAM_BIT(visibility) | SPL_PARAM_BIT(kernel) |
                        SPL_PARAM_BIT(threshold) | SPL_PARAM_BIT(pyramid),
              .finds_normals = true},
