@@ -3,17 +3,22 @@
  * with them, which bounds, first view and the search for wires and planes pay for. More than a thousandth are strays
  * where a gap parts them that is `gap_ratio` times as wide as nearly all others lie: heights that mean none. Of more
  * than a twentieth nobody can say which are the scan, unless all of them have one value, which surfaces do not have so
- * far from all else. One thread. */
+ * far from all else.
+ * Points of equal coordinates are one point, as a pack keeps them: those that are not kept are sampled by place, so
+ * that "0 0 0" for each pixel that saw nothing weighs no more than it does there. One thread. */
 #include "pack/strays.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "base/hash.h"
 #include "base/memory.h"
 #include "pack/bulk.h"
 
 enum { sample_most = 1 << 16, points_least = 2000, twentieth = 20 };
+enum { slots = 1 << 17, probes = 16, halved_most = 40 };
 static const double left_out = 1e-3, far_ratio = 50, gap_ratio = 4;
 
 /* How many of `values` are `level`; *gap to the nearest other, *width of what nearly all others lie in. */
@@ -105,13 +110,41 @@ bool spl_strays_find(const struct spl_points *p, char text[SPL_STRAYS_TEXT_MAX])
     return found;
 }
 
-/* Whether the sample of one in 2^`halved` has the point: by chance, for a step would meet the rows of grids. */
-static bool is_drawn(uint64_t point, unsigned halved)
+/* By chance, for a step would meet the rows of grids, but of one place always the same. */
+static uint64_t hash_place(const double at[3])
 {
-    uint64_t h = (point + 1) * 0x9E3779B97F4A7C15u;
-    h = (h ^ h >> 30) * 0xBF58476D1CE4E5B9u;
-    h = (h ^ h >> 27) * 0x94D049BB133111EBu;
-    return !((h ^ h >> 31) & (((uint64_t)1 << halved) - 1));
+    uint64_t h = 0;
+    for (int c = 0; c < 3; c++) {
+        const double v = at[c] + 0.0; /* no -0 */
+        uint64_t bits;
+        memcpy(&bits, &v, sizeof bits);
+        h = spl_hash_mix(h + SPL_GOLDEN_64 + bits);
+    }
+    return h;
+}
+
+static bool is_drawn(const struct spl_strays *s, uint64_t hash)
+{
+    return !(hash & (((uint64_t)1 << s->halved) - 1));
+}
+
+/* Into the sample, unless its place is there, or all slots near its own are full, as whoever makes a scan may want. */
+static void take(struct spl_strays *s, const double at[3], uint64_t hash)
+{
+    double *const x = s->sample, *const y = x + sample_most, *const z = y + sample_most;
+    size_t slot = spl_hash_slot(hash, slots - 1);
+    for (int i = 0; i < probes && s->count < sample_most; i++, slot = (slot + 1) % slots) {
+        const uint32_t there = s->slots[slot];
+        if (there && x[there - 1] == at[0] && y[there - 1] == at[1] && z[there - 1] == at[2])
+            return;
+        if (there)
+            continue;
+        x[s->count] = at[0];
+        y[s->count] = at[1];
+        z[s->count] = at[2];
+        s->slots[slot] = (uint32_t)++s->count;
+        return;
+    }
 }
 
 static void halve(struct spl_strays *s)
@@ -119,26 +152,38 @@ static void halve(struct spl_strays *s)
     const size_t count = s->count;
     s->halved++;
     s->count = 0;
+    memset(s->slots, 0, slots * sizeof *s->slots);
     for (size_t i = 0; i < count; i++) {
-        if (!is_drawn((uint64_t)s->sample[3 * sample_most + i], s->halved))
-            continue;
-        for (size_t c = 0; c < 4; c++)
-            s->sample[c * sample_most + s->count] = s->sample[c * sample_most + i];
-        s->count++;
+        const double at[3] = {s->sample[i], s->sample[sample_most + i], s->sample[2 * sample_most + i]};
+        const uint64_t hash = hash_place(at);
+        if (is_drawn(s, hash))
+            take(s, at, hash);
     }
+}
+
+static void finish(struct spl_strays *s)
+{
+    free(s->sample);
+    free(s->slots);
+    *s = (struct spl_strays){0};
 }
 
 void spl_strays_add(struct spl_strays *s, const struct spl_point_batch *batch)
 {
-    if (!s->sample && !(s->sample = spl_alloc_raw(4 * (size_t)sample_most, sizeof *s->sample, NULL)))
-        return;
-    for (size_t i = 0; i < batch->count; i++, s->seen++) {
-        if (!is_drawn(s->seen, s->halved))
+    if (!s->sample) {
+        s->sample = spl_alloc_raw(4 * (size_t)sample_most, sizeof *s->sample, NULL);
+        s->slots = spl_alloc(slots, sizeof *s->slots, NULL);
+        if (!s->sample || !s->slots) {
+            finish(s);
+            return;
+        }
+    }
+    for (size_t i = 0; i < batch->count; i++) {
+        const uint64_t hash = hash_place(batch->position[i]);
+        if (!is_drawn(s, hash))
             continue;
-        for (size_t c = 0; c < 3; c++)
-            s->sample[c * sample_most + s->count] = batch->position[i][c];
-        s->sample[3 * sample_most + s->count] = (double)s->seen;
-        if (++s->count == sample_most)
+        take(s, batch->position[i], hash);
+        if (s->count == sample_most && s->halved < halved_most)
             halve(s);
     }
 }
@@ -150,7 +195,6 @@ bool spl_strays_tell(struct spl_strays *s, const double min[3], const double max
         double *const axis[3] = {s->sample, s->sample + sample_most, s->sample + 2 * sample_most};
         found = judge(axis, s->count, s->sample + 3 * sample_most, min, max, text);
     }
-    free(s->sample);
-    *s = (struct spl_strays){0};
+    finish(s);
     return found;
 }

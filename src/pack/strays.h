@@ -10,12 +10,12 @@ enum { SPL_STRAYS_TEXT_MAX = 400 };
  * there is no memory. Needs ordered points. */
 bool spl_strays_find(const struct spl_points *points, char text[SPL_STRAYS_TEXT_MAX]);
 
-/* The same of points that are not kept, batch by batch. Zeroed before the first one. */
+/* The same of points that are not kept, batch by batch, in whatever order. Zeroed before the first one. */
 struct spl_strays {
-    double *sample; // x, y, z and which point; NULL: nothing added
+    double *sample;  // x, y, z of places, each once, and room for one more; NULL: nothing added
+    uint32_t *slots; // 1 + its number in the sample, by a place's hash
     size_t count;
-    uint64_t seen;
-    unsigned halved; // the sample has one of 2^halved
+    unsigned halved; // the sample has one place of 2^halved
 };
 
 void spl_strays_add(struct spl_strays *strays, const struct spl_point_batch *batch);

@@ -326,6 +326,36 @@ static void test_strays(void **state)
     }
 }
 
+/* A place that pixels without an echo repeat is one point, as it is to a pack: in a tenth of the rows, or in all but a
+ * few, beside more places than are looked at or fewer. */
+static void test_repeated_places_are_one_point(void **state)
+{
+    (void)state;
+    static const struct {
+        int points, of, zeros; /* places; of so many rows so many are zeros */
+    } cases[] = {{180000, 10, 1}, {50000, 10, 1}, {5000, 40, 39}, {180000, 0, 0}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        static char text[220000 * 24], output[16384];
+        size_t used = 0;
+        for (int i = 0, row = 0; i < cases[k].points; row++)
+            if (cases[k].of && row % cases[k].of < cases[k].zeros) {
+                used += (size_t)sprintf(text + used, "%s0 0 0\n", row % 3 ? "" : "-");
+            } else {
+                used += (size_t)sprintf(text + used, "%d %d %d\n", 600000 + i % 500, 5300000 + i / 500, 400 + i % 7);
+                i++;
+            }
+        write_text("zeros.xyz", text);
+        json_t *json = json_of("zeros.xyz"), *warnings = json_object_get(json_object_get(json, "pack"), "warnings");
+        assert_int_equal(run("pack zeros.xyz -o zeros.spld 2>&1", output, sizeof output), 0);
+        const char *told = json_string_value(json_array_get(warnings, 0)), strays[] = "nearly all points lie between";
+        if (!cases[k].of)
+            assert_true(!told && !strstr(output, strays) && !strstr(output, "% of all points"));
+        else if (!told || !strstr(told, strays) || !strstr(output, strays))
+            fail_msg("%zu: info: %s; pack: %s", k, told, output);
+        json_decref(json);
+    }
+}
+
 static int make_folder(void **state)
 {
     (void)state;
@@ -348,6 +378,7 @@ int main(void)
         cmocka_unit_test(test_columns_by_their_values),
         cmocka_unit_test(test_metres_beside_feet), cmocka_unit_test(test_panoramas),
         cmocka_unit_test(test_strays),
+        cmocka_unit_test(test_repeated_places_are_one_point),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
