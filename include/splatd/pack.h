@@ -113,7 +113,7 @@ struct spl_pack_options {
     const char *const *inputs; /* scans; folders, for all scans below them; @NAME, a list with a path a line */
     size_t input_count;
     const char *output;        /* NAME.spld */
-    const char *columns;       /* text inputs, may be NULL */
+    const char *columns;       /* of text inputs, of which there must then be one; may be NULL */
     bool intensity;            /* grey from intensity where a scan has one, whatever colours it has */
     unsigned neighbours;       /* K of eq. 20 and of the PCA; 0 = 12 */
     double position_error;     /* mean, as a share of the splat radius; 0 = 0.016 */

@@ -37,7 +37,7 @@ static int take_verify(void *arguments, const char *option, char *text, struct s
 static const struct spl_cmd_option options[] = {
     {"json", NULL, "one JSON object a line", SPL_CMD_FLAG(struct arguments, json)},
     {"dictionary", "PNG", "where the picture goes; one dataset with textures", SPL_CMD_TEXT(struct arguments, picture)},
-    {"columns", "LIST", "of text scans: x y z r g b intensity class nx ny nz -",
+    {"columns", "LIST", "of text scans, of which there must be one: x y z r g b intensity class nx ny nz -",
      SPL_CMD_TEXT(struct arguments, columns)},
     {"verify", NULL,
      "check the pages' checksums too, also of a collection's tiles on disk; read all points of scans (default)",
@@ -92,6 +92,16 @@ static int check_tiles(struct spl_info_report *report, struct spl_error *err)
     return rc;
 }
 
+/* Of scans the library says which have any use for them. */
+static int check_columns(char **paths, struct spl_error *err)
+{
+    for (char **path = paths; *path; path++)
+        if (spl_info_is_scan(*path))
+            return SPL_OK;
+    return spl_fail(err, SPL_E_USAGE,
+                    "--columns names the columns of texts (XYZ, PTS, CSV and such); %.300s is a dataset", *paths);
+}
+
 int spl_cmd_info(int argc, char **argv)
 {
     struct arguments a = {0};
@@ -109,6 +119,8 @@ int spl_cmd_info(int argc, char **argv)
     if (!parsed && a.picture && spl_info_is_scan(argv[optind]))
         parsed = spl_fail(&wrong, SPL_E_USAGE, "--dictionary is the picture of a dataset; %.300s is a scan",
                           argv[optind]);
+    if (!parsed && a.columns)
+        parsed = check_columns(argv + optind, &wrong);
     if (parsed)
         return spl_cmd_fail(&wrong);
     int worst = 0; /* the remaining files are still told of */

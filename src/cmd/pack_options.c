@@ -100,7 +100,7 @@ static int take_view(void *arguments, const char *option, char *text, struct spl
 static const struct spl_cmd_option options[] = {
     {"output", "NAME.spld", "replaced in one step when everything has been written", .letter = 'o',
      SPL_CMD_TEXT(struct spl_cmd_pack, pack.output)},
-    {"columns", "LIST", "of text inputs: x y z r g b intensity class nx ny nz -",
+    {"columns", "LIST", "of text inputs, of which there must be one: x y z r g b intensity class nx ny nz -",
      SPL_CMD_TEXT(struct spl_cmd_pack, pack.columns)},
     {"intensity", NULL, "grey from intensity where a scan has one, whatever colours it has",
      SPL_CMD_FLAG(struct spl_cmd_pack, pack.intensity)},

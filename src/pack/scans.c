@@ -82,6 +82,22 @@ int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_clou
     return rc;
 }
 
+/* Columns of texts that are named where no scan is one: whoever named them expects to see them. Beside texts other
+ * scans are read as they are. */
+static int check_columns(const struct spl_scans *scans, struct spl_error *err)
+{
+    struct spl_names names = {0};
+    for (size_t i = 0; i < scans->count; i++) {
+        if (!strcmp(scans->list[i].format, "text") || !strcmp(scans->list[i].format, "PTS"))
+            return SPL_OK;
+        spl_names_add(&names, scans->list[i].name);
+    }
+    return spl_fail_field(err, SPL_E_USAGE, "columns",
+                          "--columns names the columns of texts (XYZ, PTS, CSV and such); %s %s%s: leave it out",
+                          spl_names_list(&names), scans->count > 1 ? "are none" : "is ",
+                          scans->count > 1 ? "" : scans->list[0].format);
+}
+
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
                    struct spl_stage *stage, struct spl_error *err)
 {
@@ -110,6 +126,8 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
     spl_stage_end(stage);
     if (!rc && !scans->count)
         rc = spl_inputs_fail_empty(inputs, err);
+    if (!rc && how->columns)
+        rc = check_columns(scans, err);
     if (rc)
         spl_scans_finish(scans);
     else

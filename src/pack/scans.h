@@ -51,8 +51,8 @@ struct spl_scans {
 };
 
 /* Opens each scan once, so that one that cannot be read is refused, or left out, before hours of work, and decides how
- * colours are taken. `inputs` is held. Points are counted by spl_points_gather(). On failure nothing is held. Blocks.
- */
+ * colours are taken. `inputs` is held. Points are counted by spl_points_gather(). SPL_E_USAGE where `how` names columns
+ * and no scan is a text. On failure nothing is held. Blocks. */
 int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const struct spl_cloud_options *how,
                    struct spl_stage *stage, struct spl_error *err);
 

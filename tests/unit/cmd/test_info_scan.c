@@ -197,6 +197,11 @@ static void test_options(void **state)
     assert_int_equal(run("info c.xyz --columns x,y,z,class", output, sizeof output), 0);
     assert_non_null(strstr(output, "  attributes    class\n"));
     assert_int_equal(run("info c.xyz --columns x,y,z,class,r 2>&1", output, sizeof output), 2);
+    assert_int_equal(run("info a.ply --columns x,y,z 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "--columns names the columns of texts (XYZ, PTS, CSV and such); a.ply is PLY"));
+    assert_int_equal(run("info a.spld --columns x,y,z 2>&1", output, sizeof output), 2);
+    assert_non_null(strstr(output, "a.spld is a dataset"));
+    assert_int_equal(run("info a.ply c.xyz --columns x,y,z,class", output, sizeof output), 0);
     assert_int_equal(run("info c.xyz --dictionary atoms.png 2>&1", output, sizeof output), 2);
     assert_non_null(strstr(output, "--dictionary is the picture of a dataset; c.xyz is a scan"));
     write_text("half.spld", "SPLD\r\nand no more");

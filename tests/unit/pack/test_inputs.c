@@ -572,6 +572,38 @@ static int end(void **state)
     return system(command);
 }
 
+/* Columns that are named where no scan is a text are refused, by the scans' names; beside a text they are its. */
+static void test_columns_without_a_text(void **state)
+{
+    (void)state;
+    write_text(path_of("a.ply"), "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                                 "property float z\nproperty float heat\nend_header\n1 2 3 9\n4 5 6 8\n");
+    write_text(path_of("b.pcd"), "FIELDS x y z\nWIDTH 2\nDATA ascii\n1 2 4\n4 5 7\n");
+    write_text(path_of("c.csv"), "1;2;5;9\n4;5;8;8\n");
+    const char *inputs[] = {path_of("a.ply"), path_of("b.pcd"), path_of("c.csv")};
+    static const struct {
+        size_t first, count;
+        const char *said; /* NULL: packed */
+    } cases[] = {{0, 1, "--columns names the columns of texts (XYZ, PTS, CSV and such); a.ply is PLY: leave it out"},
+                 {1, 1, "b.pcd is PCD: leave it out"},
+                 {0, 2, "a.ply, b.pcd are none: leave it out"},
+                 {0, 3, NULL},
+                 {2, 1, NULL}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct spl_pack_options options = {.size = sizeof options,
+                                           .inputs = inputs + cases[i].first,
+                                           .input_count = cases[i].count,
+                                           .output = path_of("out.spld"),
+                                           .threads = 1,
+                                           .columns = "x,y,z,class"};
+        struct spl_error err = {0};
+        int rc = spl_pack(&options, NULL, &err);
+        if (rc != (cases[i].said ? SPL_E_USAGE : SPL_OK) ||
+            (cases[i].said && (strcmp(err.field, "columns") || !strstr(err.message, cases[i].said))))
+            fail_msg("%zu: %d: %s: %s", i, rc, err.field, err.message);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -588,6 +620,7 @@ int main(void)
         cmocka_unit_test_setup(test_the_broken_are_as_never_named, empty_folder),
         cmocka_unit_test_setup(test_the_broken_have_no_share_in_grey, empty_folder),
         cmocka_unit_test_setup(test_many_scans, empty_folder),
+        cmocka_unit_test_setup(test_columns_without_a_text, empty_folder),
         cmocka_unit_test_setup(test_the_command, empty_folder),
     };
     if (!mkdtemp(folder))
