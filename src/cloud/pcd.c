@@ -19,6 +19,7 @@
 #include "cloud/fields.h"
 #include "cloud/little.h"
 #include "cloud/packed.h"
+#include "cloud/synonyms.h"
 
 enum { sizes_bytes = 8 };
 enum { lzf_most = 88 }; /* bytes that a byte gives: the longest match is 264 from 3 */
@@ -51,15 +52,30 @@ static int take_column(struct spl_cloud *cloud, struct spl_pcd_field *field)
     return field->count == 1 ? spl_cloud_take_column(cloud, field->name, length) : SPL_COLUMN_SKIP;
 }
 
-static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
+/* By their own names, then by others. */
+static void take_names(struct spl_cloud *cloud)
 {
     struct pcd *pcd = cloud->state;
-    cloud->integer_colors = true;
+    struct spl_field_name fields[SPL_PCD_FIELDS];
+    unsigned count = 0;
     for (unsigned i = 0; i < pcd->header.field_count; i++) {
         struct spl_pcd_field *field = &pcd->header.fields[i];
         if (is_padding(field)) /* neither is a list a number of the point */
             continue;
         field->column = (int8_t)take_column(cloud, field);
+        if (field->count == 1)
+            fields[count++] = (struct spl_field_name){field->name, &field->column};
+    }
+    spl_cloud_take_synonyms(cloud, fields, count);
+}
+
+static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
+{
+    struct pcd *pcd = cloud->state;
+    take_names(cloud);
+    cloud->integer_colors = true;
+    for (unsigned i = 0; i < pcd->header.field_count; i++) {
+        struct spl_pcd_field *field = &pcd->header.fields[i];
         if (field->column >= SPL_COLUMN_X && field->column <= SPL_COLUMN_Z)
             cloud->info.coordinates.floats |= pcd->header.data != SPL_PCD_ASCII && field->type == SPL_NUMBER_FLOAT32;
         if (field->column >= SPL_COLUMN_RED && field->column <= SPL_COLUMN_BLUE) {

@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "cloud/fields.h"
 #include "cloud/packed.h"
+#include "cloud/synonyms.h"
 
 struct ply {
     struct spl_ply_header header;
@@ -240,11 +241,27 @@ static int check_byte_order(struct spl_cloud *cloud, struct spl_error *err)
     return SPL_OK;
 }
 
+/* Columns of the vertices' properties that no own name says. */
+static void take_synonyms(struct spl_cloud *cloud)
+{
+    struct ply *ply = cloud->state;
+    const struct spl_ply_element *element = vertices(ply);
+    struct spl_field_name fields[SPL_PLY_PROPERTIES];
+    unsigned count = 0;
+    for (unsigned i = 0; i < element->properties; i++) {
+        struct spl_ply_property *p = &ply->header.properties[element->first + i];
+        if (!p->count_type) /* a list is no number of the point */
+            fields[count++] = (struct spl_field_name){p->name, &p->column};
+    }
+    spl_cloud_take_synonyms(cloud, fields, count);
+}
+
 static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
 {
     struct ply *ply = cloud->state;
     const struct spl_ply_element *element = vertices(ply);
 
+    take_synonyms(cloud);
     cloud->integer_colors = true;
     for (unsigned i = 0; i < element->properties; i++) {
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];

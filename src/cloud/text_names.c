@@ -1,26 +1,12 @@
-/* Columns of a text by their headings: names that every format knows first, then what surveyors and other languages
- * call them, without the unit in brackets behind. Longitudes and latitudes are no coordinates. Pure functions. */
+/* Columns of a text by their headings: names that every format knows first, then synonyms (synonyms.h), without the
+ * unit in brackets behind. Longitudes and latitudes are no coordinates. Pure functions. */
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "cloud/fields.h"
+#include "cloud/synonyms.h"
 #include "cloud/text.h"
-
-static bool is(const char *name, size_t length, const char *other)
-{
-    return strlen(other) == length && !strncasecmp(other, name, length);
-}
-
-static bool is_one_of(const char *const *words, size_t count, const char *name, size_t length)
-{
-    for (size_t i = 0; i < count; i++)
-        if (is(name, length, words[i]))
-            return true;
-    return false;
-}
-
-#define IS_ONE_OF(words, name, length) is_one_of(words, sizeof(words) / sizeof *(words), name, length)
 
 /* The next heading. Between blanks "[m]" is the unit of the one before. */
 static bool next_name(struct spl_fields *fields, const char **name, size_t *length)
@@ -49,188 +35,6 @@ static size_t without_words(const char *name, size_t length)
     return bare;
 }
 
-/* What other languages, surveyors and programs call columns: small letters, without what only parts words. Letters
- * beyond ASCII are in UTF-8 and Latin-1, and in both cases, since nothing makes them small here. */
-static int column_from_word(const char *word)
-{
-    static const struct {
-        const char *words; /* with a blank on each side */
-        int column;
-    } synonyms[] = {
-        {" x easting east rechtswert ostwert ost est este \xc3\xb6st \xc3\x96st \xf6st \xd6st oost utme points0 ",
-         SPL_COLUMN_X},
-        {" y northing north hochwert nordwert nord norte norr noord utmn points1 ", SPL_COLUMN_Y},
-        {" z up height elevation elev h hoehe h\xc3\xb6he h\xc3\x96he h\xf6he h\xd6he altitude altitud alt cota quota "
-         "h\xc3\xb6jd h\xf6jd hojd hoogte points2 ",
-         SPL_COLUMN_Z},
-        {" red r rot rouge rosso rojo vermelho rood ", SPL_COLUMN_RED},
-        {" green g gr\xc3\xbcn gr\xc3\x9cn gr\xfcn gr\xdcn gruen vert verde groen ", SPL_COLUMN_GREEN},
-        {" blue b blau bleu blu azul blauw ", SPL_COLUMN_BLUE},
-        {" int intensit\xc3\xa4t intensit\xc3\x84t intensit\xe4t intensit\xc4t intensitaet intensit\xc3\xa9 "
-         "intensit\xc3\x89 intensit\xe9 intensit\xc9 intensidad intensidade intensit\xc3\xa0 intensiteit reflectivity ",
-         SPL_COLUMN_INTENSITY},
-        {" klasse classe clase ", SPL_COLUMN_CLASS},
-    };
-    char between[48];
-    snprintf(between, sizeof between, " %s ", word);
-    for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
-        if (strstr(synonyms[i].words, between))
-            return synonyms[i].column;
-    return SPL_COLUMN_SKIP;
-}
-
-static int column_from_rest(const char *word, bool axes)
-{
-    return !axes || (word[0] && !word[1] && strchr("xyz", word[0])) ? column_from_word(word) : SPL_COLUMN_SKIP;
-}
-
-/* The column that a word means without what says that it is one: "posx", "xcoordinate", "eastingm". `axes`: if it is x,
- * y or z. */
-static int column_from_part(const char *word, bool axes)
-{
-    static const struct {
-        const char *text;
-        bool before, behind;
-    } affixes[] = {{"coordinates", true, true}, {"coordinate", true, true},   {"coord", true, true},
-                   {"koordinate", true, true},  {"coordinaat", true, true},   {"co\xc3\xb6rdinaat", true, true},
-                   {"position", true, true},    {"pos", true, true},          {"point", true, false},
-                   {"wert", false, true},       {"value", false, true},       {"color", true, true},
-                   {"colour", true, true},      {"ellipsoidal", true, false}, {"orthometric", true, false},
-                   {"m", false, true},          {"ft", false, true}};
-    size_t length = strlen(word);
-    int column = SPL_COLUMN_SKIP;
-    for (size_t i = 0; i < sizeof affixes / sizeof *affixes && column < 0; i++) {
-        size_t size = strlen(affixes[i].text);
-        char rest[40];
-        if (size >= length)
-            continue;
-        if (affixes[i].before && !memcmp(word, affixes[i].text, size))
-            column = column_from_rest(word + size, axes);
-        snprintf(rest, sizeof rest, "%.*s", (int)(length - size), word);
-        if (column < 0 && affixes[i].behind && !memcmp(word + length - size, affixes[i].text, size))
-            column = column_from_rest(rest, axes);
-    }
-    return column;
-}
-
-/* The next word of a heading, of letters and digits; 0 at the end. */
-static size_t next_word(const char **p, const char *end)
-{
-    size_t length = 0;
-    while (*p < end && strchr(" \t_-.:,/", **p))
-        (*p)++;
-    while (*p + length < end && !strchr(" \t_-.:,/", (*p)[length]))
-        length++;
-    return length;
-}
-
-static bool is_height(const char *word, size_t length)
-{
-    static const char *const heights[] = {"z",       "h",      "hoehe",     "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he",
-                                          "h\xd6he", "height", "elevation", "elev",        "altitude",    "alt",
-                                          "altitud", "cota",   "quota",     "hoogte",      "h\xc3\xb6jd", "h\xf6jd"};
-    return IS_ONE_OF(heights, word, length);
-}
-
-/* "Höhe ü. NN", "Altitude NGF", "H m a.s.l.": a height and what it counts from. Other words may make it
- * one of an instrument or a reflector. */
-static bool is_height_above(const char *name, size_t length)
-{
-    static const char *const from[] = {"\xc3\xbc",
-                                       "\xc3\x9c",
-                                       "\xfc",
-                                       "\xdc",
-                                       "ue",
-                                       "\xc3\xbc"
-                                       "ber",
-                                       "\xfc"
-                                       "ber",
-                                       "ueber",
-                                       "above",
-                                       "over",
-                                       "m",
-                                       "ft",
-                                       "a",
-                                       "s",
-                                       "l",
-                                       "sl",
-                                       "sea",
-                                       "level",
-                                       "mean",
-                                       "msl",
-                                       "amsl",
-                                       "masl",
-                                       "\xc3\xbcm",
-                                       "\xfcm",
-                                       "\xc3\xbcnn",
-                                       "\xfcnn",
-                                       "\xc3\xbcnhn",
-                                       "\xfcnhn",
-                                       "nn",
-                                       "nhn",
-                                       "dhhn",
-                                       "dhhn12",
-                                       "dhhn92",
-                                       "dhhn2016",
-                                       "ln02",
-                                       "lhn95",
-                                       "ngf",
-                                       "ign69",
-                                       "nap",
-                                       "rh2000",
-                                       "nn2000",
-                                       "dvr90",
-                                       "navd",
-                                       "navd88",
-                                       "ngvd29",
-                                       "egm96",
-                                       "egm2008",
-                                       "evrf2007",
-                                       "odn",
-                                       "ell",
-                                       "ellipsoid",
-                                       "ellipsoidal",
-                                       "ellipsoidisch",
-                                       "ortho",
-                                       "orthometric",
-                                       "orthometrisch"};
-    const char *p = name, *end = name + length;
-    unsigned heights = 0, others = 0;
-    for (size_t size; (size = next_word(&p, end)); p += size) {
-        if (is_height(p, size))
-            heights++;
-        else if (IS_ONE_OF(from, p, size))
-            others++;
-        else
-            return false;
-    }
-    return heights == 1 && others;
-}
-
-/* Only where no column has the name itself: what surely is an axis before other words, and parts of those last. */
-enum pass { PASS_AXES, PASS_WORDS, PASS_PARTS, PASSES };
-
-static int column_from_synonym(const char *name, size_t length, bool letters, enum pass pass)
-{
-    char word[40];
-    size_t n = 0;
-    if (letters && pass == PASS_WORDS && is(name, length, "e"))
-        return SPL_COLUMN_X;
-    if (letters && pass == PASS_WORDS && is(name, length, "n"))
-        return SPL_COLUMN_Y;
-    if (pass == PASS_PARTS && is_height_above(name, length))
-        return SPL_COLUMN_Z;
-    for (size_t i = 0; i < length && n + 1 < sizeof word; i++)
-        if (!strchr(" _-.:", name[i]))
-            word[n++] = (char)(name[i] >= 'A' && name[i] <= 'Z' ? name[i] + 32 : name[i]);
-    word[n] = 0;
-    if (n == 0 || n + 1 == sizeof word)
-        return SPL_COLUMN_SKIP;
-    if (pass == PASS_AXES && column_from_rest(word, true) >= 0) /* "X [m]" */
-        return column_from_word(word);
-    return pass == PASS_WORDS ? column_from_word(word) : column_from_part(word, pass == PASS_AXES);
-}
-
 bool spl_text_names_degrees(const char *line, size_t length)
 {
     static const char *const degrees[] = {"lon", "lat", "long", "longitude", "latitude"};
@@ -238,7 +42,7 @@ bool spl_text_names_degrees(const char *line, size_t length)
     const char *name;
     size_t size;
     while (next_name(&fields, &name, &size))
-        if (IS_ONE_OF(degrees, name, without_words(name, size)))
+        if (SPL_NAME_IS_ONE_OF(degrees, name, without_words(name, size)))
             return true;
     return false;
 }
@@ -251,7 +55,7 @@ static bool has_letters(struct spl_fields fields)
     unsigned found = 0;
     while (next_name(&fields, &name, &length)) {
         length = without_words(name, length);
-        found |= is(name, length, "e") ? 1 : is(name, length, "n") ? 2 : 0;
+        found |= spl_name_is(name, length, "e") ? 1 : spl_name_is(name, length, "n") ? 2 : 0;
     }
     return found == 3;
 }
@@ -259,16 +63,16 @@ static bool has_letters(struct spl_fields fields)
 static void take_synonyms(struct spl_layout *layout, struct spl_fields fields)
 {
     bool letters = has_letters(fields);
-    for (int pass = 0; pass < PASSES; pass++) {
-        if (pass == PASS_WORDS)
+    for (enum spl_synonym_pass pass = 0; pass < SPL_SYNONYM_PASSES; pass++) {
+        if (pass == SPL_SYNONYM_WORDS)
             layout->letters = spl_layout_has(layout, SPL_COLUMN_X) && spl_layout_has(layout, SPL_COLUMN_Y);
         struct spl_fields again = fields;
         const char *name;
         size_t length;
         for (unsigned i = 0; i < layout->fields && next_name(&again, &name, &length); i++) {
-            int column = column_from_synonym(name, without_unit(name, length), letters, (enum pass)pass);
+            int column = spl_column_from_synonym(name, without_unit(name, length), letters, pass);
             if (column < 0)
-                column = column_from_synonym(name, without_words(name, length), letters, (enum pass)pass);
+                column = spl_column_from_synonym(name, without_words(name, length), letters, pass);
             if (column > SPL_COLUMN_Z && without_words(name, length) < without_unit(name, length))
                 column = SPL_COLUMN_SKIP; /* "r_m" is a range, and no red */
             if (column >= 0 && layout->column[i] < 0 && !spl_layout_has(layout, column))
@@ -290,13 +94,13 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
     bool numbered = false;
     for (unsigned i = 0, stage = 0; next_name(&fields, &name, &length); i++) {
         length = without_words(name, length);
-        numbered |= !stage && IS_ONE_OF(numbers, name, length);
+        numbered |= !stage && SPL_NAME_IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && layout->column[i] == SPL_COLUMN_Z;
         const char *blank = memchr(name, ' ', length);
-        bool german = IS_ONE_OF(heights, name, blank ? (size_t)(blank - name) : length);
-        int axis = is(name, length, "x")   ? SPL_COLUMN_X
-                   : is(name, length, "y") ? SPL_COLUMN_Y
-                                           : column_from_synonym(name, length, false, PASS_AXES);
+        bool german = SPL_NAME_IS_ONE_OF(heights, name, blank ? (size_t)(blank - name) : length);
+        int axis = spl_name_is(name, length, "x")   ? SPL_COLUMN_X
+                   : spl_name_is(name, length, "y") ? SPL_COLUMN_Y
+                                                    : spl_column_from_synonym(name, length, false, SPL_SYNONYM_AXES);
         stage = stage == 1 && axis == SPL_COLUMN_X ? 2 : axis == SPL_COLUMN_Y ? 1 : 0;
         layout->doubtful |= height && german && !numbered;
         if (height && numbered) {

@@ -311,6 +311,24 @@ static void viewpoint_is_a_station(void **state)
     loaded_finish(&l);
 }
 
+/* Fields are known by the headings of texts too, but for those of several numbers. */
+static void names_of_other_programs(void **state)
+{
+    const struct field fields[] = {{"Northing", 'F', 4, 1, {4, 5, 6}}, {"rot", 'U', 1, 1, {9, 19, 29}},
+                                   {"gruen", 'U', 1, 1, {10, 20, 30}}, {"blau", 'U', 1, 1, {11, 21, 31}},
+                                   {"height", 'F', 4, 2, {0, 0, 0}},   {"EASTING", 'F', 8, 1, {1, 2, 3}},
+                                   {"Elevation", 'F', 4, 1, {7, 8, 9}}};
+    (void)state;
+    for (int kind = 0; kind < KINDS; kind++) {
+        struct loaded l;
+        load_fields((enum kind)kind, fields, 7, &l);
+        assert_int_equal(l.attributes, SPL_CLOUD_COLOR);
+        assert_point(&l, 1, 2, 5, 8);
+        assert_color(&l, 2, 29, 30, 31);
+        loaded_finish(&l);
+    }
+}
+
 /* The library leaves padding out of compressed data, other programs do not. */
 static void padding_of_compressed_data(void **state)
 {
@@ -442,6 +460,7 @@ int main(void)
         cmocka_unit_test(colors_as_text),
         cmocka_unit_test(headers_in_any_order),
         cmocka_unit_test(viewpoint_is_a_station),
+        cmocka_unit_test(names_of_other_programs),
         cmocka_unit_test(padding_of_compressed_data),
         cmocka_unit_test(broken_headers),
         cmocka_unit_test(long_headers_are_refused),

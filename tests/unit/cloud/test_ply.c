@@ -4,6 +4,8 @@
 #include <endian.h>
 #include <math.h>
 
+#include "cloud/rows.h"
+
 static const char *const orders[] = {"ascii", "binary_little_endian", "binary_big_endian"};
 
 static void put_scalar(struct bytes *b, int order, const char *type, double v)
@@ -450,6 +452,69 @@ static void names_that_want_the_same(void **state)
         }
 }
 
+/* Names as PDAL and CloudCompare write them, and as headings of texts are, in whatever case; of two that mean the same
+ * the column's own. */
+static void names_of_other_programs(void **state)
+{
+    enum { most = 12 };
+    static const struct {
+        const char *names; /* with the values 1, 2, 3, … */
+        uint32_t attributes, columns;
+    } all[] = {
+        {"X Y Z Intensity ReturnNumber NumberOfReturns Classification Red Green Blue",
+         SPL_CLOUD_COLOR | SPL_CLOUD_CLASS,
+         7 << SPL_COLUMN_RED | 1 << SPL_COLUMN_INTENSITY | 1 << SPL_COLUMN_RETURN | 1 << SPL_COLUMN_RETURNS},
+        {"X Y Z NormalX NormalY NormalZ", SPL_CLOUD_NORMAL, 7 << SPL_COLUMN_NX},
+        {"x y z scalar_Reflectance scalar_Return_Number scalar_Number_Of_Returns", SPL_CLOUD_COLOR,
+         1 << SPL_COLUMN_INTENSITY | 1 << SPL_COLUMN_RETURN | 1 << SPL_COLUMN_RETURNS},
+        {"x y z diffuse_red diffuse_green diffuse_blue", SPL_CLOUD_COLOR, 7 << SPL_COLUMN_RED},
+        {"Easting NORTHING elevation", 0, 0},
+        {"E N H", 0, 0},
+        {"POINT_X point_y Point_Z", 0, 0},
+        {"x y z height n scalar_Easting", 0, 0},
+        {"rechtswert Hochwert hoehe rot gruen blau reflectivity klasse", SPL_CLOUD_COLOR | SPL_CLOUD_CLASS,
+         7 << SPL_COLUMN_RED | 1 << SPL_COLUMN_INTENSITY},
+        {"x y z intensity int", SPL_CLOUD_COLOR, 1 << SPL_COLUMN_INTENSITY},
+        {"x y z scalar_Reflectivity", SPL_CLOUD_COLOR, 1 << SPL_COLUMN_INTENSITY},
+    };
+    (void)state;
+    for (int order = 0; order < 3; order++)
+        for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+            static struct bytes b;
+            char names[128];
+            struct loaded l;
+            struct spl_cloud *cloud = NULL;
+            int count = 0;
+            b.length = 0;
+            put_text(&b, "ply\nformat %s 1.0\nelement vertex 2\n", orders[order]);
+            snprintf(names, sizeof names, "%s", all[i].names);
+            for (char *name = strtok(names, " "); name; name = strtok(NULL, " "), count++)
+                put_text(&b, "property float %s\n", name);
+            assert_true(count <= most);
+            put_text(&b, "end_header\n");
+            for (int row = 0; row < 2; row++, end_row(&b, order))
+                for (int k = 0; k < count; k++)
+                    put_scalar(&b, order, "float", (row + 1) * (k + 1));
+            load_bytes(&b, NULL, 2, &l);
+            if (l.code < 0)
+                fail_msg("%s: %s", all[i].names, l.err.message);
+            assert_point(&l, 0, 1, 2, 3);
+            assert_point(&l, 1, 2, 4, 6);
+            assert_int_equal(spl_cloud_open(scratch_path(), NULL, &cloud, NULL), 0);
+            uint32_t columns = spl_cloud_get_info(cloud)->columns & ~(7u | 1u << SPL_COLUMN_CLASS);
+            if (l.attributes != all[i].attributes || columns != all[i].columns)
+                fail_msg("%s: attributes %x, columns %x", all[i].names, l.attributes, columns);
+            spl_cloud_destroy(cloud);
+            loaded_finish(&l);
+        }
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty double lon\nproperty double lat\n"
+                 "property float height\nend_header\n1 2 3\n",
+                 SPL_E_INPUT, "x", "it has \"lon, lat, height\"");
+    refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x_ft\nproperty float y_ft\n"
+                 "property float z_ft\nend_header\n1 2 3\n",
+                 SPL_E_INPUT, "x", "it has \"x_ft, y_ft, z_ft\""); /* a unit that would be lost */
+}
+
 /* Centres of Gaussians are no points of a scan; an opacity alone makes none. */
 static void gaussians_are_no_scan(void **state)
 {
@@ -603,6 +668,7 @@ int main(void)
         cmocka_unit_test(gaussians_are_no_scan),
         cmocka_unit_test(rows_behind_the_last_are_counted),
         cmocka_unit_test(names_that_want_the_same),
+        cmocka_unit_test(names_of_other_programs),
         cmocka_unit_test(every_type_and_byte_order),
         cmocka_unit_test(doubles_are_exact),
         cmocka_unit_test(other_elements_and_lists_are_skipped),
