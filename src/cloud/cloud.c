@@ -145,9 +145,14 @@ void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t leng
 
 void spl_cloud_add_unused(struct spl_cloud *cloud, const char *name, size_t length, const char *why)
 {
-    char *unused = cloud->info.unused;
-    const size_t used = strlen(unused), size = sizeof cloud->info.unused - used;
-    snprintf(unused + used, size, why ? "%s%.*s (%s)" : "%s%.*s", used ? ", " : "", (int)length, name, why);
+    static const char more[] = ", …";
+    char *unused = cloud->info.unused, entry[160];
+    const size_t used = strlen(unused), room = sizeof cloud->info.unused - used;
+    const bool cut = used >= sizeof more - 1 && !strcmp(unused + used - (sizeof more - 1), more);
+    size_t size =
+        (size_t)snprintf(entry, sizeof entry, why ? "%s%.*s (%s)" : "%s%.*s", used ? ", " : "", (int)length, name, why);
+    if (!cut)
+        snprintf(unused + used, room, "%s", size < sizeof entry && size + sizeof more <= room ? entry : more);
 }
 
 int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length)

@@ -98,8 +98,9 @@ struct spl_cloud_info {
     /* Text whose columns nothing names: what their values say, "x,y,z,nx,ny,nz,-"; else "". Begins with '-' where the
      * first numbers, names or times the points. */
     char guessed[192];
-    /* Headings of a text whose columns fill nothing, as "Code, Dist"; of other files what is called as a colour, and
-     * gives none, "rgb (a list)", or as another one, "x (again)"; "" = none */
+    /* Headings of a text, properties of a PLY and fields of a PCD that fill nothing, as "Code, Dist"; of the latter two
+     * with the reason what is called as a colour, and gives none, "rgb (a list)", or as another one, "x (again)";
+     * ends in "…" where there are more; "" = none */
     char unused[200];
     /* Of a text whose columns nothing names, or the letters X and Y: what is odd about them where x may be the north,
      * "x has seven digits and y six"; static, NULL = nothing */

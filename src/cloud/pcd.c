@@ -62,7 +62,9 @@ static void take_names(struct spl_cloud *cloud)
         struct spl_pcd_field *field = &pcd->header.fields[i];
         if (is_padding(field)) /* neither is a list a number of the point */
             continue;
+        const char *told = cloud->info.unused + strlen(cloud->info.unused);
         field->column = (int8_t)take_column(cloud, field);
+        field->told = *told;
         if (field->count == 1)
             fields[count++] = (struct spl_field_name){field->name, &field->column};
     }
@@ -88,6 +90,12 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
             return spl_source_fail_line(&cloud->source, pcd->header.fields_line, spl_column_name(k), err,
                                         "FIELDS has no such name with a COUNT of 1");
     spl_packed_tell_rest(cloud);
+    for (unsigned i = 0; i < pcd->header.field_count; i++) {
+        const struct spl_pcd_field *field = &pcd->header.fields[i];
+        const bool rest = field->column >= SPL_COLUMN_RED && field->column <= SPL_COLUMN_BLUE; /* told already */
+        if (!field->told && !rest && !is_padding(field) && !spl_column_is_used(cloud->columns, field->column))
+            spl_cloud_add_unused(cloud, field->name, strlen(field->name), NULL);
+    }
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)

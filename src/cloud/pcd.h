@@ -12,6 +12,7 @@ struct spl_pcd_field {
     uint8_t type;    /* enum spl_number */
     int8_t column;   /* enum spl_column; SKIP for what is not read */
     bool packed;     /* red, green and blue in one number: 0x..RRGGBB */
+    bool told;       /* in info.unused, with the reason */
     uint32_t count;  /* numbers of this name in a point */
     uint32_t bytes;  /* of all of them */
     uint32_t offset; /* in a point; compressed: of one byte for each point, in all fields before it */

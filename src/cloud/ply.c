@@ -279,6 +279,12 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
             return spl_source_fail_line(&cloud->source, ply->header.vertex_line, spl_column_name(k), err,
                                         "element vertex has no such property; it has \"%.100s\"", cloud->fields);
     spl_packed_tell_rest(cloud);
+    for (unsigned i = 0; i < element->properties; i++) {
+        const struct spl_ply_property *p = &ply->header.properties[element->first + i];
+        const bool rest = p->column >= SPL_COLUMN_RED && p->column <= SPL_COLUMN_BLUE; /* which is told already */
+        if (!p->told && !rest && !spl_column_is_used(cloud->columns, p->column))
+            spl_cloud_add_unused(cloud, p->name, strlen(p->name), NULL);
+    }
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;
     if (cloud->columns >> SPL_COLUMN_CLASS & 1)

@@ -13,6 +13,7 @@ struct spl_ply_property {
     uint8_t count_type; /* of a list's length, SPL_NUMBER_NONE when it is no list */
     int8_t column;      /* enum spl_column; SKIP for what is not kept */
     bool packed;        /* red, green and blue in one number: 0x..RRGGBB */
+    bool told;          /* in info.unused, with the reason */
     uint16_t offset;    /* in the row, where no list precedes it */
 };
 

@@ -153,6 +153,7 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
     copy_name(p.name, sizeof p.name, words, name);
     p.offset = (uint16_t)element->row_bytes;
     if (header->vertex_line && element == &header->elements[header->vertex]) {
+        const char *told = cloud->info.unused + strlen(cloud->info.unused);
         if (has_vertex_property(header, p.name))
             spl_cloud_add_unused(cloud, p.name, strlen(p.name), "again");
         p.packed = spl_packed_take(cloud, p.name, strlen(p.name), spl_number_bytes(p.type), list);
@@ -162,6 +163,7 @@ static int parse_property(struct spl_cloud *cloud, const struct words *words, st
             p.column = (int8_t)spl_cloud_take_column(cloud, words->word[name], words->length[name]);
         if (!list)
             prefer_own_name(cloud, header, &p);
+        p.told = *told;
     }
     element->row_bytes += spl_number_bytes(list ? p.count_type : p.type);
     element->lists |= list;

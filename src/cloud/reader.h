@@ -64,7 +64,7 @@ const char *spl_cloud_find_wrong_ending(const char *path, const struct spl_cloud
 int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length);
 void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t length);
 
-/* Adds to info.unused, "NAME" or "NAME (WHY)"; `why` may be NULL. */
+/* Adds to info.unused, "NAME" or "NAME (WHY)", or that there are more; `why` may be NULL. */
 void spl_cloud_add_unused(struct spl_cloud *cloud, const char *name, size_t length, const char *why);
 
 /* For messages. */

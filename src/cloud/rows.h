@@ -52,6 +52,16 @@ static inline bool spl_columns_have3(uint32_t mask, int first)
     return (mask >> first & 7u) == 7u;
 }
 
+/* Does a field with this column of `columns` fill anything? Of colours and normals that lack a component none does. */
+static inline bool spl_column_is_used(uint32_t columns, int column)
+{
+    if (column >= SPL_COLUMN_RED && column < SPL_COLUMN_NX)
+        return spl_columns_have3(columns, SPL_COLUMN_RED);
+    if (column >= SPL_COLUMN_NX && column < SPL_COLUMN_CLASS)
+        return spl_columns_have3(columns, SPL_COLUMN_NX);
+    return column >= 0;
+}
+
 struct spl_color_rule spl_color_rule_rgb(double white); /* 1, 255, 1023, … */
 struct spl_color_rule spl_color_rule_grey(double black, double white);
 

@@ -154,18 +154,6 @@ bool spl_layout_from_names(struct spl_layout *layout, const struct spl_keep *kee
     return true;
 }
 
-/* Of colours and normals that lack a component none is used. */
-static bool is_used(const struct spl_layout *layout, unsigned i)
-{
-    int column = layout->column[i];
-    uint32_t taken = spl_layout_taken(layout);
-    if (column >= SPL_COLUMN_RED && column < SPL_COLUMN_NX)
-        return spl_columns_have3(taken, SPL_COLUMN_RED);
-    if (column >= SPL_COLUMN_NX && column < SPL_COLUMN_CLASS)
-        return spl_columns_have3(taken, SPL_COLUMN_NX);
-    return column >= 0;
-}
-
 void spl_layout_list_unused(const struct spl_layout *layout, const char *line, size_t length, char *text, size_t size)
 {
     static const char more[] = ", …";
@@ -173,7 +161,7 @@ void spl_layout_list_unused(const struct spl_layout *layout, const char *line, s
     const char *name;
     size_t used = 0, n;
     for (unsigned i = 0; i < layout->fields && next_name(&fields, &name, &n); i++) {
-        if (is_used(layout, i) || n == 0)
+        if (spl_column_is_used(spl_layout_taken(layout), layout->column[i]) || n == 0)
             continue;
         if (used + n + 2 + sizeof more > size) {
             snprintf(text + used, size - used, "%s", used ? more : "…");

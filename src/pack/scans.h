@@ -60,7 +60,7 @@ int spl_scans_init(struct spl_scans *scans, struct spl_inputs *inputs, const str
 int spl_scan_open(struct spl_scan *scan, const char *path, const struct spl_cloud_options *options, char *fields,
                   struct spl_error *err);
 
-/* What columns and colours of a text were taken for by their values, and which are not used, as a sentence; free().
+/* What columns and colours of a text were taken for by their values, and which fields are not used, a sentence; free().
  * NULL in *text where there is nothing to say. */
 int spl_scan_guess(const struct spl_cloud_info *info, char **text, struct spl_error *err);
 

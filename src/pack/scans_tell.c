@@ -43,7 +43,11 @@ int spl_scan_guess(const struct spl_cloud_info *info, char **out, struct spl_err
     if (info->footer[0])
         add(text, sizeof text, "%s", info->footer);
     if (info->unused[0])
-        add(text, sizeof text, "columns not used: %s", info->unused);
+        add(text, sizeof text,
+            !strcmp(info->format, "PLY")   ? "properties not used: %s"
+            : !strcmp(info->format, "PCD") ? "fields not used: %s"
+                                           : "columns not used: %s",
+            info->unused);
     snprintf(white, sizeof white, "%g", bits ? info->colors.white : info->colors.dark);
     if (bits)
         add(text, sizeof text, "0 is black and %s white by the largest colour", white);

@@ -223,7 +223,7 @@ static void wide_colors_and_those_that_are_none(void **state)
             {{"rgba", 'U', 2, 1, {1, 2, 3}}, "rgba (of 2 bytes)"},
             {{"rgb", 'U', 1, 3, {1, 2, 3}}, "rgb (a list)"},
             {{"red", 'U', 1, 1, {1, 2, 3}}, "red (without green)"},
-            {{"foo", 'U', 1, 3, {1, 2, 3}}, ""},
+            {{"foo", 'U', 1, 3, {1, 2, 3}}, "foo"},
         };
         for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
             struct loaded l;

@@ -426,10 +426,10 @@ static void names_that_want_the_same(void **state)
         int class;
     } all[] = {
         {"float x\nproperty float y\nproperty float z\nproperty float x\nproperty float y", "x (again), y (again)", 0},
-        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint class", "", 5},
-        {"float x\nproperty float y\nproperty float z\nproperty uint CLASS\nproperty uint label", "", 4},
-        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint foo", "", 4},
-        {"float x\nproperty float y\nproperty float z\nproperty int64 label\nproperty uint64 foo", "", 4},
+        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint class", "label", 5},
+        {"float x\nproperty float y\nproperty float z\nproperty uint CLASS\nproperty uint label", "label", 4},
+        {"float x\nproperty float y\nproperty float z\nproperty uint label\nproperty uint foo", "foo", 4},
+        {"float x\nproperty float y\nproperty float z\nproperty int64 label\nproperty uint64 foo", "foo", 4},
     };
     struct loaded l;
     (void)state;
@@ -450,6 +450,28 @@ static void names_that_want_the_same(void **state)
             assert_string_equal(l.unused, all[i].unused);
             loaded_finish(&l);
         }
+}
+
+/* However many are not used, and however long their names are, a line says it. */
+static void many_that_are_not_used_are_cut(void **state)
+{
+    static struct bytes b;
+    struct loaded l;
+    (void)state;
+    b.length = 0;
+    put_text(&b, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n");
+    for (int i = 0; i < 900; i++)
+        put_text(&b, "property float property_with_a_long_name_%d\n", i);
+    put_text(&b, "end_header\n1 2 3");
+    for (int i = 0; i < 900; i++)
+        put_text(&b, " 0");
+    put_text(&b, "\n");
+    load_bytes(&b, NULL, 1, &l);
+    assert_int_equal(l.code, 0);
+    assert_int_equal(strncmp(l.unused, "property_with_a_long_name_0, property_with_a_long_name_1, ", 58), 0);
+    assert_string_equal(l.unused + strlen(l.unused) - 5, ", …");
+    assert_true(strlen(l.unused) > 150);
+    loaded_finish(&l);
 }
 
 /* Names as PDAL and CloudCompare write them, and as headings of texts are, in whatever case; of two that mean the same
@@ -639,8 +661,12 @@ static void colours_that_are_not_read_are_told(void **state)
         {"property uchar rgba", "7", "rgba (of 1 byte)"},
         {"property uchar red\nproperty uchar blue", "7 8", "red, blue (without green)"},
         {"property uchar green", "7", "green (without red)"},
-        {"property uchar foo", "7", ""},
-        {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uint rgba", "7 8 9 7", ""},
+        {"property uchar foo", "7", "foo"},
+        {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uint rgba", "7 8 9 7", "rgba"},
+        {"property uchar r\nproperty uchar g\nproperty uchar b\nproperty uchar alpha", "7 8 9 7", "alpha"},
+        {"property float nx\nproperty float ny\nproperty float quality", "0 1 7", "nx, ny, quality"},
+        {"property uchar red\nproperty list uchar int seen\nproperty uchar x", "7 2 8 9 1",
+         "x (again), red (without green), seen"},
     };
     (void)state;
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
@@ -669,6 +695,7 @@ int main(void)
         cmocka_unit_test(rows_behind_the_last_are_counted),
         cmocka_unit_test(names_that_want_the_same),
         cmocka_unit_test(names_of_other_programs),
+        cmocka_unit_test(many_that_are_not_used_are_cut),
         cmocka_unit_test(every_type_and_byte_order),
         cmocka_unit_test(doubles_are_exact),
         cmocka_unit_test(other_elements_and_lists_are_skipped),

@@ -237,6 +237,7 @@ static void test_guesses_are_noted(void **state)
                         "a.txt, b.txt: columns are x,y,z,intensity by their values; --columns says otherwise\n");
     b = write_lines("b.txt", "x y z foo\n", "3%d.5 %d 4 7\n");
     assert_non_null(strstr(note_two(a, b, NULL), "otherwise\nb.txt: columns not used: foo\n"));
+    assert_non_null(strstr(note_two(a, write_ply("c.ply", 0, "int q", "%d"), NULL), "c.ply: properties not used: q\n"));
 }
 
 static const char *grey_fields = "float intensity", *rgb_fields = "uchar red,uchar green,uchar blue";
