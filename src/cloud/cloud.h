@@ -82,7 +82,8 @@ struct spl_cloud_info {
     const char *named;        /* static: the format that the name's ending is of, where it is another; else NULL */
     uint32_t attributes;      /* enum spl_cloud_attribute, known at open */
     uint64_t points_expected; /* as the header says (already checked against the file's size), 0 = unknown */
-    bool points_at_most; /* of points_expected some may be cells of a grid that saw nothing, which are skipped */
+    bool points_at_most; /* of points_expected some may be none: cells of a grid that saw nothing, which are skipped, or
+                            more than the file's bytes vouch for */
     uint64_t points_behind; /* that the file has room for behind those that its header counts: not read; 0 mostly */
     uint64_t rows;            /* that spl_cloud_seek() can go to; 0: it cannot */
     uint64_t points_total;    /* with those that max_points leaves out; 0 = unknown, never where it is set */

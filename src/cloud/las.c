@@ -108,6 +108,17 @@ static int open_stream(struct spl_cloud *cloud, const struct spl_laz_format *for
     return code;
 }
 
+/* Those that compressed records are made of. */
+static uint64_t count_bytes(const struct spl_cloud *cloud)
+{
+    const struct las *las = cloud->state;
+    const struct spl_laz_table *table = spl_laz_stream_get_table(las->stream);
+    uint64_t bytes = 0;
+    for (size_t i = 0; table && i < table->count; i++)
+        bytes += table->chunks[i].bytes;
+    return table ? bytes : cloud->source.size - las->start;
+}
+
 /* The header's box: most and least of each axis in turn. */
 static void take_bounds(struct spl_cloud_info *info, const uint8_t *h)
 {
@@ -203,6 +214,8 @@ static int las_open(struct spl_cloud *cloud, struct spl_error *err)
     if (compressed &&
         (code = spl_copc_take_levels(cloud, records, las->stream, cloud->options->max_points, &las->count, err)) < 0)
         return code;
+    /* points that are much alike take less than a byte, and so do those that a header invents */
+    cloud->info.points_at_most = compressed && las->count > count_bytes(cloud);
     snprintf(cloud->info.version, sizeof cloud->info.version, "1.%u, point format %u", minor, las->format);
     take_bounds(&cloud->info, h);
     const uint64_t end = all[1].count && all[1].at < size ? all[1].at : size;

@@ -251,8 +251,8 @@ static int gather_file(struct spl_points *p, struct spl_point_batch *batch, cons
     snprintf(name, sizeof name, "reading %.100s", scan->name);
     spl_stage_begin(stage, name, "points", scans->rules ? scan->points_expected : info->points_expected);
     /* One allocation where the header is honest; batches correct it where it is not. Where it may count what is
-     * no point they alone do, as of a part: beyond the bound of memory what is allocated takes room on disk, used or
-     * not. */
+     * no point, or more than there is, they alone do, as of a part: beyond the bound of memory what is allocated takes
+     * room on disk, used or not. */
     if (info->points_expected && !scans->rules && !info->points_at_most &&
         info->points_expected < SPL_POINTS_MAX - p->count)
         rc = reserve(p, (size_t)info->points_expected, attributes, err);

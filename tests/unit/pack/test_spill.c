@@ -14,9 +14,15 @@
 
 #include <cmocka.h>
 
+#include <splatd/pack.h>
+
+#include "cloud/cloud.h"
 #include "pack/spill.h"
 #include "support/folder.h"
+#include "support/laz_writer.h"
 #include "support/sanitised.h"
+
+enum { laz_points = 70000 };
 
 static struct spl_spill *create(uint64_t memory)
 {
@@ -223,6 +229,53 @@ static void a_disk_without_room_is_an_error(void **state)
     spl_spill_destroy(spill);
 }
 
+/* A LAZ file of 7 chunks whose header counts `count` points. */
+static const char *write_laz(const char *name, uint64_t count)
+{
+    static const uint32_t chunks[] = {10000, 10000, 10000, 10000, 10000, 10000, 10000, 0};
+    struct spl_laz_format format = laz_format(2, 0, 2, 10000);
+    uint8_t *records = laz_make_records(&format, laz_points, 1);
+    struct laz_out file = laz_write_file(&format, 2, records, chunks, LAZ_TABLE_USUAL);
+    memcpy(file.bytes + 247, &count, sizeof count);
+    folder_put(name, file.bytes, file.count);
+    free(file.bytes);
+    free(records);
+    return in_folder(name);
+}
+
+/* Points that a header counts and no byte vouches for take no room before they come: none of 40 MB can be had here. */
+static void what_a_header_invents_takes_no_room(void **state)
+{
+    struct rlimit before, less = {.rlim_cur = 16 << 20};
+    const uint64_t counts[] = {laz_points, 10000000};
+    const char *path = NULL;
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        const struct spl_cloud_options first_points = {.sample_colors = true};
+        struct spl_cloud *cloud;
+        path = write_laz("forged.laz", counts[i]);
+        assert_int_equal(spl_cloud_open(path, &first_points, &cloud, NULL), 0);
+        assert_int_equal(spl_cloud_get_info(cloud)->points_expected, counts[i]);
+        assert_int_equal(spl_cloud_get_info(cloud)->points_at_most, i);
+        spl_cloud_destroy(cloud);
+    }
+    struct spl_pack_options options = {.size = sizeof options,
+                                       .inputs = &path,
+                                       .input_count = 1,
+                                       .output = in_folder("forged.spld"),
+                                       .threads = 1,
+                                       .memory_bytes = SPL_PACK_MEMORY_MIN};
+    struct spl_error err = {0};
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    less.rlim_max = before.rlim_max;
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &less), 0);
+    int rc = spl_pack(&options, NULL, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    if (rc != SPL_E_INPUT || !strstr(err.message, "forged.laz: offset") || !strstr(err.message, "chunk 8"))
+        fail_msg("%d: %s: %s", rc, err.field, err.message);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -230,6 +283,7 @@ int main(void)
         cmocka_unit_test(what_was_small_grows_into_a_file),
         cmocka_unit_test(what_is_discarded_takes_no_room),
         cmocka_unit_test(the_most_is_that_of_every_moment), cmocka_unit_test(without_a_bound_it_is_the_heap),
-        cmocka_unit_test(a_disk_without_room_is_an_error)};
+        cmocka_unit_test(a_disk_without_room_is_an_error),
+        cmocka_unit_test(what_a_header_invents_takes_no_room)};
     return cmocka_run_group_tests_name("arrays on disk", tests, folder_make, folder_remove);
 }
