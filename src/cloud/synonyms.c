@@ -8,12 +8,25 @@
 
 #include "cloud/text.h"
 
+/* Is the word one of `words`, which are small letters with a blank on each side? */
+static bool is_in(const char *words, const char *word, size_t length)
+{
+    char between[48] = " ";
+    size_t n = 1;
+    if (length + 3 > sizeof between)
+        return false;
+    for (size_t i = 0; i < length; i++)
+        between[n++] = (char)(word[i] >= 'A' && word[i] <= 'Z' ? word[i] + 32 : word[i]);
+    between[n] = ' ';
+    return strstr(words, between);
+}
+
 /* What other languages, surveyors and programs call columns: small letters, without what only parts words. Letters
  * beyond ASCII are in UTF-8 and Latin-1, and in both cases, since nothing makes them small here. */
 static int column_from_word(const char *word)
 {
     static const struct {
-        const char *words; /* with a blank on each side */
+        const char *words;
         int column;
     } synonyms[] = {
         {" x easting east rechtswert ostwert ost est este \xc3\xb6st \xc3\x96st \xf6st \xd6st oost utme points0 ",
@@ -30,10 +43,8 @@ static int column_from_word(const char *word)
          SPL_COLUMN_INTENSITY},
         {" klasse classe clase ", SPL_COLUMN_CLASS},
     };
-    char between[48];
-    snprintf(between, sizeof between, " %s ", word);
     for (size_t i = 0; i < sizeof synonyms / sizeof *synonyms; i++)
-        if (strstr(synonyms[i].words, between))
+        if (is_in(synonyms[i].words, word, strlen(word)))
             return synonyms[i].column;
     return SPL_COLUMN_SKIP;
 }
@@ -83,82 +94,26 @@ static size_t next_word(const char **p, const char *end)
     return length;
 }
 
-static bool is_height(const char *word, size_t length)
-{
-    static const char *const heights[] = {"z",       "h",      "hoehe",     "h\xc3\xb6he", "h\xc3\x96he", "h\xf6he",
-                                          "h\xd6he", "height", "elevation", "elev",        "altitude",    "alt",
-                                          "altitud", "cota",   "quota",     "hoogte",      "h\xc3\xb6jd", "h\xf6jd"};
-    return SPL_NAME_IS_ONE_OF(heights, word, length);
-}
-
 /* "Höhe ü. NN", "Altitude NGF", "H m a.s.l.": a height and what it counts from. Other words may make it
  * one of an instrument or a reflector. */
 static bool is_height_above(const char *name, size_t length)
 {
-    static const char *const from[] = {"\xc3\xbc",
-                                       "\xc3\x9c",
-                                       "\xfc",
-                                       "\xdc",
-                                       "ue",
-                                       "\xc3\xbc"
-                                       "ber",
-                                       "\xfc"
-                                       "ber",
-                                       "ueber",
-                                       "above",
-                                       "over",
-                                       "m",
-                                       "ft",
-                                       "a",
-                                       "s",
-                                       "l",
-                                       "sl",
-                                       "sea",
-                                       "level",
-                                       "mean",
-                                       "msl",
-                                       "amsl",
-                                       "masl",
-                                       "\xc3\xbcm",
-                                       "\xfcm",
-                                       "\xc3\xbcnn",
-                                       "\xfcnn",
-                                       "\xc3\xbcnhn",
-                                       "\xfcnhn",
-                                       "nn",
-                                       "nhn",
-                                       "dhhn",
-                                       "dhhn12",
-                                       "dhhn92",
-                                       "dhhn2016",
-                                       "ln02",
-                                       "lhn95",
-                                       "ngf",
-                                       "ign69",
-                                       "nap",
-                                       "rh2000",
-                                       "nn2000",
-                                       "dvr90",
-                                       "navd",
-                                       "navd88",
-                                       "ngvd29",
-                                       "egm96",
-                                       "egm2008",
-                                       "evrf2007",
-                                       "odn",
-                                       "ell",
-                                       "ellipsoid",
-                                       "ellipsoidal",
-                                       "ellipsoidisch",
-                                       "ortho",
-                                       "orthometric",
-                                       "orthometrisch"};
+    static const char called[] =
+        " z h hoehe h\xc3\xb6he h\xc3\x96he h\xf6he h\xd6he height elevation elev altitude alt "
+        "altitud cota quota hoogte h\xc3\xb6jd h\xf6jd ";
+    static const char from[] =
+        " \xc3\xbc \xc3\x9c \xfc \xdc ue \xc3\xbc\142er \xfc\142er ueber above over m ft a s l sl sea level mean msl "
+        "amsl masl "
+        "\xc3\xbcm \xfcm \xc3\xbcnn \xfcnn \xc3\xbcnhn \xfcnhn nn nhn dhhn dhhn12 dhhn92 dhhn2016 ln02 lhn95 ngf ign69 "
+        "nap "
+        "rh2000 nn2000 dvr90 navd navd88 ngvd29 egm96 egm2008 evrf2007 odn ell ellipsoid ellipsoidal ellipsoidisch "
+        "ortho orthometric orthometrisch ";
     const char *p = name, *end = name + length;
     unsigned heights = 0, others = 0;
     for (size_t size; (size = next_word(&p, end)); p += size) {
-        if (is_height(p, size))
+        if (is_in(called, p, size))
             heights++;
-        else if (SPL_NAME_IS_ONE_OF(from, p, size))
+        else if (is_in(from, p, size))
             others++;
         else
             return false;
