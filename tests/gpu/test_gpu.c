@@ -344,8 +344,10 @@ static void deadline_of_zero(void **state)
     const uint32_t fills_most = strcmp(device, "vulkan") ? 40 : 640;
     for (uint32_t fills = 40; code == 0 && fills <= fills_most; fills *= 2) {
         assert_int_equal(spl_gpu_begin(gpu, NULL), 0);
-        for (uint32_t i = 0; i < fills; i++)
+        for (uint32_t i = 0; i < fills; i++) {
             spl_gpu_fill(gpu, work, 0, 64 << 20, i * 0x01020304);
+            spl_gpu_barrier(gpu);
+        }
         assert_int_equal(spl_gpu_submit(gpu, &ticket, NULL), 0);
         code = spl_gpu_wait(gpu, ticket, 0, NULL);
     }

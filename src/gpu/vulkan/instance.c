@@ -46,7 +46,10 @@ static bool has_layer(const char *name)
 static int create(bool debug, VkInstance *out, struct spl_error *err)
 {
     static const char *const layer = "VK_LAYER_KHRONOS_validation";
-    static const char *const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+    static const char *const extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME,
+                                             VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME};
+    /* Software drivers run one command after another: whether a barrier is missing, that layer alone sees there. */
+    static const VkValidationFeatureEnableEXT hazards = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
     uint32_t version = 0;
     if (vkEnumerateInstanceVersion(&version) < 0 || version < VK_API_VERSION_1_3)
         return spl_fail(err, SPL_E_NO_DEVICE, "vulkan: the loader has version %u.%u; 1.3 is needed",
@@ -63,17 +66,21 @@ static int create(bool debug, VkInstance *out, struct spl_error *err)
                        VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT,
         .pfnUserCallback = on_message,
     };
+    const VkValidationFeaturesEXT checks = {.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
+                                            .pNext = &reports,
+                                            .enabledValidationFeatureCount = 1,
+                                            .pEnabledValidationFeatures = &hazards};
     VkResult result = vkCreateInstance(
         &(VkInstanceCreateInfo){
             .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
-            .pNext = debug ? &reports : NULL,
+            .pNext = debug ? &checks : NULL,
             .pApplicationInfo = &(VkApplicationInfo){.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                                      .pApplicationName = "splatd",
                                                      .apiVersion = VK_API_VERSION_1_3},
             .enabledLayerCount = debug,
             .ppEnabledLayerNames = &layer,
-            .enabledExtensionCount = debug,
-            .ppEnabledExtensionNames = &extension,
+            .enabledExtensionCount = debug ? sizeof extensions / sizeof *extensions : 0,
+            .ppEnabledExtensionNames = extensions,
         },
         NULL, out);
     if (result < 0)
