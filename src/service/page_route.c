@@ -36,19 +36,12 @@ static const struct asset *find(const char *folder, const char *name)
     return NULL;
 }
 
-static const char *get_header(struct request *request, const char *name)
-{
-    const char *value = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, name);
-    return value ? value : "";
-}
-
 static void reply_with(struct request *request, const struct asset *asset, const char *const (*headers)[2])
 {
     static const char *const always[][2] = {{MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache"},
                                             {"Referrer-Policy", "no-referrer"},
                                             {NULL, NULL}};
-    const char *held = get_header(request, MHD_HTTP_HEADER_IF_NONE_MATCH);
-    bool same = !strcmp(held, "*") || strstr(held, asset->etag); // a tag is quoted: no other one contains it
+    const bool same = spl_client_has(request, asset->etag);
     request->status = same ? MHD_HTTP_NOT_MODIFIED : MHD_HTTP_OK;
     request->response = MHD_create_response_from_buffer(same ? 0 : asset->length, (void *)(uintptr_t)asset->bytes,
                                                         MHD_RESPMEM_PERSISTENT);
@@ -62,30 +55,47 @@ static void reply_with(struct request *request, const struct asset *asset, const
         MHD_add_response_header(request->response, (*headers)[0], (*headers)[1]);
 }
 
-/* How much a client wants a media type that it names, 0 to 1; 0 when it does not name it. */
-static double wish(const char *accept, const char *type)
+struct wish {
+    const char *type;
+    double weight;
+};
+
+/* One line of Accept, of which there may be several; the first that names the type says it. */
+static enum MHD_Result look(void *context, enum MHD_ValueKind kind, const char *header, const char *accept)
 {
+    (void)kind;
+    struct wish *wish = context;
+    if (!accept || strcasecmp(header, MHD_HTTP_HEADER_ACCEPT))
+        return MHD_YES;
     for (const char *item = accept; *item; item += strcspn(item, ","), item += *item == ',') {
         item += strspn(item, " \t");
         size_t length = strcspn(item, " \t;,");
-        if (length != strlen(type) || strncasecmp(item, type, length))
+        if (length != strlen(wish->type) || strncasecmp(item, wish->type, length))
             continue;
         const char *end = item + strcspn(item, ","), *q = item + length;
         while (q < end && (strncasecmp(q, "q=", 2) || !strchr("; \t", q[-1])))
             q++;
-        double weight = 0;
-        if (q < end)
-            spl_decimal_parse(q + 2, &weight);
-        return q < end ? weight : 1;
+        if (q == end)
+            wish->weight = 1;
+        else
+            spl_decimal_parse(q + 2, &wish->weight);
+        return MHD_NO;
     }
-    return 0;
+    return MHD_YES;
+}
+
+/* How much a client wants a media type that it names, 0 to 1; 0 when it does not name it. */
+static double get_wish(const struct request *request, const char *type)
+{
+    struct wish wish = {.type = type};
+    MHD_get_connection_values(request->handle, MHD_HEADER_KIND, look, &wish);
+    return wish.weight;
 }
 
 bool spl_wants_page(struct request *request)
 {
-    const char *accept = get_header(request, MHD_HTTP_HEADER_ACCEPT);
-    double html = wish(accept, "text/html");
-    return html > 0 && html >= wish(accept, "application/json");
+    double html = get_wish(request, "text/html");
+    return html > 0 && html >= get_wish(request, "application/json");
 }
 
 void spl_show_page(struct request *request)

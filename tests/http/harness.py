@@ -1,5 +1,6 @@
 """A daemon under test, and the client that talks to it. Every reply of status 400 or more is checked to be an RFC 9457
 problem, every reply to be what api/openapi.yaml promises (openapi.py); every daemon must end the way the test says."""
+import email.message
 import email.parser
 import http.client
 import inspect
@@ -187,6 +188,14 @@ def npy(rows, kind="f", order="False"):
     header += " " * (117 - len(header)) + "\n"
     flat = [x for row in rows for x in row] if order == "False" else [row[k] for k in range(3) for row in rows]
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack(f"<{len(flat)}{kind}", *flat)
+
+
+def lines(*pairs):
+    """Headers of which several may have one name, each of which is sent as a line of its own."""
+    headers = email.message.Message()
+    for name, value in pairs:
+        headers[name] = value
+    return headers
 
 
 class Port:

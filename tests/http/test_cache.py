@@ -4,7 +4,7 @@ import re
 import socket
 import threading
 
-from harness import FAKE, PATIENT, REAL, VIEW, Daemon, Hold, eventually, fresh, run, together
+from harness import FAKE, PATIENT, REAL, VIEW, Daemon, Hold, eventually, fresh, lines, run, together
 
 SMALL = VIEW + "?width=16&height=16"
 FOREVER = "public, max-age=31536000, immutable"
@@ -39,6 +39,17 @@ def test_an_etag_is_answered_with_304_and_no_frame():
         assert d.status()["counters"]["frames"] == 0
     with Daemon(FAKE) as d:
         assert d.ask(SMALL, headers={"If-None-Match": tag}).status == 200, "another renderer, the same ETag"
+
+
+def test_several_lines_of_one_header_are_one_list():
+    with Daemon(REAL) as d:
+        def ask(*values):
+            return d.ask(SMALL, headers=lines(*(("If-None-Match", value) for value in values))).status
+        tag = d.ask(SMALL).headers["ETag"]
+        for known in [('"other"', tag), (tag, '"other"'), ('"other", "another"', "", f'"a", W/{tag}'), ("x", "*")]:
+            assert ask(*known) == 304, known
+        for unknown in [('"other"', '"another"'), (tag[:20], tag[20:]), ("", "")]:
+            assert ask(*unknown) == 200, unknown
 
 
 def test_requests_that_mean_the_same_share_an_etag():

@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 
-from harness import FAKE, REAL, WALL, Daemon, break_page, eventually, run, together
+from harness import FAKE, REAL, WALL, Daemon, break_page, eventually, lines, run, together
 
 ADMIN, VIEWER = "admin-0123456789abcdef", "viewer-0123456789abcdef"
 AUTH = {"Authorization": f"Bearer {ADMIN}", "Content-Type": "application/octet-stream"}
@@ -97,6 +97,11 @@ def test_who_would_overwrite_nothing_does_not():
         part = put(d, "a", WALL_2, {**AUTH, "Content-Range": f"bytes 0-{len(WALL_2) - 1}/{2 * len(WALL_2)}"})
         assert part.status == 400 and part.json()["field"] == "Content-Range", part.body
         assert listed(d).keys() == {"a"} and [p.name for p in d.home.iterdir()] == ["a.spld"]
+        for several in ((("If-Match", wrong), ("If-Match", "W/" + old)), (("If-None-Match", wrong), ("If-None-Match", "*"))):
+            reply = put(d, "a", WALL_2, lines(*AUTH.items(), *several))
+            assert reply.status == 412 and reply.json()["field"] == several[0][0], (several, reply.body)
+        again = put(d, "a", WALL_1, lines(*AUTH.items(), ("If-Match", wrong), ("If-Match", f"W/{wrong}, {old}")))
+        assert again.status == 200 and again.json()["version"] == first.json()["version"], again.body
         second = put(d, "a", WALL_2, {**AUTH, "If-Match": f"{wrong},{old}", "If-None-Match": wrong})
         assert second.status == 200 and listed(d)["a"]["version"] == second.json()["version"] != first.json()["version"]
         assert delete(d, "a", {**AUTH, "If-Match": old}).status == 412  # it was that

@@ -4,7 +4,7 @@ import os
 import pathlib
 import re
 
-from harness import FAKE, Daemon, run
+from harness import FAKE, Daemon, lines, run
 
 ROOT = pathlib.Path(os.environ["SPLATD_SOURCE_ROOT"])
 TYPES = {
@@ -46,6 +46,14 @@ def test_html_is_for_those_who_ask_for_it():
             reply = d.ask("/", headers={} if accept is None else {"Accept": accept})
             assert reply.status == 200 and reply.headers["Content-Type"].split(";")[0] == kind, (accept, reply.headers)
             assert reply.headers["Vary"] == "Accept"
+        for first, second, kind in [  # several lines are one list
+            ("application/xml", "text/html", "text/html"),
+            ("text/html;q=0.1", "application/json", "application/json"),
+            ("application/json;q=0.5", "*/*, text/html", "text/html"),
+            ("text/html;q=0", "text/html", "application/json"),
+        ]:
+            reply = d.ask("/", headers=lines(("Accept", first), ("accept", second)))
+            assert reply.headers["Content-Type"].split(";")[0] == kind, (first, second, reply.headers)
         assert d.ask("/", headers=BROWSER).body == (ROOT / "api/viewer/index.html").read_bytes()
 
 
@@ -72,6 +80,8 @@ def test_a_file_that_is_held_is_not_sent_again():
             for held in (tag, "*", f'"0", W/{tag}'):
                 reply = d.ask(name, headers={**headers, "If-None-Match": held})
                 assert (reply.status, reply.body, reply.headers["ETag"]) == (304, b"", tag), (name, held)
+            several = lines(*headers.items(), ("If-None-Match", '"0"'), ("If-None-Match", tag))
+            assert d.ask(name, headers=several).status == 304, name
             for other in ('"0123456789abcdef"', tag[:-2], ""):
                 assert d.ask(name, headers={**headers, "If-None-Match": other}).status == 200, other
             head = d.ask(name, "HEAD", headers=headers)

@@ -15,7 +15,7 @@ import zipfile
 
 import openapi
 import tiles
-from harness import FAKE, PATIENT, REAL, WALL, Daemon, Hold, eventually, run, together, Reply
+from harness import FAKE, PATIENT, REAL, WALL, Daemon, Hold, eventually, lines, run, together, Reply
 
 TOURS = "/v1/datasets/wall/tours"
 SMALL = dict(width=64, height=48)
@@ -168,6 +168,7 @@ def check_files(d, tour, frames):
     assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body), head.headers
     assert d.ask(uri, headers={"Range": f"bytes={len(whole.body)}-"}).status == 416
     assert d.ask(uri, headers={"If-None-Match": whole.headers["ETag"]}).status == 304
+    assert d.ask(uri, headers=lines(("If-None-Match", '"x"'), ("If-None-Match", whole.headers["ETag"]))).status == 304
     head = d.ask(uri, "HEAD")
     assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body) and not head.body
     for n in ("4", "-1", "1e0", "99999999999", "x"):

@@ -15,7 +15,6 @@
 #include "service/range.h"
 #include "service/reply.h"
 #include "service/tour/tour.h"
-#include "service/view/key.h"
 
 enum { block_bytes = 64 << 10 };
 
@@ -75,8 +74,7 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
     struct spl_error why = {0}, err = {0};
     struct spl_tour_file file;
     uint64_t length;
-    const char *held = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
-    if (held && spl_etag_matches(held, tag)) {
+    if (spl_client_has(request, tag)) {
         request->status = MHD_HTTP_NOT_MODIFIED;
         if ((request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT)))
             add_cache_headers(request, tag);

@@ -200,22 +200,23 @@ void spl_key_etag(const struct spl_key *key, char etag[SPL_ETAG_BYTES])
              (unsigned long long)key->words[1]);
 }
 
-bool spl_etag_matches(const char *if_none_match, const char *etag)
+bool spl_etag_matches(const char *list, const char *etag, bool strong)
 {
     size_t length = strlen(etag);
-    const char *p = if_none_match + strspn(if_none_match, " \t");
+    const char *p = list + strspn(list, " \t");
     if (*p == '*')
         return !p[1 + strspn(p + 1, " \t")];
     for (;;) {
         p += strspn(p, " \t,");
-        if (!strncmp(p, "W/", 2))
+        const bool weak = !strncmp(p, "W/", 2);
+        if (weak)
             p += 2;
         const char *end = *p == '"' ? strchr(p + 1, '"') : NULL;
         if (!end)
             return false;
         size_t found = (size_t)(end + 1 - p);
         p = end + 1;
-        if (found == length && !strncmp(p - found, etag, length))
+        if (found == length && !(strong && weak) && !strncmp(p - found, etag, length))
             return true;
     }
 }

@@ -31,8 +31,8 @@ static inline bool spl_key_equal(const struct spl_key *a, const struct spl_key *
 /* The strong validator, quoted. */
 void spl_key_etag(const struct spl_key *key, char etag[SPL_ETAG_BYTES]);
 
-/* Whether the value of an If-None-Match header (RFC 9110, 13.1.2) names `etag`: '*', or a list in which weak validators
- * count as well. What is malformed matches nothing. */
-bool spl_etag_matches(const char *if_none_match, const char *etag);
+/* Whether the value of an If-None-Match or If-Match header (RFC 9110, 13.1) names `etag`: '*', or a list, in which weak
+ * validators count as well where the comparison is not `strong` (8.8.3.2). What is malformed matches nothing. */
+bool spl_etag_matches(const char *list, const char *etag, bool strong);
 
 #endif

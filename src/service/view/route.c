@@ -43,8 +43,7 @@ static bool answer_at_once(struct request *request, const struct spl_view_reques
     struct spl_service *service = request->service;
     char etag[SPL_ETAG_BYTES];
     spl_key_etag(key, etag);
-    const char *known = MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_IF_NONE_MATCH);
-    if (request->validated && known && spl_etag_matches(known, etag)) {
+    if (request->validated && spl_client_has(request, etag)) {
         spl_count(service->counters, not_modified);
         spl_reply_not_modified(request, key);
         return true;

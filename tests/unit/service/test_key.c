@@ -287,7 +287,7 @@ static void if_none_match_is_read_as_the_standard_says(void **state)
     assert_string_equal(etag, "\"0123456789abcdef0000000000000001\"");
     static const char *const good[] = {
         "*",    " * ",     "%s",      " %s ",          "W/%s", "\"x\", %s", "\"x\",W/\"y\",%s",
-        ",,%s", "\"\",%s", "%s, \"x", "\"a,b\"\t,\t%s"};
+        ",,%s", "\"\",%s", "%s, \"x", "\"a,b\"\t,\t%s", "W/\"y\" , %s"};
     static const char *const bad[] = {"",
                                       " ",
                                       "**",
@@ -307,14 +307,17 @@ static void if_none_match_is_read_as_the_standard_says(void **state)
         const char *hole = strstr(good[i], "%s");
         snprintf(text, sizeof text, "%.*s%s%s", hole ? (int)(hole - good[i]) : (int)strlen(good[i]), good[i],
                  hole ? etag : "", hole ? hole + 2 : "");
-        if (!spl_etag_matches(text, etag))
+        if (!spl_etag_matches(text, etag, false))
             fail_msg("%s does not match", text);
+        const bool weak = strstr(good[i], "W/%s");
+        if (spl_etag_matches(text, etag, true) == weak)
+            fail_msg("%s %s", text, weak ? "is strong" : "does not match though it is strong");
     }
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         const char *hole = strstr(bad[i], "%s");
         snprintf(text, sizeof text, "%.*s%s%s", hole ? (int)(hole - bad[i]) : (int)strlen(bad[i]), bad[i],
                  hole ? etag : "", hole ? hole + 2 : "");
-        if (spl_etag_matches(text, etag))
+        if (spl_etag_matches(text, etag, false))
             fail_msg("%s matches", text);
     }
 }
