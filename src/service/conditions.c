@@ -38,14 +38,22 @@ bool spl_client_has(const struct request *request, const char *tag)
     return read_list(request, MHD_HTTP_HEADER_IF_NONE_MATCH, tag, false).names_it;
 }
 
-bool spl_check_conditions(struct request *request, const char *tag)
+bool spl_check_match(struct request *request, const char *tag)
 {
     const struct list only = read_list(request, MHD_HTTP_HEADER_IF_MATCH, tag, true);
-    if (only.given && !only.names_it)
-        spl_reply_problem(request, MHD_HTTP_PRECONDITION_FAILED, "conflict", MHD_HTTP_HEADER_IF_MATCH,
-                          tag ? "what is there is another version than the request names"
-                              : "nothing is there, and the request is for what is");
-    else if (spl_client_has(request, tag))
+    if (!only.given || only.names_it)
+        return true;
+    spl_reply_problem(request, MHD_HTTP_PRECONDITION_FAILED, "conflict", MHD_HTTP_HEADER_IF_MATCH,
+                      tag ? "what is there is another version than the request names"
+                          : "nothing is there, and the request is for what is");
+    return false;
+}
+
+bool spl_check_conditions(struct request *request, const char *tag)
+{
+    if (!spl_check_match(request, tag))
+        return false;
+    if (spl_client_has(request, tag))
         spl_reply_problem(request, MHD_HTTP_PRECONDITION_FAILED, "conflict", MHD_HTTP_HEADER_IF_NONE_MATCH,
                           "there is one already, and the request is to replace none");
     else if (MHD_lookup_connection_value(request->handle, MHD_HEADER_KIND, MHD_HTTP_HEADER_CONTENT_RANGE))

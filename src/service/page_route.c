@@ -41,6 +41,8 @@ static void reply_with(struct request *request, const struct asset *asset, const
     static const char *const always[][2] = {{MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache"},
                                             {"Referrer-Policy", "no-referrer"},
                                             {NULL, NULL}};
+    if (!spl_check_match(request, asset->etag))
+        return;
     const bool same = spl_client_has(request, asset->etag);
     request->status = same ? MHD_HTTP_NOT_MODIFIED : MHD_HTTP_OK;
     request->response = MHD_create_response_from_buffer(same ? 0 : asset->length, (void *)(uintptr_t)asset->bytes,

@@ -27,6 +27,8 @@ void spl_reply_stream(struct request *request, size_t block, MHD_ContentReaderCa
 /* conditions.c: may the request change what is there, whose strong validator is `tag`: NULL where nothing is, "" if it
  * has none? False: it has its reply, 412, or 400 where it would put a part. */
 bool spl_check_conditions(struct request *request, const char *tag);
+/* The same of what only reads: may it have what is there? False: it has its reply, 412. It comes before the next. */
+bool spl_check_match(struct request *request, const char *tag);
 /* Does its If-None-Match name `tag`, which may be NULL: none? */
 bool spl_client_has(const struct request *request, const char *tag);
 

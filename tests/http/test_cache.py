@@ -52,6 +52,32 @@ def test_several_lines_of_one_header_are_one_list():
             assert ask(*unknown) == 200, unknown
 
 
+def test_who_wants_another_version_gets_none():
+    """If-Match (RFC 9110, 13.1.1) of what is read: with a strong validator, before If-None-Match, and without a frame."""
+    with Daemon(REAL) as d:
+        base = "/v1/datasets/wall"
+        for path in (SMALL, f"{base}/thumbnail.jpg?width=16", f"{base}/pick?x=1&y=1&width=16&height=16",
+                     f"{base}/tiles/0/0/0.png"):
+            tag, frames = d.ask(path).headers["ETag"], d.status()["counters"]["frames"]
+            for other in ('"other"', "W/" + tag, "", tag.strip('"'), f'"other", W/{tag}'):
+                for method in ("GET", "HEAD"):
+                    for more in ({}, {"If-None-Match": tag}):
+                        reply = d.ask(path, method, headers={"If-Match": other, **more})
+                        assert reply.status == 412, (path, other, method, reply.status)
+            assert d.ask(path, headers={"If-Match": '"other"'}).json()["field"] == "If-Match"
+            assert reply.headers["ETag"] is None and d.status()["counters"]["frames"] == frames, path
+            assert d.ask(path, headers=lines(("If-Match", '"other"'), ("If-Match", f"W/{tag}"))).status == 412
+            for one in ("*", tag, f'"other", {tag}'):
+                reply = d.ask(path, headers={"If-Match": one})
+                assert reply.status == 200 and reply.headers["ETag"] == tag, (path, one, reply.status)
+                assert d.ask(path, headers={"If-Match": one, "If-None-Match": tag}).status == 304, (path, one)
+            assert d.ask(path, headers=lines(("If-Match", '"other"'), ("If-Match", tag))).status == 200
+        frames = d.status()["counters"]["frames"]
+        assert d.ask(fresh(SMALL), headers={"If-Match": '"other"'}).status == 412 and d.status()["counters"]["frames"] == frames
+        for path in (SMALL + "&budget=500ms", base):  # no ETag, and nothing that it could be held against
+            assert d.ask(path, headers={"If-Match": '"other"'}).status == 200, path
+
+
 def test_requests_that_mean_the_same_share_an_etag():
     with Daemon(REAL) as d:
         def tag(query):

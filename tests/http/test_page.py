@@ -82,6 +82,12 @@ def test_a_file_that_is_held_is_not_sent_again():
                 assert (reply.status, reply.body, reply.headers["ETag"]) == (304, b"", tag), (name, held)
             several = lines(*headers.items(), ("If-None-Match", '"0"'), ("If-None-Match", tag))
             assert d.ask(name, headers=several).status == 304, name
+            for wanted in (tag, "*", f'"0", {tag}'):
+                assert d.ask(name, headers={**headers, "If-Match": wanted}).status == 200, (name, wanted)
+                assert d.ask(name, headers={**headers, "If-Match": wanted, "If-None-Match": tag}).status == 304, (name, wanted)
+            for other in () if headers else ('"0"', "W/" + tag, ""):  # a browser would be told on a page
+                reply = d.ask(name, headers={"If-Match": other, "If-None-Match": tag})
+                assert reply.status == 412 and reply.json()["field"] == "If-Match", (name, other)
             for other in ('"0123456789abcdef"', tag[:-2], ""):
                 assert d.ask(name, headers={**headers, "If-None-Match": other}).status == 200, other
             head = d.ask(name, "HEAD", headers=headers)

@@ -168,6 +168,8 @@ def check_files(d, tour, frames):
     assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body), head.headers
     assert d.ask(uri, headers={"Range": f"bytes={len(whole.body)}-"}).status == 416
     assert d.ask(uri, headers={"If-None-Match": whole.headers["ETag"]}).status == 304
+    assert d.ask(uri, headers={"If-Match": whole.headers["ETag"], "Range": "bytes=0-9"}).status == 206
+    assert d.ask(uri, headers={"If-Match": '"x"', "Range": "bytes=0-9", "If-None-Match": "*"}).status == 412
     assert d.ask(uri, headers=lines(("If-None-Match", '"x"'), ("If-None-Match", whole.headers["ETag"]))).status == 304
     head = d.ask(uri, "HEAD")
     assert head.status == 200 and int(head.headers["Content-Length"]) == len(whole.body) and not head.body
@@ -188,6 +190,8 @@ def check_video(d, tour, frames):
     assert d.ask(tour["video"], headers={"Range": "bytes=0-1", "If-Range": '"x"'}).body == reply.body
     assert d.ask(tour["video"], headers={"Range": "bytes=999999999-"}).status == 416
     assert d.ask(tour["video"], headers={"If-None-Match": "*"}).status == 304
+    assert d.ask(tour["video"], headers={"If-Match": "*"}).body == reply.body
+    assert d.ask(tour["video"], headers={"If-Match": '"x"'}).status == 412
     if not shutil.which("ffprobe"):
         return
     with tempfile.NamedTemporaryFile(suffix=".mp4") as file:

@@ -74,6 +74,8 @@ void spl_tour_reply_file(struct request *request, struct spl_tour *tour, const c
     struct spl_error why = {0}, err = {0};
     struct spl_tour_file file;
     uint64_t length;
+    if (!spl_check_match(request, tag))
+        return;
     if (spl_client_has(request, tag)) {
         request->status = MHD_HTTP_NOT_MODIFIED;
         if ((request->response = MHD_create_response_from_buffer(0, "", MHD_RESPMEM_PERSISTENT)))

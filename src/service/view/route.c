@@ -37,12 +37,14 @@ static void answer(struct ticket *ticket, struct spl_rendering *rendering, const
     spl_waiting_resume(request);
 }
 
-/* What can be said without rendering: the client has it, the cache has it, or HEAD does not want it. */
+/* What can be said without rendering: the client wants another, or has it, the cache has it, or HEAD wants none. */
 static bool answer_at_once(struct request *request, const struct spl_view_request *view, const struct spl_key *key)
 {
     struct spl_service *service = request->service;
     char etag[SPL_ETAG_BYTES];
     spl_key_etag(key, etag);
+    if (request->validated && !spl_check_match(request, etag))
+        return true;
     if (request->validated && spl_client_has(request, etag)) {
         spl_count(service->counters, not_modified);
         spl_reply_not_modified(request, key);
