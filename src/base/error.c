@@ -2,6 +2,7 @@
  * printable here, where all of them come by: one line of UTF-8. Reentrant; no global state. */
 #include "base/error.h"
 
+#include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -80,14 +81,15 @@ int spl_fail_field(struct spl_error *err, int code, const char *field, const cha
 
 int spl_fail_errno(struct spl_error *err, int errno_value, const char *format, ...)
 {
-    if (!err || err->code != SPL_OK)
-        return SPL_E_IO;
-    va_list args;
-    va_start(args, format);
-    fill(err, SPL_E_IO, "", format, args);
-    va_end(args);
-    size_t used = strlen(err->message);
-    snprintf(err->message + used, sizeof err->message - used, ": %s", strerror(errno_value));
+    if (err && err->code == SPL_OK) {
+        va_list args;
+        va_start(args, format);
+        fill(err, SPL_E_IO, "", format, args);
+        va_end(args);
+        size_t used = strlen(err->message);
+        snprintf(err->message + used, sizeof err->message - used, ": %s", strerror(errno_value));
+    }
+    errno = errno_value;
     return SPL_E_IO;
 }
 

@@ -11,7 +11,7 @@ int spl_fail(struct spl_error *err, int code, const char *format, ...) __attribu
 int spl_fail_field(struct spl_error *err, int code, const char *field, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* Appends ": " + strerror(errno_value) to the message; code SPL_E_IO. */
+/* Appends ": " + strerror(errno_value) to the message; code SPL_E_IO, and errno is errno_value. */
 int spl_fail_errno(struct spl_error *err, int errno_value, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 

@@ -1,7 +1,8 @@
 /* POST …/tours. A path can be a MiB of numbers and become a hundred thousand cameras, so a thread of the pool reads it
  * while the request waits like one for a view; the loop looks whether there is room before and again after.
  *
- * The reply is sent when tour.json is on the disk: what was promised is there after a crash, too.
+ * The reply is sent when tour.json is on the disk: what was promised is there after a crash, too. Where it cannot be
+ * written there is no tour.
  *
  * Invariant: what is asked for belongs to the pool until after(), whether its request still waits or not. Owned by the
  * loop's thread, but for read_path(). */

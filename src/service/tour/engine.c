@@ -222,8 +222,22 @@ void spl_tour_video_made(struct spl_tour *tour, uint64_t bytes, const struct spl
     end(tour, SPL_TOUR_DONE);
 }
 
+/* Nothing of it is on the disk, and nobody was told of it: there is no such tour. */
+static void refuse(struct spl_tour *tour, const struct spl_error *err)
+{
+    struct spl_error why = *err;
+    hide_folder(tour->tours, why.message);
+    spl_tour_answer(tour, &why);
+    if (!tour->removed)
+        spl_tours_remove(tour, NULL);
+}
+
 void spl_tour_state_written(struct spl_tour *tour, size_t bytes, const struct spl_error *err)
 {
+    if (err->code && !tour->state_bytes && !tour->removed) {
+        refuse(tour, err);
+        return;
+    }
     if (!err->code) {
         account(tour, tour->state_bytes, bytes);
         tour->state_bytes = bytes;

@@ -34,7 +34,7 @@ static int make_name(struct spl_tours *tours, char name[SPL_TOUR_NAME + 1], stru
 
 int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl_error *err)
 {
-    uint64_t disk = tours->service->options->tour_disk_max, more = spl_tour_state_bytes_max(length);
+    const uint64_t disk = tours->service->options->tour_disk_max, more = spl_tour_state_bytes_max(length);
     const struct spl_tour *other;
     size_t unfinished = tours->wishes;
     TAILQ_FOREACH(other, &tours->all, link)
@@ -42,13 +42,17 @@ int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl
     if (unfinished >= SPL_TOURS_UNFINISHED)
         return spl_fail(err, SPL_E_BUSY, "%zu tours are still to be made; come back later", unfinished);
     if (tours->count >= SPL_TOURS_MAX)
-        return spl_fail(err, SPL_E_BUSY, "%zu tours are kept; remove some", tours->count);
-    if (tours->bytes + tours->writing_bytes + more > disk)
-        return spl_fail(err, SPL_E_BUSY,
+        return spl_fail(err, SPL_E_LIMIT, "%zu tours are kept; remove some", tours->count);
+    if (tours->bytes + more > disk)
+        return spl_fail(err, SPL_E_LIMIT,
                         "tours fill %llu of the %llu bytes that they may, and this path takes up to %llu; "
                         "remove some",
-                        (unsigned long long)(tours->bytes + tours->writing_bytes), (unsigned long long)disk,
-                        (unsigned long long)more);
+                        (unsigned long long)tours->bytes, (unsigned long long)disk, (unsigned long long)more);
+    if (tours->bytes + tours->writing_bytes + more > disk)
+        return spl_fail(err, SPL_E_BUSY,
+                        "what is being written may need the rest of the %llu bytes that tours may fill; come back "
+                        "later",
+                        (unsigned long long)disk);
     return 0;
 }
 

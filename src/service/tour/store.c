@@ -45,14 +45,18 @@ int spl_tour_store_write(const char *directory, const char *name, const char *fi
     char *slash = strrchr(path, '/');
     *slash = '\0';
     const bool made = !mkdir(path, 0777);
+    int rc = 0;
     if (!made && errno != EEXIST)
-        return spl_fail_errno(err, errno, "%s: cannot be made", path);
-    if (made && spl_file_sync_folder(path))
-        return spl_fail_errno(err, errno, "%s: its folder cannot be synced", path);
+        rc = spl_fail_errno(err, errno, "%s: cannot be made", path);
+    else if (made && spl_file_sync_folder(path))
+        rc = spl_fail_errno(err, errno, "%s: its folder cannot be synced", path);
     *slash = '/';
-    int rc = spl_file_replace(path, bytes, length, err);
+    if (!rc)
+        rc = spl_file_replace(path, bytes, length, err);
     if (!rc && spl_file_sync_folder(path))
         rc = spl_fail_errno(err, errno, "the folder of %s cannot be synced", path);
+    if (rc && (errno == ENOSPC || errno == EDQUOT || errno == EFBIG))
+        rc = err->code = SPL_E_LIMIT;
     return rc;
 }
 

@@ -108,7 +108,8 @@ void spl_tours_sweep(struct spl_tours *tours);
 
 struct spl_tour *spl_tours_find(struct spl_tours *tours, const char *name); /* NULL when there is none */
 
-/* SPL_E_BUSY: too many, or the disk quota has no room for what is kept of a body of `length` bytes. */
+/* For one with a body of `length` bytes. SPL_E_BUSY, which passes: too many are still to be made, or what is on its way
+ * to the disk may need its room. SPL_E_LIMIT: what is kept has that, or is too many, until some are removed or old. */
 int spl_tours_find_room(const struct spl_tours *tours, size_t length, struct spl_error *err);
 
 /* Adds a tour and begins it; takes *body, malloc'd, and spec. Errors as above. */
@@ -143,7 +144,7 @@ const char *spl_tour_format_name(const struct spl_tour *tour); /* of a frame: "j
 const char *spl_tour_media_type(const struct spl_tour *tour);
 void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32]);
 
-/* store.c: files of a tour; any thread, blocks on disk. Each is whole or not there. */
+/* store.c: files of a tour; any thread, blocks on disk. Each is whole or not there. SPL_E_LIMIT: the disk is full. */
 int spl_tour_store_write(const char *directory, const char *name, const char *file, const void *bytes, size_t length,
                          struct spl_error *err);
 int spl_tour_store_read(const char *directory, const char *name, const char *file, size_t most, uint8_t **bytes,

@@ -103,9 +103,9 @@ static void after_state(uv_work_t *uv, int status)
     (void)status;
     struct work *work = uv->data;
     struct spl_tour *tour = work->tour;
-    tour->state_writing = false;
     tour->tours->writing_bytes -= work->reserved;
     spl_tour_state_written(tour, work->length, &work->err);
+    tour->state_writing = false; // now, so that what is removed or changes with it is seen to below, once
     if (tour->removed)
         spl_tour_work_forget(tour);
     else if (tour->state_again)
