@@ -435,7 +435,7 @@ def test_a_client_that_leaves_while_its_path_is_read():
     with Folder() as folder, Folder() as elsewhere:
         gate = elsewhere / "gate"
         gate.touch()  # for the dataset
-        with Daemon(FAKE, "--tours", str(folder), "--deadline", "6000", LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
+        with Daemon(FAKE, "--tours", str(folder), *PATIENT, LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
                     SLOW_DISK_NAME="tour.json", UV_THREADPOOL_SIZE=1) as d:
             gate.unlink()
             first = d.connect()
@@ -449,13 +449,43 @@ def test_a_client_that_leaves_while_its_path_is_read():
                 eventually(lambda: b"\nsplatd_requests_open 2\n" in d.ops("/metrics").body)
                 leaving.close()
                 eventually(lambda: d.status()["counters"]["clients_left"] == 1)
-                assert "deadline" in begin(d, body(4), 503)["detail"]
                 assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2]
             finally:
                 gate.touch()
+            assert first.getresponse().status == 202
             ended(d, uri)
             ended(d, begin(d, body(5))["uri"])
             assert [t["frames"] for t in d.ask("/v1/tours").json()["tours"]] == [2, 5]
+
+
+def test_a_tour_that_nobody_was_told_of_is_none():
+    """Whoever made it leaves, or is told 503, while its tour.json is on the way to the disk: who asks again would have two."""
+    preload = " ".join(filter(None, [os.environ.get("LD_PRELOAD"), os.environ["SPLATD_SLOW_DISK"]]))
+    for deadline in (PATIENT, ("--deadline", "2000")):
+        with Folder() as folder, Folder() as elsewhere:
+            gate = elsewhere / "gate"
+            gate.touch()  # for the dataset
+            with Daemon(FAKE, "--tours", str(folder), *deadline, LD_PRELOAD=preload, SLOW_DISK_GATE=gate,
+                        SLOW_DISK_NAME="tour.json", UV_THREADPOOL_SIZE=1) as d:
+                gate.unlink()
+                try:
+                    if deadline == PATIENT:
+                        leaving = d.connect()
+                        leaving.request("POST", TOURS, json.dumps(body(2)))
+                        eventually(lambda: d.ask("/v1/tours").json()["tours"])
+                        leaving.close()
+                        eventually(lambda: d.status()["counters"]["clients_left"] == 1)
+                    else:  # one whose tour.json is being written, and one whose path is not read yet
+                        replies = together(2, lambda i: d.post(body(2 + i), TOURS))
+                        assert all(r.status == 503 and "deadline" in r.json()["detail"] for r in replies), replies
+                    assert d.ask("/v1/tours").json()["tours"] == []
+                finally:
+                    gate.touch()
+                eventually(lambda: not list(folder.iterdir()))
+                assert d.ask("/v1/tours").json() == {"tours": [], "bytes": 0, "bytes_max": 10 << 30}
+                if deadline == PATIENT:
+                    ended(d, begin(d, body(3))["uri"])
+                    assert d.status()["counters"]["tour_frames"] == 3
 
 
 def test_what_is_removed_while_it_is_read_counts_until_then():

@@ -2,7 +2,8 @@
  * while the request waits like one for a view; the loop looks whether there is room before and again after.
  *
  * The reply is sent when tour.json is on the disk: what was promised is there after a crash, too. Where it cannot be
- * written there is no tour.
+ * written there is no tour, nor where its request no longer waits for that: nobody knows its name, and who asks again
+ * would have two.
  *
  * Invariant: what is asked for belongs to the pool until after(), whether its request still waits or not. Owned by the
  * loop's thread, but for read_path(). */
@@ -54,7 +55,8 @@ void spl_tour_answer(struct spl_tour *tour, const struct spl_error *why)
     struct request *request = tour->asker;
     if (!request)
         return;
-    spl_tour_abandon(request);
+    request->tour = NULL;
+    tour->asker = NULL;
     if (why->code)
         spl_reply_error(request, why);
     else if (tour->removed)
@@ -67,9 +69,13 @@ void spl_tour_answer(struct spl_tour *tour, const struct spl_error *why)
 
 void spl_tour_abandon(struct request *request)
 {
-    if (request->tour)
-        request->tour->asker = NULL;
+    struct spl_tour *tour = request->tour;
+    if (!tour)
+        return;
     request->tour = NULL;
+    tour->asker = NULL;
+    if (!tour->removed)
+        spl_tours_remove(tour, NULL);
 }
 
 /* True: the request has its reply, else it waits until the tour is on the disk. */

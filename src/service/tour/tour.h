@@ -203,7 +203,8 @@ void spl_tour_reply_zip(struct request *request, struct spl_tour *tour);
 /* create.c: has a thread of the pool read the request's body; the request waits, and gets 202 or why not. */
 void spl_tour_wish_add(struct request *request, struct spl_tours *tours, struct spl_catalog_entry *entry);
 void spl_tour_wish_abandon(struct spl_tour_wish *wish); /* its request no longer waits for it; NULL-safe */
-/* The tour's asker gets 202 or 204, or `why`; nothing without one. abandon: the request no longer waits for a tour. */
+/* The tour's asker gets 202 or 204, or `why`; nothing without one. abandon: the request no longer waits for a tour; one
+ * that it was to make is removed. */
 void spl_tour_answer(struct spl_tour *tour, const struct spl_error *why);
 void spl_tour_abandon(struct request *request);
 
