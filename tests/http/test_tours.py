@@ -269,12 +269,15 @@ def test_every_format_and_member_is_taken():
             tour = begin(d, body(2, settings={**SMALL, "layer": layer, "format": kind}))
             ended(d, tour["uri"])
             assert all(frame.startswith(start) for frame in frames_of(d, tour))
+            assert tour["stream"] == (tour["uri"] + "/stream" if kind == "png" else None), tour
+            assert d.ask(tour["uri"] + "/stream").status == (200 if kind == "png" else 409)
         tour = begin(d, body(2, settings={**SMALL, "layers": ["color", "depth"]}))
         assert tour["layers"] == ["color", "depth"] and tour["format"] == "zip"
         ended(d, tour["uri"])
         for frame in frames_of(d, tour):
             assert zipfile.ZipFile(io.BytesIO(frame)).namelist() == ["color.jpg", "depth.png", "index.json"]
-        assert d.ask(tour["stream"]).status == 409 and d.ask(tour["uri"] + "/video.mp4").status == 404
+        assert tour["stream"] is None and d.ask(tour["uri"] + "/stream").status == 409
+        assert tour["video"] is None and d.ask(tour["uri"] + "/video.mp4").status == 404
 
 
 def test_a_side_that_is_left_out_follows_from_the_path():
@@ -351,7 +354,7 @@ def test_quotas():
         assert d.ask(failed["frame"].replace("{n}", "0")).status == 200
         assert d.ask(failed["frame"].replace("{n}", "5")).status == 409
         assert len(zipfile.ZipFile(io.BytesIO(d.ask(failed["zip"]).body)).namelist()) == failed["frames_done"]
-        assert d.ask(failed["stream"]).status == 409  # raw
+        assert failed["stream"] is None and d.ask(failed["uri"] + "/stream").status == 409  # raw
         for uri in (kept["uri"], failed["uri"]):
             assert d.ask(uri, "DELETE").status == 204
         ended(d, begin(d, body(2))["uri"])

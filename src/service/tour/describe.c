@@ -40,9 +40,10 @@ static json_t *layers(uint32_t bits)
     return names;
 }
 
-static void set_link(json_t *json, const struct spl_tour *tour, const char *name, const char *leaf)
+/* null where the tour has no such thing. */
+static void set_link(json_t *json, const struct spl_tour *tour, const char *name, const char *leaf, bool there)
 {
-    set(json, name, json_sprintf("/v1/tours/%s/%s", tour->name, leaf));
+    set(json, name, there ? json_sprintf("/v1/tours/%s/%s", tour->name, leaf) : json_null());
 }
 
 json_t *spl_tour_describe(const struct spl_tour *tour)
@@ -69,13 +70,10 @@ json_t *spl_tour_describe(const struct spl_tour *tour)
     set(json, "bytes", json_integer((json_int_t)(tour->bytes - tour->state_bytes)));
     set(json, "created", date(tour->created_s));
     set(json, "ended", date(tour->ended_s));
-    set_link(json, tour, "frame", "frames/{n}");
-    set_link(json, tour, "events", "events");
-    set_link(json, tour, "stream", "stream");
-    set_link(json, tour, "zip", "frames.zip");
-    if (spec->video)
-        set_link(json, tour, "video", SPL_TOUR_VIDEO_FILE);
-    else
-        set(json, "video", json_null());
+    set_link(json, tour, "frame", "frames/{n}", true);
+    set_link(json, tour, "events", "events", true);
+    set_link(json, tour, "stream", "stream", spl_tour_holds_pictures(tour));
+    set_link(json, tour, "zip", "frames.zip", true);
+    set_link(json, tour, "video", SPL_TOUR_VIDEO_FILE, spec->video);
     return json;
 }

@@ -118,16 +118,10 @@ void spl_show_tour_events(struct request *request, const struct spl_call *call)
         spl_tour_stream_events(request, tour);
 }
 
-static bool holds_pictures(const struct spl_tour *tour)
-{
-    enum spl_format format = tour->spec.view.encode.format;
-    return !tour->spec.view.container && format != SPL_FORMAT_NPY && format != SPL_FORMAT_RAW;
-}
-
 void spl_show_tour_stream(struct request *request, const struct spl_call *call)
 {
     struct spl_tour *tour = get_tour(request, call);
-    if (tour && holds_pictures(tour))
+    if (tour && spl_tour_holds_pictures(tour))
         spl_tour_stream_pictures(request, tour);
     else if (tour)
         refuse_early(request, "a stream is of pictures; this tour's frames are arrays or ZIP files");

@@ -35,6 +35,12 @@ const char *spl_tour_media_type(const struct spl_tour *tour)
     return view->container ? spl_container_media_type(view->container) : spl_format_media_type(view->encode.format);
 }
 
+bool spl_tour_holds_pictures(const struct spl_tour *tour)
+{
+    const struct spl_view_request *view = &tour->spec.view;
+    return !view->container && view->encode.format != SPL_FORMAT_NPY && view->encode.format != SPL_FORMAT_RAW;
+}
+
 void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32])
 {
     snprintf(out, 32, "%06zu.%.8s", frame, spl_tour_format_name(tour));

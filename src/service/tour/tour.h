@@ -142,6 +142,7 @@ int spl_tour_load(struct spl_tours *tours, const char *name, struct spl_tour **o
 void spl_tour_free(struct spl_tour *tour);
 const char *spl_tour_format_name(const struct spl_tour *tour); /* of a frame: "jpeg", "zip" */
 const char *spl_tour_media_type(const struct spl_tour *tour);
+bool spl_tour_holds_pictures(const struct spl_tour *tour); /* which a stream is of: no arrays, no ZIP files */
 void spl_tour_file_name(const struct spl_tour *tour, size_t frame, char out[32]);
 
 /* store.c: files of a tour; any thread, blocks on disk. Each is whole or not there. SPL_E_LIMIT: the disk is full. */
