@@ -137,6 +137,7 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
     struct spl_camera camera = {0};
     struct spl_places *places = NULL;
     struct spl_places_hook hook;
+    struct spl_error why = {0};
     spl_fade_get_values(values);
     memcpy(defaults.eye, info->default_eye, sizeof defaults.eye);
     memcpy(defaults.target, info->default_target, sizeof defaults.target);
@@ -155,8 +156,12 @@ static int resolve_cameras(struct arguments *a, const struct spl_dataset *datase
         return rc;
     path.closed |= a->closed;
     if ((rc = spl_camera_path_count(&path, a->frames, a->fps, a->seconds, SPL_CAMERA_PATH_MAX, &a->count, &a->fps,
-                                    err)))
+                                    &why))) {
+        const bool unsaid = rc == SPL_E_INPUT && !strcmp(why.field, "frames");
+        rc = spl_fail_field(err, rc, why.field, "%s%s", why.message,
+                            unsaid ? ", as in --frames 150 or --seconds 5" : "");
         goto done;
+    }
     if (!(a->cameras = spl_alloc_raw(a->count, sizeof *a->cameras, err)))
         rc = SPL_E_NOMEM;
     else if (!(rc = spl_camera_path_sample(&path, &motion, a->count, a->cameras, err)) &&

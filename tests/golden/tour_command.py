@@ -77,7 +77,7 @@ with tempfile.TemporaryDirectory() as folder:
     run("tour", "c.spld", *few, "--format", "jpeg")
     for arguments, said in [
         (["-o", "x"], "--path"), (["--path", "keys.json"], "-o"), (["--path", "nowhere.json", "-o", "x"], "nowhere.json"),
-        (["--path", "keys.json", "-o", "x"], "frames or seconds"), (["--path", "keys.json", "--ease", "up", "-o", "x"], "--ease"),
+        (["--path", "keys.json", "-o", "x"], "give frames or seconds, as in --frames 150 or --seconds 5"), (["--path", "keys.json", "--ease", "up", "-o", "x"], "--ease"),
         (["--path", "keys.json", "--frames", "0", "-o", "x"], "--frames"),
         (["--path", "keys.json", "--frames", "2", "--layer", "depth", "-o", "x.mp4"], "video"),
         (["--path", "c.spld", "-o", "x"], "c.spld"),

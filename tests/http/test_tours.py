@@ -606,6 +606,26 @@ def test_a_killed_tour_goes_on_with_the_same_bytes():
             assert all(d.ask(tour["frame"].replace("{n}", str(i))).status == 409 for i in (7, 8, 9))
 
 
+def test_a_tour_that_was_killed_before_its_end_was_written_is_complete():
+    with Folder() as folder:
+        with Daemon(FAKE, "--tours", str(folder), **(hold := Hold()).environment) as d:
+            video = can_make_video(d)
+            tours = [begin(d, body(3, video=made)) for made in (False, True)[:1 + video]]
+            files = {folder / tour["name"] / "tour.json": (folder / tour["name"] / "tour.json").read_bytes() for tour in tours}
+            hold.allow_all()
+            for tour in tours:
+                ended(d, tour["uri"])
+            d.log("done after 3 of 3 frames", len(tours))
+        for file, began in files.items():
+            file.write_bytes(began)
+        with Daemon(FAKE, "--tours", str(folder)) as d:
+            for tour in tours:
+                assert ended(d, tour["uri"])["frames_done"] == 3
+                rest = "its video is made" if tour["video"] else "it is complete"
+                assert len(d.log(f"{tour['name']}: all of its 3 frames are there")) == 1 and rest in d.log(tour["name"])[0], d.lines
+            assert not [line for line in d.lines if "goes on at" in line], d.lines
+
+
 def test_what_is_no_tours_stays():
     """The folder may be an operator's, too: links are not followed, and nothing goes but what a tour writes."""
     with Folder() as folder, Folder() as other, Folder() as whole:

@@ -57,7 +57,11 @@ static void take(struct spl_tour *tour, struct spl_tour_spec *spec)
     tour->spec = *spec;
     *spec = (struct spl_tour_spec){0};
     tour->state = SPL_TOUR_RENDERING; // a video that was being made is begun again
-    spl_log_info("tour %s: goes on at %zu of %zu frames", tour->name, tour->frames_done, tour->spec.frames);
+    if (tour->frames_done < tour->spec.frames)
+        spl_log_info("tour %s: goes on at %zu of %zu frames", tour->name, tour->frames_done, tour->spec.frames);
+    else
+        spl_log_info("tour %s: all of its %zu frames are there%s", tour->name, tour->spec.frames,
+                     tour->spec.video ? "; its video is made" : ", it is complete");
 }
 
 /* One of a dataset that comes from a server is taken up when that has been opened. */
