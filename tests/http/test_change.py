@@ -314,14 +314,23 @@ def test_one_change_of_a_dataset_at_a_time():
 
 
 def test_bodies_that_dawdle_give_way():
-    with serving() as d:
-        dawdling = []
+    with serving("--max-upload", "4096T") as d:
+        dawdling, began = [], time.monotonic()
         for i in range(4):
             dawdling.append(socket.create_connection(("127.0.0.1", d.port), 150))
             dawdling[-1].sendall(f"PUT /v1/datasets/slow-{i} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(WALL_1)}\r\n"
                                  f"Authorization: Bearer {ADMIN}\r\n\r\n".encode() + WALL_1[:1000])
         eventually(lambda: sum(dataset["state"] == "loading" for dataset in listed(d).values()) == 4)
         assert put(d, "a", WALL_1).status == 503  # nobody has dawdled yet
+        time.sleep(6)
+        huge = {**AUTH, "Content-Length": str(1 << 50)}
+        for headers, status in (({**AUTH, "If-Match": "*"}, 412), ({**AUTH, "Content-Range": "bytes 0-1/9"}, 400), (huge, 507),
+                                ({"Authorization": f"Bearer {VIEWER}"}, 403)):
+            assert put(d, "a", b"" if headers is huge else WALL_1, headers).status == status
+        assert put(d, ".a", WALL_1).status == 400 and delete(d, "a").status == 404
+        assert put(d, "slow-0", WALL_1).status == 503 and delete(d, "slow-3").status == 503
+        cut = select.select(dawdling, [], [], 0)[0]
+        assert not cut or time.monotonic() - began > 25, "one was cut for who is not let in, before half a minute was over"
         while put(d, "a", WALL_1).status == 503:
             time.sleep(0.3)
         cut = select.select(dawdling, [], [], 0)[0]

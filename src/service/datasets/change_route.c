@@ -57,17 +57,14 @@ static void cut_dawdler(struct spl_service *service)
 static struct spl_catalog_slot *claim(struct request *request, const char *id, bool make)
 {
     struct spl_service *service = request->service;
-    if (count_changes(service) == changes_max)
-        cut_dawdler(service); // slots move where one goes
     struct spl_catalog_slot *slot = spl_catalog_find_slot(&service->library->catalog, id);
     struct spl_error err = {0};
     char tag[24] = "";
     if (slot && slot->current)
         snprintf(tag, sizeof tag, "\"%016llx\"", (unsigned long long)slot->current->info->version);
     const bool busy = slot && (slot->busy || (slot->current && slot->current->saving));
-    if (service->draining || count_changes(service) == changes_max || busy) {
-        spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed, or too many others are; come back later",
-                       id);
+    if (service->draining || busy) {
+        spl_fail_field(&err, SPL_E_BUSY, "id", "dataset '%s' is being changed; come back later", id);
     } else if (slot && !slot->in_directory) {
         reply_conflict(request, "this dataset's file was named itself when the service was started, so only its "
                                 "operator changes it");
@@ -122,6 +119,21 @@ static struct change *begin(struct request *request, const struct spl_call *call
     return change;
 }
 
+/* Last of all, so that nobody gives way to a change that is refused for anything else. False: it is, and has ended. */
+static bool find_place(struct change *change)
+{
+    struct spl_service *service = change->service;
+    struct spl_error err = {0};
+    if (count_changes(service) > changes_max) // with this one
+        cut_dawdler(service);
+    if (count_changes(service) <= changes_max)
+        return true;
+    spl_fail_field(&err, SPL_E_BUSY, "id", "%d datasets are being changed; come back later", (int)changes_max);
+    spl_reply_error(change->request, &err);
+    spl_change_finish(change);
+    return false;
+}
+
 static void refuse_size(struct request *request, uint64_t bytes)
 {
     char detail[128];
@@ -140,8 +152,12 @@ void spl_put_dataset(struct request *request, const struct spl_call *call)
         return;
     }
     struct change *change = begin(request, call, true);
-    if (!change || !spl_store_check_room(change->target, announced, &change->err))
+    if (!change)
         return;
+    if (!spl_store_check_room(change->target, announced, &change->err)) {
+        find_place(change);
+        return;
+    }
     spl_reply_problem(request, MHD_HTTP_INSUFFICIENT_STORAGE, "storage", "body", change->err.message);
     spl_change_finish(change);
 }
@@ -149,7 +165,7 @@ void spl_put_dataset(struct request *request, const struct spl_call *call)
 void spl_delete_dataset(struct request *request, const struct spl_call *call)
 {
     struct change *change = begin(request, call, false);
-    if (change)
+    if (change && find_place(change))
         spl_change_run(change, SPL_CHANGE_REMOVE);
 }
 
