@@ -38,8 +38,9 @@ static json_t *number(double value)
 
 static bool take_number(const json_t *value, double *out)
 {
-    *out = json_is_number(value) ? json_number_value(value) : json_is_string(value) ? (double)INFINITY : (double)NAN;
-    return json_is_number(value) || json_is_null(value) || json_is_string(value);
+    const char *text = json_string_value(value);
+    *out = json_is_number(value) ? json_number_value(value) : text ? (double)INFINITY : (double)NAN;
+    return json_is_number(value) || json_is_null(value) || (text && !strcmp(text, "equal"));
 }
 
 static json_t *members(const void *object, const struct member *list, size_t count)
@@ -116,7 +117,7 @@ bool spl_record_take(struct spl_sweep *sweep, const json_t *record)
     if (metrics) {
         struct spl_sweep_accuracy *a = spl_sweep_get_accuracy(sweep, setting, view);
         a->complete = json_is_true(json_object_get(record, "complete"));
-        a->done = take_number(json_object_get(record, "splats"), &a->splats) &&
+        a->done = take_number(json_object_get(record, "splats"), &a->splats) && a->splats >= 0 && a->splats <= 1e18 &&
                   take_number(json_object_get(record, "dense_share"), &a->dense_share) &&
                   take_members(metrics, &a->metrics, measures, MEASURES) &&
                   take_members(json_object_get(record, "dense"), &a->dense, measures, MEASURES);
@@ -126,6 +127,10 @@ bool spl_record_take(struct spl_sweep *sweep, const json_t *record)
         return false;
     struct spl_sweep_time *t = spl_sweep_get_time(sweep, setting, view, (enum spl_sweep_size)size, repeat);
     t->done = take_members(time, t, stages, STAGES) && t->ms > 0;
+    for (size_t i = 0; i < STAGES && t->done; i++) {
+        const double ms = *(const double *)((const char *)t + stages[i].offset);
+        t->done = ms >= 0 && ms <= 1e12;
+    }
     return t->done;
 }
 

@@ -1,17 +1,21 @@
 /* The state file. Appending is what makes it cheap (a result is a few hundred bytes) and safe: whatever a kill cuts off
- * is the last line, which has no newline yet. Numbers have 17 digits, so what is read back is what was measured. Owned
- * by one thread. */
+ * is the last line, which has no newline yet. The plan, its first line, is there as a whole or not at all: what begins
+ * otherwise is somebody else's, and stays. Numbers have 17 digits, so what is read back is what was measured. Owned by
+ * one thread. */
 #include "measure/state.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/memory.h"
 
-enum { FLAGS = JSON_COMPACT | JSON_REAL_PRECISION(17) };
+enum { FLAGS = JSON_COMPACT | JSON_REAL_PRECISION(17), file_most = 1 << 30 };
 
 struct spl_state {
     FILE *file;
@@ -95,6 +99,39 @@ static int put(struct spl_state *s, const json_t *record, struct spl_error *err)
     return SPL_OK;
 }
 
+static int begin(const char *path, const json_t *plan, struct spl_error *err)
+{
+    char *text = json_dumps(plan, FLAGS), *line = NULL;
+    const int length = text ? asprintf(&line, "%s\n", text) : -1;
+    int rc = length < 0 ? spl_fail(err, SPL_E_NOMEM, "out of memory: the plan could not be stored")
+                        : spl_file_replace(path, line, (size_t)length, err);
+    free(text);
+    free(line);
+    return rc;
+}
+
+/* No link is followed and no pipe waited for: in a folder that another made they may lead anywhere. */
+static int open_file(struct spl_state *s, struct spl_error *err)
+{
+    struct stat status;
+    int fd = open(s->path, O_RDWR | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0 && errno != ELOOP)
+        return spl_fail_errno(err, errno, "cannot open %s", s->path);
+    if (fd < 0 || fstat(fd, &status) || !S_ISREG(status.st_mode) || status.st_size > file_most) {
+        if (fd >= 0)
+            close(fd);
+        return spl_fail(err, SPL_E_INPUT,
+                        "%s: no file of at most %d MiB, which the state of a measurement is; name "
+                        "another folder, or begin anew with --restart",
+                        s->path, file_most >> 20);
+    }
+    if (!(s->file = fdopen(fd, "a+"))) {
+        close(fd);
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for %s", s->path);
+    }
+    return SPL_OK;
+}
+
 int spl_state_open(const char *path, const json_t *plan, bool restart, bool (*take)(void *, const json_t *),
                    void *context, struct spl_state **out, size_t *resumed, struct spl_error *err)
 {
@@ -108,21 +145,26 @@ int spl_state_open(const char *path, const json_t *plan, bool restart, bool (*ta
     off_t end = 0;
     if ((size_t)snprintf(s->path, sizeof s->path, "%s", path) >= sizeof s->path)
         rc = spl_fail(err, SPL_E_USAGE, "the path '%.100s…' is too long", path);
-    if (!rc && !(s->file = fopen(path, restart ? "w+" : "a+")))
-        rc = spl_fail_errno(err, errno, "cannot open %s", path);
+    if (!rc && (restart || (faccessat(AT_FDCWD, path, F_OK, AT_SYMLINK_NOFOLLOW) && errno == ENOENT)))
+        rc = begin(path, plan, err);
+    if (!rc)
+        rc = open_file(s, err);
     if (!rc) {
         rewind(s->file);
         rc = read_lines(s, plan, take, context, &lines, &end, err);
     }
+    if (!rc && !lines)
+        rc = spl_fail(err, SPL_E_INPUT,
+                      "%s: it does not begin with the plan of a measurement; name another folder, or "
+                      "begin anew with --restart",
+                      path);
     if (!rc && (fseeko(s->file, end, SEEK_SET) || ftruncate(fileno(s->file), end)))
         rc = spl_fail_errno(err, errno, "cannot write %s", path);
-    if (!rc && !lines)
-        rc = put(s, plan, err);
     if (rc) {
         spl_state_close(s);
         return rc;
     }
-    *resumed = lines ? lines - 1 : 0;
+    *resumed = lines - 1;
     *out = s;
     return SPL_OK;
 }

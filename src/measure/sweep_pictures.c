@@ -3,9 +3,9 @@
  * so a resumed run has all pictures of what it skips. Any thread; one folder is one sweep's. */
 #include "measure/sweep_pictures.h"
 
-#include <errno.h>
 #include <stdio.h>
 
+#include "base/file.h"
 #include "measure/pictures.h"
 
 size_t spl_sweep_page_views(size_t views)
@@ -46,11 +46,7 @@ int spl_sweep_save_picture(const struct spl_sweep_options *o, enum spl_sweep_pic
         return rc;
     char path[4096];
     spl_sweep_picture_path(o, kind, view, setting, path);
-    FILE *file = fopen(path, "w");
-    bool failed = !file || fwrite(encoded.bytes, 1, encoded.length, file) != encoded.length;
-    failed |= file && fclose(file);
-    if (failed)
-        rc = spl_fail_errno(err, errno, "cannot write %s", path);
+    rc = spl_file_replace(path, encoded.bytes, encoded.length, err);
     spl_encoded_finish(&encoded);
     return rc;
 }

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -263,6 +264,8 @@ static void test_state_refusals(void **state)
         const char *text, *said;
     } bad[] = {
         {"nonsense\n", "line 1"},
+        {"nonsense", "does not begin with the plan"}, /* and stays */
+        {"", "does not begin with the plan"},
         {"[]\n", "line 1"},
         {"{\"splatd-bench\": 1, \"size\": 1.0}\n{\"value\": 1}\nx\n{\"value\": 2}\n", "line 3"},
         {"{\"splatd-bench\": 1, \"size\": 1.0}\n{\"value\": \"1\"}\n", "line 2 does not fit"},
@@ -277,6 +280,31 @@ static void test_state_refusals(void **state)
         assert_non_null(strstr(err.message, bad[i].said));
         assert_null(s);
     }
+}
+
+/* A folder that another made: what lies behind a link there is neither read nor written over, no pipe is waited for. */
+static void test_state_follows_nothing(void **state)
+{
+    (void)state;
+    char path[300], text[64] = "";
+    double values[4];
+    size_t resumed;
+    struct spl_state *s;
+    snprintf(path, sizeof path, "%s/link.jsonl", folder);
+    const char *behind = write_text("behind.txt", "{\"splatd-bench\": 1, \"size\": 1.0}\n{");
+    assert_int_equal(symlink("behind.txt", path), 0);
+    struct spl_error err = {0};
+    assert_int_equal(open_values(path, 1, false, values, &s, &resumed, &err), SPL_E_INPUT);
+    assert_non_null(strstr(err.message, path));
+    assert_int_equal(open_values(path, 1, true, values, &s, &resumed, NULL), 0); /* in place of the link */
+    spl_state_close(s);
+    FILE *file = fopen(behind, "r");
+    assert_non_null(fgets(text, sizeof text, file));
+    assert_int_equal(fgetc(file), '{');
+    fclose(file);
+    snprintf(path, sizeof path, "%s/pipe.jsonl", folder);
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_int_equal(open_values(path, 1, false, values, &s, &resumed, NULL), SPL_E_INPUT);
 }
 
 /* ------------------------------------------------------------------------------------------------------ references */
@@ -526,8 +554,8 @@ static void test_report(void **state)
     /* With something soft: a model beside the solid setting, with its own stage's time. */
     struct spl_soft_params soft = {.opacity = 0.3};
     assert_int_equal(spl_soft_parse("class:3-5", &soft, NULL), 0);
-    report.profile.points[0].setting = (struct spl_setting){.method = SPL_METHOD_POINTS, .lod = 4, .supersample = 1,
-                                                            .atoms = 8, .soft = 1 + SPL_SOFT_MODEL_BASE};
+    report.profile.points[0].setting = (struct spl_setting){
+        .method = SPL_METHOD_POINTS, .lod = 4, .supersample = 1, .atoms = 8, .soft = 1 + SPL_SOFT_MODEL_BASE};
     report.profile.points[0].soft_ms = 7.5;
     report.profile.soft = soft;
     spl_report_setting_name(&report.profile.points[0].setting, name);
@@ -559,6 +587,7 @@ int main(void)
         cmocka_unit_test(test_peers_refusals),
         cmocka_unit_test(test_state_resumes),
         cmocka_unit_test(test_state_refusals),
+        cmocka_unit_test(test_state_follows_nothing),
         cmocka_unit_test(test_references),
         cmocka_unit_test(test_poses),
         cmocka_unit_test(test_tolerance),
