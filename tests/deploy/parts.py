@@ -178,7 +178,7 @@ def check_leftovers(survey, command, whole, parts):
     parts.mkdir()
     for name in "part-3.spld", "part-7.empty", f"part-3.spld.splatd-{2**22 + 1}", f".job.json.{2**22 + 1}-0":
         (parts / name).write_text("of a plan before")
-    (parts / "job.json").write_text("{}")
+    (parts / "job.json").write_text('{"format": "splatd-job"}')
     assert subprocess.run(others, stderr=subprocess.DEVNULL).returncode == 0 and not parts.exists(), list(parts.iterdir())
     with in_part(command, 2, whole, signal.SIGSTOP) as running:
         second = subprocess.run(command, stderr=subprocess.PIPE, text=True)
@@ -224,7 +224,7 @@ def check_one_file(survey, top):
     assert survey.run("--part", 0, top / "of copy").returncode == survey.run("--part", 1, top / "of copy").returncode == 0
     (top / "link.spld.parts").symlink_to(top / "nowhere")
     said = survey.run("--parts", 3, survey.scans, "-o", top / "link.spld")
-    assert said.returncode == 1 and "link.spld.parts: parts lie in this folder, and it cannot be opened" in said.stdout, said.stdout
+    assert said.returncode == 2 and "link.spld.parts: this is a link" in said.stdout, said.stdout
     for words, says in ((("--merge", survey.scans, "-o", whole), "--merge is of parts that are joined"),
                         (("--join", survey.truth, "--merge"), "--merge needs a dataset to write"),
                         (("--join", survey.truth, "--merge", "-o", survey.truth / "part-0.spld"), "is a tile of"),

@@ -21,9 +21,14 @@ int spl_job_lock(const char *path, int *lock, struct spl_error *err)
     for (int tries = 0;; tries++) {
         if (mkdir(path, 0777) && errno != EEXIST)
             return spl_fail_errno(err, errno, "%.300s: this folder cannot be made", path);
-        *lock = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        *lock = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
         if (*lock < 0 && errno == ENOENT && tries < tries_most)
             continue;
+        if (*lock < 0 && !lstat(path, &there) && S_ISLNK(there.st_mode)) /* to parts of another, maybe */
+            return spl_fail_field(err, SPL_E_USAGE, "output",
+                                  "%.300s: this is a link; parts lie in a folder of their own, which is removed with "
+                                  "them: remove the link, or choose another name",
+                                  path);
         if (*lock < 0)
             return spl_fail_errno(err, errno, "%.300s: parts lie in this folder, and it cannot be opened", path);
         if (flock(*lock, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK) {
@@ -32,7 +37,7 @@ int spl_job_lock(const char *path, int *lock, struct spl_error *err)
                                   "%.300s: another splatd packs these parts; wait for its end, or choose another name",
                                   path);
         }
-        if (!stat(path, &there) && !fstat(*lock, &own) && own.st_ino == there.st_ino && own.st_dev == there.st_dev)
+        if (!lstat(path, &there) && !fstat(*lock, &own) && own.st_ino == there.st_ino && own.st_dev == there.st_dev)
             return SPL_OK;
         close(*lock);
         if (tries >= tries_most)

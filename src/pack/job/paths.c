@@ -3,15 +3,29 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "base/memory.h"
 #include "pack/inputs.h"
-#include "pack/job/job.h"
+#include "pack/job/names.h"
+
+/* Whether the folder's job.json says that it is one of ours; such are there as a whole. */
+static bool is_job(DIR *dir)
+{
+    char begin[4096];
+    int fd = openat(dirfd(dir), SPL_JOB_FILE, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    ssize_t length = fd < 0 ? -1 : read(fd, begin, sizeof begin - 1);
+    if (fd >= 0)
+        close(fd);
+    begin[length < 0 ? 0 : length] = '\0';
+    return strstr(begin, "\"" SPL_JOB_FORMAT "\"");
+}
 
 static int look_into(const char *path, struct spl_error *err)
 {
@@ -24,7 +38,7 @@ static int look_into(const char *path, struct spl_error *err)
         if (!strcmp(item->d_name, ".") || !strcmp(item->d_name, "..") ||
             !strncmp(item->d_name, "." SPL_JOB_FILE ".", strlen("." SPL_JOB_FILE "."))) /* a killed plan's */
             continue;
-        job |= !strcmp(item->d_name, SPL_JOB_FILE);
+        job |= !strcmp(item->d_name, SPL_JOB_FILE) && is_job(dir);
         if (!other)
             snprintf(first, sizeof first, "%.60s", item->d_name);
         other = true;

@@ -382,8 +382,13 @@ static void test_a_folder_of_something_else_is_refused(void **state)
     folder_put_text("new/holiday.jpg", "");
     assert_int_equal(spl_job_make_folder(in_folder("new"), &made, &err), SPL_E_USAGE);
     assert_non_null(strstr(err.message, "something else than a job (holiday.jpg)"));
-    folder_put_text("new/job.json", "");
+    folder_put_text("new/job.json", "{\"kind\": \"Job\"}"); /* of another program */
+    assert_int_equal(spl_job_make_folder(in_folder("new"), &made, NULL), SPL_E_USAGE);
+    folder_put_text("new/job.json", "{\"format\": \"splatd-job\"}");
     assert_int_equal(spl_job_make_folder(in_folder("new"), &made, NULL), 0);
+    int lock;
+    assert_int_equal(symlink("new", in_folder("link")), 0);
+    assert_int_equal(spl_job_lock(in_folder("link"), &lock, &(struct spl_error){0}), SPL_E_USAGE);
     err = (struct spl_error){0};
     assert_int_equal(spl_job_make_folder(in_folder("new/job.json"), &made, &err), SPL_E_USAGE);
     assert_non_null(strstr(err.message, "a job is a folder"));
