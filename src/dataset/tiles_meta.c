@@ -109,6 +109,23 @@ static int tie(struct spl_dataset *dataset, size_t index, struct spl_tile *tile,
     return SPL_OK;
 }
 
+/* Of what was `before` and a tile more: panels and meshes stand for leaves, the others are splats. */
+static int check_counts(const struct spl_dataset *dataset, size_t index, const struct spl_dataset_info *before,
+                        struct spl_error *err)
+{
+    const struct spl_dataset_info *info = &dataset->info;
+    const uint64_t leaves = info->leaf_splats - before->leaf_splats,
+                   panels = info->panel_points - before->panel_points,
+                   meshes = info->mesh_points - before->mesh_points;
+    if (panels > leaves)
+        return wrong(dataset, index, "panel_points", "is more than its leaf_splats", err);
+    if (meshes > leaves - panels)
+        return wrong(dataset, index, "mesh_points", "is more than panels leave of its leaf_splats", err);
+    if (info->splats - before->splats < leaves - panels - meshes)
+        return wrong(dataset, index, "splats", "is less than its leaves are", err);
+    return SPL_OK;
+}
+
 static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *json, struct sums *sums,
                     struct spl_error *err)
 {
@@ -116,7 +133,7 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
     struct spl_tile *tile = &dataset->tiles->list[index];
     const json_t *pages = json_object_get(json, "pages");
     const json_t *radius = json_object_get(json, "splat_radius");
-    const uint64_t leaves_before = info->leaf_splats;
+    const struct spl_dataset_info before = *info;
     uint64_t node, levels;
     const struct {
         const char *member;
@@ -136,11 +153,13 @@ static int add_tile(struct spl_dataset *dataset, size_t index, const json_t *jso
             (*more[i].sum += number) > sum_most)
             rc = wrong(dataset, index, more[i].member, "is more than all together can have", err);
     }
+    if (!rc)
+        rc = check_counts(dataset, index, &before, err);
     if (!rc && !(json_number_value(radius) > 0 && json_number_value(radius) <= 1e15))
         rc = wrong(dataset, index, "splat_radius", "is no number that it can be", err);
     if (rc)
         return rc;
-    sums->radii += json_number_value(radius) * (double)(info->leaf_splats - leaves_before);
+    sums->radii += json_number_value(radius) * (double)(info->leaf_splats - before.leaf_splats);
     tile->node = (uint32_t)node;
     tile->levels = (uint32_t)levels;
     tile->first_page = (uint32_t)sums->pages;

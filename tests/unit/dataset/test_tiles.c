@@ -494,6 +494,8 @@ static void test_forged(void **state)
                 {"levels", "0", "tiles[3].levels"},              {"levels", "255", "tiles[3].levels"},
                 {"points", "-3", "tiles[3].points"},             {"splats", "9223372036854775807", "tiles[3].splats"},
                 {"splats", "2305843009213693951", "tiles[3].splats"},
+                {"splats", "0", "tiles[3].splats"},              {"panel_points", "99999999", "tiles[3].panel_points"},
+                {"mesh_points", "99999999", "tiles[3].mesh_points"},
                 {"pages", "[]", "tiles[3].pages"},               {"pages", "[[1,1,1]]", "tiles[3].pages"},
                 {"pages", "[[0,1,1,64]]", "tiles[3].pages"},     {"pages", "[[1,1,1,63]]", "tiles[3].pages"},
                 {"pages", "[[1,1,1,4294967296]]", "tiles[3].pages"},
