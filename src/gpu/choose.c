@@ -95,6 +95,8 @@ static int open_device(const struct spl_gpu_backend *backend, uint32_t index, co
         spl_gpu_close(gpu);
         return code;
     }
+    if (getenv("SPLATD_INJECT_HARDWARE")) // tests: it is drawn with as a GPU is, which a machine may have none of
+        gpu->info.software = false;
     // after the test, which says what the device can do and not what it may take
     uint64_t share = limits->memory_bytes / 4 * 3 / (options->sharers ? options->sharers : 1);
     limits->memory_bytes = options->memory_limit ? options->memory_limit : share;
