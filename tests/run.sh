@@ -100,6 +100,7 @@ leaks=1
 sanitiser_runs address env || leaks=0
 [ $leaks = 1 ] || echo "note: no leak check, this container does not let LeakSanitizer work"
 export ASAN_OPTIONS=detect_leaks=$leaks:abort_on_error=1:allocator_may_return_null=1:verify_asan_link_order=0
+export LSAN_OPTIONS=suppressions=$PWD/tests/lsan.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1
 export TSAN_OPTIONS=suppressions=$PWD/tests/tsan.supp:halt_on_error=1:second_deadlock_stack=1
 
