@@ -145,14 +145,23 @@ void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t leng
 
 void spl_cloud_add_unused(struct spl_cloud *cloud, const char *name, size_t length, const char *why)
 {
-    static const char more[] = ", …";
+    static const char more[] = "…";
     char *unused = cloud->info.unused, entry[160];
     const size_t used = strlen(unused), room = sizeof cloud->info.unused - used;
     const bool cut = used >= sizeof more - 1 && !strcmp(unused + used - (sizeof more - 1), more);
     size_t size =
         (size_t)snprintf(entry, sizeof entry, why ? "%s%.*s (%s)" : "%s%.*s", used ? ", " : "", (int)length, name, why);
-    if (!cut)
-        snprintf(unused + used, room, "%s", size < sizeof entry && size + sizeof more <= room ? entry : more);
+    if (!cut && size < sizeof entry && size + strlen(", ") + sizeof more <= room)
+        snprintf(unused + used, room, "%s", entry);
+    else if (!cut)
+        snprintf(unused + used, room, "%s%s", used ? ", " : "", more);
+}
+
+void spl_cloud_tell_unused(struct spl_cloud *cloud, const char *name, int column, bool told)
+{
+    const bool color = column >= SPL_COLUMN_RED && column <= SPL_COLUMN_BLUE; /* spl_packed_tell_rest() tells of it */
+    if (!told && !color && !spl_column_is_used(cloud->columns, column))
+        spl_cloud_add_unused(cloud, name, strlen(name), NULL);
 }
 
 int spl_cloud_take_column(struct spl_cloud *cloud, const char *name, size_t length)

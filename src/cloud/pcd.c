@@ -92,9 +92,7 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
     spl_packed_tell_rest(cloud);
     for (unsigned i = 0; i < pcd->header.field_count; i++) {
         const struct spl_pcd_field *field = &pcd->header.fields[i];
-        const bool rest = field->column >= SPL_COLUMN_RED && field->column <= SPL_COLUMN_BLUE; /* told already */
-        if (!field->told && !rest && !is_padding(field) && !spl_column_is_used(cloud->columns, field->column))
-            spl_cloud_add_unused(cloud, field->name, strlen(field->name), NULL);
+        spl_cloud_tell_unused(cloud, field->name, field->column, field->told || is_padding(field));
     }
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;

@@ -281,9 +281,7 @@ static int find_columns(struct spl_cloud *cloud, struct spl_error *err)
     spl_packed_tell_rest(cloud);
     for (unsigned i = 0; i < element->properties; i++) {
         const struct spl_ply_property *p = &ply->header.properties[element->first + i];
-        const bool rest = p->column >= SPL_COLUMN_RED && p->column <= SPL_COLUMN_BLUE; /* which is told already */
-        if (!p->told && !rest && !spl_column_is_used(cloud->columns, p->column))
-            spl_cloud_add_unused(cloud, p->name, strlen(p->name), NULL);
+        spl_cloud_tell_unused(cloud, p->name, p->column, p->told);
     }
     if (spl_columns_have3(cloud->columns, SPL_COLUMN_NX))
         cloud->info.attributes |= SPL_CLOUD_NORMAL;

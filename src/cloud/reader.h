@@ -66,6 +66,8 @@ void spl_cloud_name_field(struct spl_cloud *cloud, const char *name, size_t leng
 
 /* Adds to info.unused, "NAME" or "NAME (WHY)", or that there are more; `why` may be NULL. */
 void spl_cloud_add_unused(struct spl_cloud *cloud, const char *name, size_t length, const char *why);
+/* Of a file whose fields have names, after spl_packed_tell_rest(): a field that fills nothing, unless it is `told`. */
+void spl_cloud_tell_unused(struct spl_cloud *cloud, const char *name, int column, bool told);
 
 /* For messages. */
 const char *spl_cloud_column_name(const struct spl_cloud *cloud, int column);

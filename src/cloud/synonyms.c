@@ -98,16 +98,14 @@ static size_t next_word(const char **p, const char *end)
  * one of an instrument or a reflector. */
 static bool is_height_above(const char *name, size_t length)
 {
-    static const char called[] =
-        " z h hoehe h\xc3\xb6he h\xc3\x96he h\xf6he h\xd6he height elevation elev altitude alt "
-        "altitud cota quota hoogte h\xc3\xb6jd h\xf6jd ";
+    static const char called[] = " z h hoehe h\xc3\xb6he h\xc3\x96he h\xf6he h\xd6he height elevation elev "
+                                 "altitude alt altitud cota quota hoogte h\xc3\xb6jd h\xf6jd ";
     static const char from[] =
-        " \xc3\xbc \xc3\x9c \xfc \xdc ue \xc3\xbc\142er \xfc\142er ueber above over m ft a s l sl sea level mean msl "
-        "amsl masl "
-        "\xc3\xbcm \xfcm \xc3\xbcnn \xfcnn \xc3\xbcnhn \xfcnhn nn nhn dhhn dhhn12 dhhn92 dhhn2016 ln02 lhn95 ngf ign69 "
-        "nap "
-        "rh2000 nn2000 dvr90 navd navd88 ngvd29 egm96 egm2008 evrf2007 odn ell ellipsoid ellipsoidal ellipsoidisch "
-        "ortho orthometric orthometrisch ";
+        " \xc3\xbc \xc3\x9c \xfc \xdc ue \xc3\xbc\142er \xfc\142er ueber above over m ft a s l sl "
+        "sea level mean msl amsl masl \xc3\xbcm \xfcm \xc3\xbcnn \xfcnn \xc3\xbcnhn \xfcnhn nn nhn "
+        "dhhn dhhn12 dhhn92 dhhn2016 ln02 lhn95 ngf ign69 nap rh2000 nn2000 dvr90 navd "
+        "navd88 ngvd29 egm96 egm2008 evrf2007 odn ell ellipsoid ellipsoidal "
+        "ellipsoidisch ortho orthometric orthometrisch ";
     const char *p = name, *end = name + length;
     unsigned heights = 0, others = 0;
     for (size_t size; (size = next_word(&p, end)); p += size) {

@@ -13,16 +13,6 @@ static inline bool spl_name_is(const char *name, size_t length, const char *othe
     return strlen(other) == length && !strncasecmp(other, name, length);
 }
 
-static inline bool spl_name_is_one_of(const char *const *words, size_t count, const char *name, size_t length)
-{
-    for (size_t i = 0; i < count; i++)
-        if (spl_name_is(name, length, words[i]))
-            return true;
-    return false;
-}
-
-#define SPL_NAME_IS_ONE_OF(words, name, length) spl_name_is_one_of(words, sizeof(words) / sizeof *(words), name, length)
-
 enum spl_synonym_pass { SPL_SYNONYM_AXES, SPL_SYNONYM_WORDS, SPL_SYNONYM_PARTS, SPL_SYNONYM_PASSES };
 
 /* The column that a name without a unit means, SKIP: none in this pass. For columns alone that no field has by its own

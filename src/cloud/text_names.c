@@ -8,6 +8,16 @@
 #include "cloud/synonyms.h"
 #include "cloud/text.h"
 
+static bool is_one_of(const char *const *words, size_t count, const char *name, size_t length)
+{
+    for (size_t i = 0; i < count; i++)
+        if (spl_name_is(name, length, words[i]))
+            return true;
+    return false;
+}
+
+#define IS_ONE_OF(words, name, length) is_one_of(words, sizeof(words) / sizeof *(words), name, length)
+
 /* The next heading. Between blanks "[m]" is the unit of the one before. */
 static bool next_name(struct spl_fields *fields, const char **name, size_t *length)
 {
@@ -42,7 +52,7 @@ bool spl_text_names_degrees(const char *line, size_t length)
     const char *name;
     size_t size;
     while (next_name(&fields, &name, &size))
-        if (SPL_NAME_IS_ONE_OF(degrees, name, without_words(name, size)))
+        if (IS_ONE_OF(degrees, name, without_words(name, size)))
             return true;
     return false;
 }
@@ -94,10 +104,10 @@ static void look_for_surveyors(struct spl_layout *layout, struct spl_fields fiel
     bool numbered = false;
     for (unsigned i = 0, stage = 0; next_name(&fields, &name, &length); i++) {
         length = without_words(name, length);
-        numbered |= !stage && SPL_NAME_IS_ONE_OF(numbers, name, length);
+        numbered |= !stage && IS_ONE_OF(numbers, name, length);
         bool height = stage == 2 && layout->column[i] == SPL_COLUMN_Z;
         const char *blank = memchr(name, ' ', length);
-        bool german = SPL_NAME_IS_ONE_OF(heights, name, blank ? (size_t)(blank - name) : length);
+        bool german = IS_ONE_OF(heights, name, blank ? (size_t)(blank - name) : length);
         int axis = spl_name_is(name, length, "x")   ? SPL_COLUMN_X
                    : spl_name_is(name, length, "y") ? SPL_COLUMN_Y
                                                     : spl_column_from_synonym(name, length, false, SPL_SYNONYM_AXES);
