@@ -42,6 +42,19 @@ int spl_path_set_size(struct spl_path_reader *reader, double width, double heigh
     return 0;
 }
 
+int spl_path_set_fps(struct spl_path_reader *reader, const json_t *json, struct spl_error *err)
+{
+    const json_t *value = json_object_get(json, "fps");
+    const double fps = json_number_value(value);
+    if (value && !json_is_number(value))
+        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps must be a number, not %s", spl_json_type_name(value));
+    if (value && !spl_camera_path_takes_fps(fps))
+        return spl_fail_field(err, SPL_E_INPUT, "fps", "fps must be %g to %g, not %g", SPL_CAMERA_PATH_FPS_MIN,
+                              SPL_CAMERA_PATH_FPS_MAX, fps);
+    reader->path->fps = fps;
+    return SPL_OK;
+}
+
 int spl_path_set_fov(const struct spl_path_reader *reader, double fov, struct spl_camera *camera, struct spl_error *err)
 {
     const struct spl_camera_defaults *defaults = reader->options->defaults;
@@ -118,17 +131,11 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     reader->list = list ? "keyframes" : "frames";
     json_object_foreach((json_t *)json, name, value)
     {
-        bool number = !strcmp(name, "fps"), flag = !strcmp(name, "closed"), crs = !strcmp(name, "crs");
-        if (!number && !flag && !crs && strcmp(name, reader->list))
+        bool flag = !strcmp(name, "closed"), fps = !strcmp(name, "fps"), crs = !strcmp(name, "crs");
+        if (!flag && !fps && !crs && strcmp(name, reader->list))
             return spl_fail_field(err, SPL_E_INPUT, name,
                                   "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name,
                                   reader->list);
-        if (number && !spl_camera_path_takes_fps(json_number_value(value)))
-            return json_is_number(value) ? spl_fail_field(err, SPL_E_INPUT, name, "fps must be %g to %g, not %g",
-                                                          SPL_CAMERA_PATH_FPS_MIN, SPL_CAMERA_PATH_FPS_MAX,
-                                                          json_number_value(value))
-                                         : spl_fail_field(err, SPL_E_INPUT, name, "fps must be a number, not %s",
-                                                          spl_json_type_name(value));
         if (flag && !json_is_boolean(value))
             return spl_fail_field(err, SPL_E_INPUT, name, "closed must be true or false, not %s",
                                   spl_json_type_name(value));
@@ -137,14 +144,16 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     if (!json_is_array(list))
         return spl_fail_field(err, SPL_E_INPUT, reader->list, "%s must be an array, not %s", reader->list,
                               spl_json_type_name(list));
-    reader->path->fps = json_number_value(json_object_get(json, "fps"));
+    int rc = spl_path_set_fps(reader, json, err);
+    if (rc)
+        return rc;
     reader->path->closed = json_is_true(json_object_get(json, "closed"));
     const json_t *camera = json_object_get(json_array_get(list, 0), "camera");
     const char *named = json_string_value(json_object_get(camera, "projection"));
     const int projection = named ? spl_projection_from_name(named) : -1;
     double shape[2];
     spl_size_of_projection(projection < 0 ? SPL_PERSPECTIVE : (enum spl_projection)projection, shape);
-    int rc = spl_path_set_size(reader, shape[0], shape[1], err);
+    rc = spl_path_set_size(reader, shape[0], shape[1], err);
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};
         if ((rc = read_own_key(reader, json_array_get(list, i), json_object_get(json, "crs"), &why))) {
@@ -155,10 +164,12 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     return rc;
 }
 
-static int finish(struct spl_path_reader *reader, int rc, struct spl_error *err)
+/* `file` (may be NULL) is what was read, for the message. */
+static int finish(struct spl_path_reader *reader, const char *file, int rc, struct spl_error *err)
 {
     if (!rc && !reader->path->count)
-        rc = spl_fail_field(err, SPL_E_INPUT, reader->list, "the path holds no camera");
+        rc = spl_fail_field(err, SPL_E_INPUT, reader->list, "%s%sthe path holds no camera", file ? file : "",
+                            file ? ": " : "");
     if (rc)
         spl_camera_path_finish(reader->path);
     return rc;
@@ -194,7 +205,7 @@ int spl_camera_path_from_json(json_t *json, const struct spl_path_options *optio
                               struct spl_error *err)
 {
     struct spl_path_reader reader = {.options = options, .path = path, .list = "path"};
-    return finish(&reader, read_json(&reader, json, err), err);
+    return finish(&reader, NULL, read_json(&reader, json, err), err);
 }
 
 static int load_file(struct spl_path_reader *reader, const char *file, struct spl_error *err)
@@ -245,5 +256,5 @@ int spl_camera_path_load(const char *file, const struct spl_path_options *option
     } else {
         rc = load_file(&reader, file, err);
     }
-    return finish(&reader, rc, err);
+    return finish(&reader, file, rc, err);
 }

@@ -51,10 +51,8 @@ int spl_path_read_nerfstudio(struct spl_path_reader *reader, const json_t *json,
     if ((rc = get_list(reader, json, "camera_path", &list, err)) ||
         (rc = spl_json_get_number(json, "render_width", &width, err)) ||
         (rc = spl_json_get_number(json, "render_height", &height, err)) ||
-        (rc = spl_path_set_size(reader, width, height, err)))
+        (rc = spl_path_set_size(reader, width, height, err)) || (rc = spl_path_set_fps(reader, json, err)))
         return rc;
-    double fps = json_number_value(json_object_get(json, "fps"));
-    reader->path->fps = spl_camera_path_takes_fps(fps) ? fps : 0;
     reader->path->closed = json_is_true(json_object_get(json, "is_cycle"));
     for (size_t i = 0; !rc && i < json_array_size(list); i++) {
         struct spl_error why = {0};

@@ -17,6 +17,9 @@ struct spl_path_reader {
 /* The size of the outcome: the options', else the path's own, else 1280 x 720; checked against the limits. */
 int spl_path_set_size(struct spl_path_reader *reader, double width, double height, struct spl_error *err);
 
+/* The path's frames a second, of its key fps; 0 where it has none. */
+int spl_path_set_fps(struct spl_path_reader *reader, const json_t *json, struct spl_error *err);
+
 /* A camera whose lens is the vertical field of view `fov`, at the reader's size, with near and far; its pose is zero.
  */
 int spl_path_set_fov(const struct spl_path_reader *reader, double fov, struct spl_camera *camera,

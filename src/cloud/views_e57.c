@@ -3,7 +3,6 @@
  *
  * Names are the images', with their number in the file, since most writers call all of them the same; of what no file
  * name can carry '_' remains. A spherical or cylindrical image without a pose has that of its scan. Any thread. */
-#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
@@ -272,9 +271,7 @@ int spl_view_open_inner(const struct spl_named_view *view, FILE **file, struct s
     struct spl_source source;
     struct spl_e57_pages pages = {0};
     if (!inner->at)
-        return (*file = spl_open_for_reading(inner->path)) ? SPL_OK
-               : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", inner->path)
-                                 : spl_fail_errno(err, errno, "%s: cannot be opened", inner->path);
+        return spl_open_for_reading(inner->path, file, err);
     int rc = spl_source_open(&source, inner->path, err);
     if (rc)
         return rc;

@@ -12,6 +12,7 @@
 
 #include <splatd/render.h>
 
+#include "base/reading.h"
 #include "cmd/cmd.h"
 #include "cmd/output.h"
 #include "cmd/waiting.h"
@@ -26,24 +27,25 @@
 static int read_rays(struct spl_cmd_render *a, struct spl_error *err)
 {
     const bool json = !strcasecmp(spl_cmd_ending(a->rays_file), "json");
-    FILE *file = fopen(a->rays_file, "rb");
+    FILE *file;
     struct stat status;
-    if (!file || fstat(fileno(file), &status)) {
-        int rc = spl_fail_errno(err, errno, "%s: cannot be read", a->rays_file);
-        if (file)
-            fclose(file);
+    struct spl_error why = {0};
+    int rc = spl_open_for_reading(a->rays_file, &file, err);
+    if (rc)
         return rc;
-    }
-    int rc;
     if (json) {
         json_error_t where;
         json_t *list = spl_json_load_stream(file, &where);
-        rc = list ? spl_rays_from_json(list, &a->rays, err)
-                  : spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file,
-                                   where.line, where.column, spl_json_fault(&where));
+        if (!list)
+            rc = spl_fail_field(err, SPL_E_INPUT, "rays", "%s: broken JSON at line %d, column %d: %s", a->rays_file,
+                                where.line, where.column, spl_json_fault(&where));
+        else if ((rc = spl_rays_from_json(list, &a->rays, &why)))
+            spl_fail_field(err, rc, "rays", "%s: %s", a->rays_file, why.message);
         json_decref(list);
     } else {
-        rc = spl_rays_from_npy(file, (uint64_t)status.st_size, a->rays_file, &a->rays, err);
+        rc = fstat(fileno(file), &status)
+                 ? spl_fail_errno(err, errno, "%s: cannot be read", a->rays_file)
+                 : spl_rays_from_npy(file, (uint64_t)status.st_size, a->rays_file, &a->rays, err);
     }
     fclose(file);
     return rc;

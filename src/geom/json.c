@@ -1,10 +1,10 @@
 /* JSON beyond what jansson has; see json.h. */
 #include "geom/json.h"
 
-#include <errno.h>
 #include <string.h>
 
 #include "base/decimal.h"
+#include "base/reading.h"
 
 bool spl_json_is_marked(const void *text, size_t length)
 {
@@ -45,10 +45,11 @@ json_t *spl_json_load_stream(FILE *file, json_error_t *where)
 
 json_t *spl_json_load_file(const char *path, json_error_t *where)
 {
-    FILE *file = fopen(path, "rb");
-    if (!file) { /* as json_load_file() says it */
+    struct spl_error why = {0};
+    FILE *file;
+    if (spl_open_for_reading(path, &file, &why)) { /* as json_load_file() says it */
         *where = (json_error_t){.line = -1, .column = -1};
-        snprintf(where->text, sizeof where->text - 1, "unable to open %s: %s", path, strerror(errno));
+        snprintf(where->text, sizeof where->text - 1, "%.*s", (int)sizeof where->text - 2, why.message);
         return NULL;
     }
     json_t *json = spl_json_load_stream(file, where);

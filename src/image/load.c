@@ -76,14 +76,6 @@ static int load(FILE *file, const char *path, struct spl_image *out, struct spl_
     return formats[format].decode(file, path, out, err);
 }
 
-static int open_file(const char *path, FILE **file, struct spl_error *err)
-{
-    *file = spl_open_for_reading(path);
-    return *file             ? SPL_OK
-           : errno == ENOENT ? spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path)
-                             : spl_fail_errno(err, errno, "%s: cannot be opened", path);
-}
-
 int spl_image_get_info_of(FILE *file, const char *path, struct spl_image_info *out, struct spl_error *err)
 {
     *out = (struct spl_image_info){0};
@@ -97,7 +89,7 @@ int spl_image_get_info(const char *path, struct spl_image_info *out, struct spl_
 {
     FILE *file;
     *out = (struct spl_image_info){0};
-    int rc = open_file(path, &file, err);
+    int rc = spl_open_for_reading(path, &file, err);
     if (!rc)
         rc = spl_image_get_info_of(file, path, out, err);
     if (file)
@@ -128,7 +120,7 @@ int spl_image_load(const char *path, enum spl_layer layer, struct spl_image *out
 {
     FILE *file;
     *out = (struct spl_image){0};
-    int rc = open_file(path, &file, err);
+    int rc = spl_open_for_reading(path, &file, err);
     if (!rc)
         rc = spl_image_load_of(file, path, layer, out, err);
     if (file)

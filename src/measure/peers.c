@@ -2,7 +2,6 @@
  * with its line rather than left out silently. Any thread. */
 #include "measure/peers.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,6 +9,7 @@
 
 #include "base/array.h"
 #include "base/decimal.h"
+#include "base/reading.h"
 
 /* Cuts the last field off `line` and parses it. */
 static int take_number(char *line, const char *field, double least, const char *path, size_t number, double *out,
@@ -48,12 +48,12 @@ static int take_row(struct spl_peers *peers, char *line, const char *path, size_
 int spl_peers_load(struct spl_peers *peers, const char *path, struct spl_error *err)
 {
     memset(peers, 0, sizeof *peers);
-    FILE *file = fopen(path, "r");
-    if (!file)
-        return spl_fail_errno(err, errno, "cannot open %s", path);
+    FILE *file;
+    int rc = spl_open_for_reading(path, &file, err);
+    if (rc)
+        return rc;
     char *line = NULL;
     size_t room = 0, number = 0;
-    int rc = SPL_OK;
     while (!rc && getline(&line, &room, file) > 0) {
         line[strcspn(line, "\r\n")] = 0;
         number++;

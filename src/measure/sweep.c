@@ -274,6 +274,7 @@ static int time_all(struct job *job, struct spl_error *err)
 
 /* --------------------------------------------------------------------------------------------------------- the run */
 
+/* A link to a folder is one. */
 static int make_folder(const char *path, struct spl_error *err)
 {
     return mkdir(path, 0777) && errno != EEXIST ? spl_fail_errno(err, errno, "cannot make the folder %s", path)
@@ -288,6 +289,7 @@ static bool take_record(void *context, const json_t *record)
 static int open_state(struct job *job, uint64_t reference_hash, struct spl_error *err)
 {
     const struct spl_sweep_options *o = job->options;
+    struct stat status;
     char path[4096];
     if ((size_t)snprintf(path, sizeof path, "%s/pictures/view18446744073709551615-setting1024-error.jpg", o->folder) >=
         sizeof path)
@@ -296,6 +298,9 @@ static int open_state(struct job *job, uint64_t reference_hash, struct spl_error
     snprintf(path, sizeof path, "%s/pictures", o->folder);
     if (!rc)
         rc = make_folder(path, err);
+    if (!rc && (lstat(path, &status) || !S_ISDIR(status.st_mode)))
+        rc = spl_fail(err, SPL_E_INPUT, "%s: no folder, which a measurement's pictures lie in; name another folder",
+                      path);
     json_t *plan = rc ? NULL : spl_record_plan(job->sweep, reference_hash, err);
     if (!plan)
         return rc ? rc : SPL_E_INPUT;

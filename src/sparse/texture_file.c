@@ -165,7 +165,7 @@ int spl_texture_file_open(const char *path, struct spl_texture_file *file, struc
     *file = (struct spl_texture_file){.fd = -1, .path = strdup(path)};
     if (!file->path)
         return spl_fail(err, SPL_E_NOMEM, "out of memory: a file's name");
-    file->fd = open(path, O_RDONLY | O_CLOEXEC);
+    file->fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (file->fd < 0 && errno == ENOENT)
         rc = spl_fail(err, SPL_E_NOT_FOUND, "%s: there is no such file", path);
     else if (file->fd < 0 || fstat(file->fd, &stat))

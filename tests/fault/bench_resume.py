@@ -212,6 +212,11 @@ def test_refusals(folder, dataset):
     assert "one dataset" in splatd("bench", dataset, dataset, "-o", out, code=2).stderr
     assert "1.5, 2 and 4, not '3'" in splatd("bench", dataset, "--supersample", "3", "-o", out, code=2).stderr
     assert not out.exists()
+    linked, elsewhere = folder / "linked", folder / "elsewhere"
+    linked.mkdir(), elsewhere.mkdir()
+    (linked / "pictures").symlink_to(elsewhere)
+    said = bench(dataset, cams, linked, code=2).stderr
+    assert "linked/pictures: no folder" in said and not list(elsewhere.iterdir()), said
 
 
 def main():

@@ -44,7 +44,11 @@ writes a.dat 89504e47 --format png --background White --margin 2 --near 0.5 --fa
 echo '[[0, 0, 1], [1, 0, 0]]' >directions.JSON
 "$splatd" render courtyard.spld --rays directions.JSON -o ranges.JSON 2>messages && grep -q '^\[' ranges.JSON ||
     fail "--rays and -o of .JSON: $(cat messages)"
-rm -f directions.JSON ranges.JSON messages
+mkfifo pipe.json && { sleep 0.2; cat directions.JSON; } >pipe.json &
+"$splatd" render courtyard.spld --rays pipe.json -o ranges.JSON 2>messages && grep -q '^\[' ranges.JSON ||
+    fail "--rays of a pipe: $(cat messages)"
+wait
+rm -f pipe.json directions.JSON ranges.JSON messages
 
 bytes=$("$splatd" render courtyard.spld --size 8x4 --layer id --format raw -o - 2>/dev/null | wc -c)
 [ "$bytes" = 128 ] || fail "stdout got $bytes bytes instead of 128"
@@ -127,6 +131,9 @@ refuses 2 '--background' courtyard.spld --background rad -o a.png
 refuses 2 '--quality' courtyard.spld --quality 0 -o a.png
 refuses 2 '--depth-scale' courtyard.spld --depth-scale 0 -o a.png
 refuses 2 '--memory-limit' courtyard.spld --memory-limit 1X -o a.png
+refuses 2 'nowhere.json: there is no such file' courtyard.spld --rays nowhere.json -o a.npy
+echo '[[0, 0, 1], 2]' >.bad.json
+refuses 2 '.bad.json: directions.1. must be' courtyard.spld --rays .bad.json -o a.npy
 refuses 1 'no-such-device' courtyard.spld --device no-such-device -o a.png
 refuses 1 'nowhere' courtyard.spld --size 8x8 -o nowhere/a.png
 refuses 2 'a.png' a.png -o a.png

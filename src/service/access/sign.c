@@ -59,11 +59,14 @@ bool spl_sign_is_signed(const char *query)
     return !strncmp(last, "sig=", 4) || !strncmp(last, "embed=", 6);
 }
 
-/* The length of the id behind `prefix` in `path`; 0 when `path` does not begin with it. */
+/* The length of the id behind `prefix` in `path`; 0 when `path` does not begin with it, or the id begins
+ * with a '.', which none does: clients take ".." for a folder. */
 static size_t find_id(const char *path, const char *prefix)
 {
     size_t length = strlen(prefix);
-    return strncmp(path, prefix, length) ? 0 : strcspn(path + length, "/?#");
+    if (strncmp(path, prefix, length) != 0 || path[length] == '.')
+        return 0;
+    return strcspn(path + length, "/?#");
 }
 
 /* Is `text`[0..length) the name of a tile, "/tiles/3/1/2.png", and nothing that could mean another path? With `holes`,

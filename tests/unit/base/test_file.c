@@ -1,5 +1,5 @@
-/* Files as a whole or not at all: what is read after success and after every failure, what lies beside, many writers.
- */
+/* Files as a whole or not at all: what is read after success and after every failure, what lies beside, many writers;
+ * opening pipes. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -19,6 +19,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/reading.h"
 
 enum { LONG = 300000, WRITERS = 4, ROUNDS = 20 };
 
@@ -151,6 +152,36 @@ static void writers_never_mix(void **state)
     free(got);
 }
 
+static void *write_late(void *writer)
+{
+    usleep(50000);
+    assert_int_equal(spl_write_all(*(const int *)writer, "late", 4), 0);
+    return NULL;
+}
+
+static void a_pipe_is_opened_at_once_and_read_as_it_writes(void **state)
+{
+    (void)state;
+    char got[4];
+    FILE *file;
+    struct spl_error err = {0};
+    pthread_t thread;
+    unlink(path);
+    assert_int_equal(spl_open_for_reading(path, &file, &err), SPL_E_NOT_FOUND);
+    assert_non_null(strstr(err.message, path));
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_int_equal(spl_open_for_reading(path, &file, NULL), 0);
+    assert_int_equal(fread(got, 1, sizeof got, file), 0); /* nobody writes */
+    fclose(file);
+    int writer = open(path, O_RDWR);
+    assert_int_equal(spl_open_for_reading(path, &file, NULL), 0);
+    assert_int_equal(pthread_create(&thread, NULL, write_late, &writer), 0);
+    assert_int_equal(fread(got, 1, sizeof got, file), sizeof got);
+    pthread_join(thread, NULL);
+    fclose(file);
+    close(writer);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -158,6 +189,7 @@ int main(void)
         cmocka_unit_test(a_failure_leaves_what_was_there),
         cmocka_unit_test(what_killed_writers_left_is_swept),
         cmocka_unit_test(writers_never_mix),
+        cmocka_unit_test(a_pipe_is_opened_at_once_and_read_as_it_writes),
     };
     if (!mkdtemp(folder))
         return 1;

@@ -239,6 +239,8 @@ static void test_bad_paths_are_named(void **state)
         {"{\"camera_path\":[],\"render_height\":9}", "render_width"},
         {"{\"camera_path\":[],\"render_width\":9.5,\"render_height\":9}", "width"},
         {"{\"camera_path\":[],\"render_width\":8192,\"render_height\":8192}", "width"},
+        {"{\"camera_path\":[],\"render_width\":9,\"render_height\":9,\"fps\":0}", "fps"},
+        {"{\"camera_path\":[],\"render_width\":9,\"render_height\":9,\"fps\":\"24\"}", "fps"},
         {"{\"class_name\":\"x\"}", "parameters"},
         {OPEN3D("[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]", "{}"), "parameters[0].width"},
         {OPEN3D("[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0]", INTRINSIC), "parameters[0].extrinsic"},

@@ -193,7 +193,7 @@ static void test_peers_refusals(void **state)
         assert_null(peers.rows);
     }
     struct spl_peers peers;
-    assert_int_equal(spl_peers_load(&peers, "/nowhere/p.csv", NULL), SPL_E_IO);
+    assert_int_equal(spl_peers_load(&peers, "/nowhere/p.csv", NULL), SPL_E_NOT_FOUND);
 }
 
 /* ----------------------------------------------------------------------------------------------------------- state */
