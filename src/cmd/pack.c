@@ -34,7 +34,7 @@ static void clean_up_on_signals(const char *output)
     }
 }
 
-/* A file may have any name, a dataset that is served may not. */
+/* A file may have any name, a dataset that is opened may not. */
 static void warn_of_name(const char *path)
 {
     size_t length;
@@ -42,7 +42,7 @@ static void warn_of_name(const char *path)
         return;
     fputs("splatd: warning: '", stderr);
     spl_cmd_put_text(stderr, path, 0);
-    fputs("' cannot be served under this name: an id has at most " SPL_CATALOG_ID_RULE "\n", stderr);
+    fputs("' is opened by no command under this name; rename it: an id has at most " SPL_CATALOG_ID_RULE "\n", stderr);
 }
 
 int spl_cmd_pack(int argc, char **argv)

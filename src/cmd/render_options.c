@@ -177,7 +177,7 @@ static int resolve_format(struct spl_cmd_render *a, struct spl_error *err)
                         spl_format_name((enum spl_format)a->drawing.format));
     if (a->drawing.format < 0)
         return spl_fail(err, SPL_E_USAGE,
-                        "'%s' does not say which format: end it in .jpg, .png or .npy, or add --format",
+                        "'%s' does not say which format: end it in .jpg, .png, .webp, .npy or .tif, or add --format",
                         a->drawing.output);
     a->drawing.encode.format = (enum spl_format)a->drawing.format;
     if (a->drawing.format == SPL_FORMAT_TIFF && !a->drawing.has_background)

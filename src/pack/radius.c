@@ -166,11 +166,11 @@ static void spread_some(const struct spl_moments *const moments[], unsigned coun
         }
 }
 
-/* More neighbours than are listed, of the point's side as those. */
-static void find_wide(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)
+/* `count` neighbours, more than are listed, of the point's side as those. */
+static void find_wide(const struct spl_vicinity *v, size_t i, unsigned count, struct spl_nearest *near)
 {
-    spl_neighbours_find(v->neighbours, i, v->wide, near);
-    spl_facing_keep(v->facing, i, v->wide, near);
+    spl_neighbours_find(v->neighbours, i, count, near);
+    spl_facing_keep(v->facing, i, count, near);
 }
 
 /* How many of `count` listed neighbours there are. */
@@ -248,10 +248,15 @@ SPL_INLINE struct place place_of(const double nearest[8])
     return place;
 }
 
+static bool is_linear(const struct spl_spread *spread)
+{
+    return spread->sigma[1] < linear_below * spread->sigma[2];
+}
+
 /* 0 on a surface or a line, 1 in a volume. */
 static double roundness(const struct spl_spread *spread)
 {
-    if (spread->sigma[1] < linear_below * spread->sigma[2])
+    if (is_linear(spread))
         return 0;
     double t = (spread->sigma[0] / spread->sigma[1] - round_from) / (round_to - round_from);
     t = smaller(1, larger(0, t));
@@ -306,15 +311,41 @@ SPL_INLINE double least_radius(const struct spl_points *p, size_t i, const uint3
     return 2 * sqrt(least);
 }
 
+/* Do the points of a wide view lie on a surface? Its normal, and what the eighths say there. */
+static bool shows_surface(const struct spl_vicinity *v, size_t i, const struct spl_nearest *near, double normal[3],
+                          struct place *place)
+{
+    double nearest[8];
+    struct spl_moments around = spl_moments_of(v->points, i, near);
+    struct spl_spread wide = spread_of(&around);
+    if (is_linear(&wide) || roundness(&wide) > 0)
+        return false;
+    memcpy(normal, wide.normal, sizeof wide.normal);
+    eighths(v->points, i, near->index, near->count, normal, coplanar, nearest);
+    *place = place_of(nearest);
+    return true;
+}
+
+/* Is point i, whose row is all that a wide view shows, of a surface of rows that are farther apart? The widest view has
+ * some on both sides then. No wire is asked: wires that hang side by side are no surface. */
+static bool shows_rows(const struct spl_vicinity *v, size_t i, struct spl_nearest *widest, double normal[3],
+                       struct place *place)
+{
+    if ((v->points->linear && v->points->linear[i]) || v->wide >= SPL_NEIGHBOURS_MAX)
+        return false;
+    find_wide(v, i, SPL_NEIGHBOURS_MAX, widest);
+    return shows_surface(v, i, widest, normal, place) && !place->open;
+}
+
 /* Normal and radius of point i, which has `reach` to its farthest neighbour, and the roundness of its surroundings. */
 SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
-                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           const struct spl_spread *around, double reach, struct spl_nearest near[2], double normal[3],
                            double *round, enum spl_edge *edge)
 {
     const struct spl_points *p = v->points;
     const uint32_t *list = v->lists + (i - v->begin) * v->k;
     double volume = 0, n = v->moments[i - v->begin].count - 1, radius = 2 * reach / sqrt(n), nearest[8];
-    bool linear = spread->sigma[1] < linear_below * spread->sigma[2];
+    const bool linear = is_linear(spread);
     memcpy(normal, spread->normal, sizeof spread->normal);
     *round = roundness(spread);
     bool flat = *round <= 0;
@@ -337,15 +368,18 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
     if (!linear && !place.open)
         return larger(radius, smaller(0.7 * place.gap, 2 * radius));
 
-    find_wide(v, i, near);
+    find_wide(v, i, v->wide, near);
     if (linear) {
-        struct spl_moments moments = spl_moments_of(p, i, near);
-        struct spl_spread wide = spread_of(&moments);
-        bool surface = wide.sigma[1] >= linear_below * wide.sigma[2] && roundness(&wide) == 0;
-        eighths(p, i, near->index, near->count, wide.normal, coplanar, nearest);
-        if (!surface || place_of(nearest).on_line) /* a wire: its points are 2 reach / n apart */
+        double across[3];
+        bool surface = shows_surface(v, i, near, across, &place) && !place.on_line;
+        if (!surface && shows_rows(v, i, near + 1, across, &place)) {
+            surface = true;
+            near++;
+            radius = 2 * near->farthest / sqrt(near->count);
+        }
+        if (!surface) /* a wire: its points are 2 reach / n apart */
             return smaller(radius, larger(1.5 * reach / n, 2 * spread->sigma[1]));
-        memcpy(normal, wide.normal, sizeof wide.normal);
+        memcpy(normal, across, sizeof across);
     }
     eighths(p, i, near->index, near->count, normal, coplanar, nearest);
     place = place_of(nearest);
@@ -360,7 +394,7 @@ SPL_INLINE double estimate_any(const struct spl_vicinity *v, size_t i, const str
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) static double
 estimate_avx2(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread, const struct spl_spread *around,
-              double reach, struct spl_nearest *near, double normal[3], double *round, enum spl_edge *edge)
+              double reach, struct spl_nearest near[2], double normal[3], double *round, enum spl_edge *edge)
 {
     return estimate_any(v, i, spread, around, reach, near, normal, round, edge);
 }
@@ -368,7 +402,7 @@ estimate_avx2(const struct spl_vicinity *v, size_t i, const struct spl_spread *s
 
 /* As widen(). */
 double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct spl_spread *spread,
-                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           const struct spl_spread *around, double reach, struct spl_nearest near[2], double normal[3],
                            double *round, enum spl_edge *edge)
 {
 #if defined(__x86_64__)
@@ -378,15 +412,13 @@ double spl_radius_estimate(const struct spl_vicinity *v, size_t i, const struct 
     return estimate_any(v, i, spread, around, reach, near, normal, round, edge);
 }
 
-bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest *near)
+bool spl_radius_on_surface(const struct spl_vicinity *v, size_t i, struct spl_nearest near[2])
 {
-    double nearest[8];
-    find_wide(v, i, near);
-    struct spl_moments around = spl_moments_of(v->points, i, near);
-    struct spl_spread wide = spread_of(&around);
-    if (wide.sigma[1] < linear_below * wide.sigma[2] || roundness(&wide) > 0)
-        return false;
-    eighths(v->points, i, near->index, near->count, wide.normal, coplanar, nearest);
-    struct place place = place_of(nearest);
-    return !place.open && place.gap < well_within * near->farthest;
+    double normal[3];
+    struct place place;
+    find_wide(v, i, v->wide, near);
+    if (shows_surface(v, i, near, normal, &place) && !place.open && place.gap < well_within * near->farthest)
+        return true;
+    struct spl_spread own = spread_of(&v->moments[i - v->begin]);
+    return is_linear(&own) && shows_rows(v, i, near + 1, normal, &place);
 }

@@ -42,12 +42,13 @@ enum spl_edge { SPL_EDGE_NONE, SPL_EDGE_LIKELY, SPL_EDGE_ASKED };
 
 /* Radius of point i of the run, which has `reach` to its farthest listed neighbour, from its two spreads; its normal,
  * of either sign; and how round its surroundings are, from 0 (a surface or a line) to 1 (a volume); whether it lies at
- * an edge: SPL_EDGE_ASKED where `near`, scratch for searches in order, holds the wide neighbours of i afterwards. */
+ * an edge: SPL_EDGE_ASKED where near[0] holds the wide neighbours of i afterwards. `near` is scratch for searches in
+ * order, for wide and for the widest views. */
 double spl_radius_estimate(const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
-                           const struct spl_spread *around, double reach, struct spl_nearest *near, double normal[3],
+                           const struct spl_spread *around, double reach, struct spl_nearest near[2], double normal[3],
                            double *round, enum spl_edge *edge);
 
 /* Whether a wider view of point i shows a surface that goes on all around it. `near` as above. */
-bool spl_radius_on_surface(const struct spl_vicinity *vicinity, size_t i, struct spl_nearest *near);
+bool spl_radius_on_surface(const struct spl_vicinity *vicinity, size_t i, struct spl_nearest near[2]);
 
 #endif

@@ -21,8 +21,9 @@ static const float stray_limit = 2.5f; /* times the median radius of the neighbo
 static void limit_runs(const struct spl_settle_block *block)
 {
     const float *radius = block->points->radius;
-    struct spl_nearest near;
-    spl_nearest_init(&near);
+    struct spl_nearest near[2];
+    spl_nearest_init(&near[0]);
+    spl_nearest_init(&near[1]);
     for (size_t run = block->begin; run < block->end; run += run_points) {
         size_t n = block->end - run < run_points ? block->end - run : run_points;
         size_t sample = n < run_sample ? n : run_sample;
@@ -34,7 +35,7 @@ static void limit_runs(const struct spl_settle_block *block)
         for (size_t i = run; i < run + n; i++) {
             float *limit = &block->limit[i - block->begin];
             *limit *= median;
-            if (radius[i] > *limit && sparse > median && spl_radius_on_surface(block->vicinity, i, &near))
+            if (radius[i] > *limit && sparse > median && spl_radius_on_surface(block->vicinity, i, near))
                 *limit *= sparse / median;
         }
     }

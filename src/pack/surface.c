@@ -27,7 +27,7 @@ enum { wide_factor = 3 };
 
 /* Fills normal, radius and its factor to the run's median; true when the normal's side is known. */
 static bool estimate(struct spl_points *p, const struct spl_vicinity *vicinity, size_t i, const struct spl_spread *own,
-                     const struct spl_spread *around, struct spl_nearest *near, float *limit, enum spl_edge *edge)
+                     const struct spl_spread *around, struct spl_nearest near[2], float *limit, enum spl_edge *edge)
 {
     double least[3], round, side = 1;
     double radius = spl_radius_estimate(vicinity, i, own, around, *limit, near, least, &round, edge);
@@ -70,19 +70,19 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
     for (size_t b = begin_block; b < end_block; b++) {
         size_t begin = b * SPL_SURFACE_BLOCK;
         size_t end = begin + SPL_SURFACE_BLOCK < s->points->count ? begin + SPL_SURFACE_BLOCK : s->points->count;
-        struct spl_nearest near;
+        struct spl_nearest near[2];
         if (spl_stage_is_cancelled(s->stage))
             return;
-        spl_nearest_init(&near);
+        spl_nearest_init(near);
         for (size_t i = begin; i < end; i++) {
-            spl_neighbours_find(s->neighbours, i, s->k, &near);
-            spl_facing_keep(&s->facing, i, s->k, &near);
+            spl_neighbours_find(s->neighbours, i, s->k, near);
+            spl_facing_keep(&s->facing, i, s->k, near);
             uint32_t *list = w->neighbours + (i - begin) * s->k;
             for (unsigned a = 0; a < s->k; a++)
-                list[a] = a < near.count ? near.index[a] : UINT32_MAX;
-            w->moments[i - begin] = spl_moments_of(s->points, i, &near);
-            w->limit[i - begin] = (float)near.farthest;
-            w->orient.reach[i - begin] = (float)(near.farthest * near.farthest);
+                list[a] = a < near->count ? near->index[a] : UINT32_MAX;
+            w->moments[i - begin] = spl_moments_of(s->points, i, near);
+            w->limit[i - begin] = (float)near->farthest;
+            w->orient.reach[i - begin] = (float)(near->farthest * near->farthest);
             if ((i & 255) == 255)
                 spl_spill_keep_bound(s->points->spill);
             if ((i & 4095) == 4095)
@@ -90,7 +90,8 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
         }
         const struct spl_vicinity vicinity = {s->points,  s->neighbours, begin, end,
                                               w->moments, w->neighbours, &s->facing, s->k,  s->wide};
-        spl_nearest_init(&near);
+        spl_nearest_init(&near[0]);
+        spl_nearest_init(&near[1]);
         struct spl_spreads spreads;
         size_t line_count = 0;
         for (size_t i = begin; i < end; i++) {
@@ -98,13 +99,13 @@ static void surface_block(void *context, size_t begin_block, size_t end_block, u
             size_t at = (i - begin) % SPL_SPREADS;
             if (!at)
                 spl_radius_spread(&vicinity, i, i + SPL_SPREADS < end ? i + SPL_SPREADS : end, &spreads);
-            w->orient.held[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at], &near,
+            w->orient.held[i - begin] = estimate(s->points, &vicinity, i, &spreads.own[at], &spreads.wide[at], near,
                                                  &w->limit[i - begin], &edge)
                                             ? SPL_TREE_ANCHORED
                                             : 0;
             const bool kept = !s->points->halo || !s->points->halo[i]; /* of others nobody asks for lines */
             if (edge == SPL_EDGE_ASKED && kept && s->edge)
-                line_count += spl_clip_foresee(s->points, i, &near, &s->turns, &w->lines[line_count]);
+                line_count += spl_clip_foresee(s->points, i, near, &s->turns, &w->lines[line_count]);
             else if (edge && kept && s->edge)
                 s->edge[i / 8] |= (uint8_t)(1 << i % 8); /* blocks share no byte */
         }

@@ -245,11 +245,11 @@ static int check_folder(const char *path, struct spl_error *err)
         return 0;
     snprintf(parent, sizeof parent, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
     bool missing = stat(path, &status) && errno == ENOENT;
+    if (!missing && !S_ISDIR(status.st_mode))
+        return spl_fail_field(err, SPL_E_USAGE, "tours", "the tours' folder '%.200s' is no folder", path);
     if (access(missing ? parent : path, W_OK | X_OK))
         return spl_fail_field(err, SPL_E_USAGE, "tours", "the tours' folder '%.200s' cannot be %s: %s", path,
                               missing ? "made" : "written", strerror(errno));
-    if (!missing && !S_ISDIR(status.st_mode))
-        return spl_fail_field(err, SPL_E_USAGE, "tours", "the tours' folder '%.200s' is no folder", path);
     return 0;
 }
 

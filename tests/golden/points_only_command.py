@@ -45,7 +45,7 @@ def main():
         expect(run("pack", cloud, *columns, "--points-only", "-o", bare).stderr, f"{WIRE} points on wires")
         run("pack", cloud, *columns, "-o", whole)
         said = run("pack", cloud, *columns, "--points-only", "--max-points", "100", "-o", folder / "Gro\u00dfe Fichte.spld").stderr
-        expect(said, "Fichte.spld' cannot be served under this name: an id has at most 127 letters a-z")
+        expect(said, "Fichte.spld' is opened by no command under this name; rename it: an id has at most 127 letters a-z")
         about = describe(bare)
         assert about["linear"] == WIRE and about["attributes"]["surface"] is False, about
         assert about["bytes_per_splat"]["normal"] == about["bytes_per_splat"]["radius"] == 0, about

@@ -245,7 +245,8 @@ def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_ope
             ("listen = nonsense", ("listen takes ADDR:PORT", "'nonsense'")), ("tokens = /nowhere", ("tokens", "/nowhere")),
             (f"tokens = {tokens}", ("tokens, line 2",)), (f"tokens = {folder}", ("tokens", folder)),
             ("url-key = /nowhere", ("url-key", "tokens")), ("listen = 0.0.0.0:0", ("listen", "--allow-anonymous")),
-            ("tours = /nowhere/x", ("tours", "/nowhere/x")), (f"tours = {tokens}", ("tours", tokens)),
+            ("tours = /nowhere/x", ("tours", "/nowhere/x")), (f"tours = {tokens}", ("tours", tokens, "is no folder")),
+            ("dataset = /nowhere/d", ("/nowhere/d", "there is no such file or directory of datasets")),
             ("listen = no-such-name.invalid:80", ("listen", "no-such-name.invalid")), ("queue = 0", ("queue", "1 to 4096")),
         ]:
             for log_format in ("text", "json"):

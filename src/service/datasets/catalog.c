@@ -129,8 +129,8 @@ void spl_catalog_say_left_out(struct spl_catalog *catalog, size_t left_out, cons
     const size_t nameless = files->nameless;
     if (nameless && nameless != catalog->nameless)
         spl_log_warn("%zu %s left out, as %s: a name is a dataset's id, which has at most " SPL_CATALOG_ID_RULE
-                     "; rename what is to be served", nameless, nameless == 1 ? "file is" : "files are",
-                     files->nameless_names);
+                     "; rename what is to be served",
+                     nameless, nameless == 1 ? "file is" : "files are", files->nameless_names);
     catalog->left_out = left_out;
     catalog->nameless = nameless;
 }
@@ -219,14 +219,16 @@ static int check_paths(char *const *paths, size_t path_count, struct spl_error *
             size_t length;
             char shown[300];
             if (!spl_catalog_id_of(paths[i], &length))
-                return spl_fail(err, SPL_E_USAGE, "%s: its name cannot be a dataset's id, which has at most "
-                                SPL_CATALOG_ID_RULE, spl_remote_show(paths[i], shown, sizeof shown));
+                return spl_fail_field(err, SPL_E_USAGE, "dataset",
+                                      "%s: its name cannot be a dataset's id, which has at most " SPL_CATALOG_ID_RULE,
+                                      spl_remote_show(paths[i], shown, sizeof shown));
         } else if (stat(paths[i], &status))
-            return errno == ENOENT ? spl_fail(err, SPL_E_USAGE,
-                                              "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
-                                              "-o NAME.spld' makes one from a scan",
-                                              paths[i])
-                                   : spl_fail_errno(err, errno, "cannot open '%s'", paths[i]);
+            return errno == ENOENT
+                       ? spl_fail_field(err, SPL_E_USAGE, "dataset",
+                                        "%s: there is no such file or directory of datasets; 'splatd pack SCAN "
+                                        "-o NAME.spld' makes one from a scan",
+                                        paths[i])
+                       : spl_fail_errno(err, errno, "cannot open '%s'", paths[i]);
     }
     return 0;
 }

@@ -152,8 +152,9 @@ static int lock(struct spl_tours *tours, struct spl_error *err)
     if (access(tours->directory, W_OK | X_OK))
         return spl_fail_errno(err, errno, "cannot write into the tours' folder '%s'", tours->directory);
     if (flock(tours->lock, LOCK_EX | LOCK_NB))
-        return spl_fail(err, SPL_E_USAGE, "another service keeps its tours in '%s'; give each a folder of its own",
-                        tours->directory);
+        return spl_fail_field(err, SPL_E_USAGE, "tours",
+                              "another service keeps its tours in '%s'; give each a folder of its own",
+                              tours->directory);
     return 0;
 }
 

@@ -66,7 +66,7 @@ static void a_spacing_of_stand_ins_is_not_complete(void **state)
 }
 
 /* Clumps of a chunk each over two decades of size, in a cube of 2 m; radii as alike as the packer leaves them, but for
- * one disc of each clump, which is `odd` times as large. */
+ * one disc of each clump, which is `odd` times as large. Every third clump is of wires. */
 static struct spl_dataset *make_clumps(double odd)
 {
     struct make_splat *all = calloc(splats, sizeof *all);
@@ -81,6 +81,7 @@ static struct spl_dataset *make_clumps(double odd)
         for (int c = 0; c < 3; c++)
             all[i].position[c] = middle[c] + size * (2 * uniform() - 1);
         all[i].normal[2] = 1;
+        all[i].linear = i / SPL_CHUNK_SPLATS % 3 == 0;
         all[i].radius = (float)(0.012 * (0.6 + 0.8 * uniform()) * (i % SPL_CHUNK_SPLATS == 8 ? odd : 1));
     }
     struct spl_dataset *dataset = make_dataset_levels(all, splats, 2);
