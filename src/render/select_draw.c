@@ -18,15 +18,15 @@ static void add_spacing(struct spl_walk *w, double spacing, uint32_t count)
     w->covered[(int)class] += count * spacing * spacing;
 }
 
-/* The share of the chunk's splats that keeps them `lod` samples apart, on a surface or along a `line`, as a count that
- * fills the lanes: they are drawn twice as wide at most. */
-static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_samples, double lod, bool line)
+/* The share of the chunk's splats that keeps them `lod` samples apart, as a count that fills the lanes; of a wire all
+ * of them, as it would be dashed. */
+static uint32_t drawn_count(const struct spl_chunk *chunk, double spacing_samples, double lod, bool wire)
 {
-    double fraction = lod > 0 ? spacing_samples / lod : 1;
+    double fraction = lod > 0 && !wire ? spacing_samples / lod * (spacing_samples / lod) : 1;
     if (!(fraction < 1))
         return chunk->count;
-    fraction = fraction < 0.5 ? 0.5 : fraction;
-    fraction *= line ? 1 : fraction;
+    if (fraction < 0.25)
+        fraction = 0.25;
     uint32_t count = (uint32_t)ceil(chunk->count * fraction / SPL_LANES) * SPL_LANES;
     return count < chunk->count ? count : chunk->count;
 }
@@ -79,15 +79,15 @@ static int draw_discs(struct spl_walk *w, const struct spl_found_node *found, co
 {
     const struct spl_camera *camera = w->params->camera;
     const uint32_t page = found->node->page, linear = chunk->geometry_bits >> SPL_GEOMETRY_LINEAR;
-    const bool lined = w->lined && linear == SPL_LINEAR_SOME, line = linear == SPL_LINEAR_ALL;
-    if (w->lined && line)
+    const bool lined = w->lined && linear == SPL_LINEAR_SOME, wire = linear == SPL_LINEAR_ALL;
+    if (w->lined && wire)
         return SPL_OK;
     double origin[3], radius_share = found->node->child_count ? cluster_radius_share : 1;
     struct spl_view_box box = spl_walk_chunk_box(w, node_to_eye, chunk, origin), centers = box;
     double spacing = chunk->radius_mean / SPL_RADIUS_SPACING * w->focal /
                      spl_camera_ray_scale(camera, fmax(box.center[2], camera->near));
-    uint32_t count = drawn_count(chunk, spacing, w->params->lod, line);
-    double wider = (double)chunk->count / count, scale = (line ? wider : sqrt(wider)) * radius_share;
+    uint32_t count = drawn_count(chunk, spacing, w->params->lod, wire);
+    double scale = sqrt((double)chunk->count / count) * radius_share;
     double radius = spl_walk_largest_radius(chunk) * scale, sphere = radius / radius_share;
     box = spl_view_box_grown(box, radius);
     const struct spl_view_box spheres = spl_view_box_grown(centers, sphere);

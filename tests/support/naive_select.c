@@ -150,14 +150,14 @@ static void add_chunk(struct selection *s, uint32_t node_index, uint32_t index, 
     }
     double depth = scale_of(camera, out->middle);
     double apart = (double)chunk->radius_mean / (double)SPL_RADIUS_SPACING * focal_of(camera) / depth;
-    const double power = chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_ALL ? 1 : 2; // a length, an area
-    if (lod > 0 && apart < lod) {
-        double share = pow(fmax(0.5, apart / lod), power), wanted = share * chunk->count;
+    const bool wire = chunk->geometry_bits >> SPL_GEOMETRY_LINEAR == SPL_LINEAR_ALL;
+    if (lod > 0 && apart < lod && !wire) {
+        double share = fmax(0.25, apart * apart / (lod * lod)), wanted = share * chunk->count;
         for (out->count = 0; out->count < wanted;)
             out->count += SPL_LANES;
         out->count = out->count < chunk->count ? out->count : chunk->count;
     }
-    out->scale = pow((double)chunk->count / out->count, 1 / power) * (node->child_count ? cluster_share : 1);
+    out->scale = sqrt((double)chunk->count / out->count) * (node->child_count ? cluster_share : 1);
     out->spacing = apart * out->scale;
     double largest = largest_radius(chunk);
     out->near -= largest * out->scale;
