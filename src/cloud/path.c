@@ -12,6 +12,7 @@
 
 #include "cloud/path_reader.h"
 #include "geom/camera_json.h"
+#include "geom/json.h"
 #include "geom/size.h"
 
 static const double fov_default = 60;
@@ -125,6 +126,7 @@ static int read_own_key(struct spl_path_reader *reader, json_t *view, json_t *cr
 
 static int read_own(struct spl_path_reader *reader, const json_t *json, struct spl_error *err)
 {
+    bool closed = false;
     const char *name;
     json_t *value, *list = json_object_get(json, "keyframes");
     reader->path->whole = !list;
@@ -136,9 +138,9 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
             return spl_fail_field(err, SPL_E_INPUT, name,
                                   "unknown field '%.60s' of a path; known are %s, closed, crs, fps", name,
                                   reader->list);
-        if (flag && !json_is_boolean(value))
-            return spl_fail_field(err, SPL_E_INPUT, name, "closed must be true or false, not %s",
-                                  spl_json_type_name(value));
+        if (flag && !spl_json_get_flag(value, &closed))
+            return spl_fail_field(err, SPL_E_INPUT, name, "closed must be " SPL_JSON_FLAG_FORMS ", not %s",
+                                  spl_json_flag_fault(value));
     }
     list = json_object_get(json, reader->list);
     if (!json_is_array(list))
@@ -147,7 +149,7 @@ static int read_own(struct spl_path_reader *reader, const json_t *json, struct s
     int rc = spl_path_set_fps(reader, json, err);
     if (rc)
         return rc;
-    reader->path->closed = json_is_true(json_object_get(json, "closed"));
+    reader->path->closed = closed;
     const json_t *camera = json_object_get(json_array_get(list, 0), "camera");
     const char *named = json_string_value(json_object_get(camera, "projection"));
     const int projection = named ? spl_projection_from_name(named) : -1;

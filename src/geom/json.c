@@ -95,6 +95,20 @@ const char *spl_json_type_name(const json_t *json)
     return json ? names[json_typeof(json)] : "missing";
 }
 
+bool spl_json_get_flag(const json_t *json, bool *out)
+{
+    const double number = json_number_value(json); // of what is no number 0
+    if (!json_is_boolean(json) && !(json_is_number(json) && (number == 0 || number == 1)))
+        return false;
+    *out = json_is_true(json) || number == 1;
+    return true;
+}
+
+const char *spl_json_flag_fault(const json_t *json)
+{
+    return json_is_number(json) ? "another number" : spl_json_type_name(json);
+}
+
 const char *spl_json_show_shape(const json_t *json, char text[40])
 {
     int length = snprintf(text, 40, "%s", spl_json_type_name(json));

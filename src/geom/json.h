@@ -22,6 +22,12 @@ char *spl_json_print(json_t *json);
 /* An array of `count` numbers. False where it is none; `out` is of no use then. */
 bool spl_json_get_numbers(const json_t *array, size_t count, double *out);
 
+/* A flag: true or false, or 1 or 0. False where it is none; `out` stays then. What to say of it is "NAME must be
+ * SPL_JSON_FLAG_FORMS, not spl_json_flag_fault()". */
+#define SPL_JSON_FLAG_FORMS "true, false, 1 or 0"
+bool spl_json_get_flag(const json_t *json, bool *out);
+const char *spl_json_flag_fault(const json_t *json);
+
 /* Why jansson has refused a text, for messages; where.text, but for what that tells in names of its own. */
 const char *spl_json_fault(const json_error_t *where);
 

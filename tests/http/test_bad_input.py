@@ -19,7 +19,7 @@ QUERIES = [
     ("height=9e99", "height"), ("near=0", "near"), ("near=-1", "near"), ("near=2&far=1", "far"), ("far=nan", "far"),
     ("method=raytrace", "method"), ("lod=-1", "lod"), ("lod=much", "lod"), ("layer=smell", "layer"),
     ("supersample=3", "supersample"), ("format=gif", "format"), ("quality=0", "quality"), ("quality=101", "quality"),
-    ("background=rad", "background"), ("transparent=1", "transparent"), ("margin=-1", "margin"),
+    ("background=rad", "background"), ("transparent=2", "transparent"), ("margin=-1", "margin"),
     ("margin=1e9", "margin"), ("atoms=9", "atoms"), ("atoms=1.5", "atoms"), ("atoms=-1", "atoms"), ("maps=no", "maps"),
     ("primitives=some", "primitives"), ("primitives=on", "primitives"),
     ("soft=", "soft"), ("soft=uncertainty", "soft"), ("soft=uncertainty>", "soft"), ("soft=uncertainty>q2", "soft"),

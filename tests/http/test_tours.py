@@ -255,7 +255,7 @@ def test_every_format_and_member_is_taken():
         ({"cameras_txt": "1 PINHOLE 64 48 50 50 32 24\n", "images_txt": "1 1 0 0 0 0 0 0 1 a.png\n\n"}, 1),
         ({"frames": [look(3), look(4), look(5)]}, 3),
     ]
-    motion = {"positions": "uniform", "rotations": "slerp", "ease": "in-out", "closed": True}
+    motion = {"positions": "uniform", "rotations": "slerp", "ease": "in-out", "closed": 1}
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:
         for path, frames in paths:
             tour = begin(d, {"path": path, "settings": SMALL})
@@ -313,7 +313,7 @@ def test_bad_tours_are_refused_by_field():
           "settings": {"layer": "depth"}}, "settings.layer"),
         ({"path": {"camera_path": [{"fov": 60}], "render_width": 9, "render_height": 9}}, "camera_path[0].camera_to_world"),
         ({**body(), "interpolation": 1}, "interpolation"), ({**body(), "interpolation": {"ease": "up"}}, "ease"),
-        ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 1}}, "closed"),
+        ({**body(), "interpolation": {"speed": 1}}, "speed"), ({**body(), "interpolation": {"closed": 2}}, "closed"),
         ({**body(), "interpolation": {"positions": "cubic"}}, "positions"),
         ({**body(), "interpolation": {"rotations": 7}}, "rotations"), ({**body(), "settings": []}, "settings"),
         ({**body(), "settings": {"width": 9999}}, "settings.width"), ({**body(), "settings": {"height": 8192}}, "height"),
@@ -324,7 +324,7 @@ def test_bad_tours_are_refused_by_field():
         ({**body(), "settings": {"psnr": 30}}, "settings.psnr"), ({**body(), "settings": {"v": "0" * 16}}, "settings.v"),
         ({**body(), "settings": {"layers": ["color"], "container": "multipart"}}, "settings.container"),
         ({**body(), "settings": {"layers": ["color"], "layer": "color"}}, "settings.layers"),
-        ({**body(), "video": True, "settings": {**SMALL, "layers": ["color"]}}, "video"), ({**body(), "video": 1}, "video"),
+        ({**body(), "video": True, "settings": {**SMALL, "layers": ["color"]}}, "video"), ({**body(), "video": 2}, "video"),
         ({**body(), "video": True, "settings": {**SMALL, "layer": "depth", "format": "png"}}, "video"),
     ]
     with Folder() as folder, Daemon(FAKE, "--tours", str(folder)) as d:

@@ -7,6 +7,7 @@
 #include <jansson.h>
 #include <string.h>
 
+#include "geom/json.h"
 #include "service/request/body.h"
 #include "service/request/values.h"
 
@@ -14,9 +15,9 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
 {
     if (kind < SPL_KIND_END)
         return spl_value_from_json(value, (enum spl_value_kind)kind, json, name, err);
-    bool flag = kind == SPL_KIND_FLAG || kind == SPL_KIND_SWITCH;
-    if (flag && json_is_boolean(json)) {
-        value->n[0] = json_is_true(json);
+    bool on = false, flag = kind == SPL_KIND_FLAG;
+    if (flag && spl_json_get_flag(json, &on)) {
+        value->n[0] = on;
         return 0;
     }
     if (kind == SPL_KIND_DURATION && json_is_number(json)) {
@@ -37,7 +38,8 @@ static int parse_value(struct spl_value *value, int kind, const json_t *json, co
     }
     if (flag || !json_is_string(json))
         return spl_fail_field(err, SPL_E_INPUT, name, "%s must be %s, not %s", name,
-                              flag ? "true or false" : "text", spl_json_type_name(json));
+                              flag ? SPL_JSON_FLAG_FORMS : "text",
+                              flag ? spl_json_flag_fault(json) : spl_json_type_name(json));
     return spl_value_from_text(value, kind, name, json_string_value(json), err);
 }
 

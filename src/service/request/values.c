@@ -215,12 +215,9 @@ static const char *format_names(void)
 
 static int flag_from_name(const char *name)
 {
-    return !strcasecmp(name, "true") ? 1 : !strcasecmp(name, "false") ? 0 : -1;
-}
-
-static int switch_from_name(const char *name)
-{
-    return !strcmp(name, "0") ? 0 : !strcmp(name, "1") ? 1 : -1;
+    if (!strcmp(name, "1") || !strcasecmp(name, "true"))
+        return 1;
+    return !strcmp(name, "0") || !strcasecmp(name, "false") ? 0 : -1;
 }
 
 int spl_value_from_text(struct spl_value *value, int kind, const char *name, const char *text, struct spl_error *err)
@@ -229,8 +226,7 @@ int spl_value_from_text(struct spl_value *value, int kind, const char *name, con
         int (*lookup)(const char *name);
         const char *choices;
     } table[] = {
-        [SPL_KIND_FLAG] = {flag_from_name, "true, false"},
-        [SPL_KIND_SWITCH] = {switch_from_name, "0, 1"},
+        [SPL_KIND_FLAG] = {flag_from_name, "true, false, 1, 0"},
         [SPL_KIND_METHOD] = {spl_method_from_name, spl_method_names()},
         [SPL_KIND_LAYER] = {spl_layer_from_name, LAYER_NAMES},
         [SPL_KIND_FORMAT] = {built_format_from_name, format_names()},

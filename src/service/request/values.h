@@ -12,7 +12,6 @@
 /* The kinds of camera parameters go before these. */
 enum {
     SPL_KIND_FLAG = SPL_KIND_END,
-    SPL_KIND_SWITCH, /* a flag that queries write as a number */
     SPL_KIND_COLOR,
     SPL_KIND_METHOD,
     SPL_KIND_CHOICE, /* of a method's parameter */

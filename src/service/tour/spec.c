@@ -12,6 +12,7 @@
 #include "base/memory.h"
 #include "base/near_name.h"
 #include "cloud/path.h"
+#include "geom/json.h"
 #include "image/video.h"
 #include "service/request/body.h"
 #include "service/tour/fade.h"
@@ -52,6 +53,16 @@ static int read_number(const json_t *body, const char *name, double *out, struct
     return 0;
 }
 
+/* Stays where it is left out. */
+static int read_flag(const json_t *body, const char *name, bool *out, struct spl_error *err)
+{
+    const json_t *json = json_object_get(body, name);
+    if (!json || spl_json_get_flag(json, out))
+        return 0;
+    return spl_fail_field(err, SPL_E_INPUT, name, "%s must be " SPL_JSON_FLAG_FORMS ", not %s", name,
+                          spl_json_flag_fault(json));
+}
+
 static int read_name(const json_t *object, const char *name, const char *const *names, int *out, struct spl_error *err)
 {
     const json_t *json = json_object_get(object, name);
@@ -77,23 +88,20 @@ static int read_motion(json_t *body, struct spl_path_motion *motion, struct spl_
                        struct spl_error *err)
 {
     static const char *const known[] = {"positions", "rotations", "ease", "closed", NULL};
-    json_t *json = json_object_get(body, "interpolation"), *closed = json_object_get(json, "closed");
+    json_t *json = json_object_get(body, "interpolation");
     int positions, rotations, ease, rc;
     *motion = (struct spl_path_motion){0};
     if (!json)
         return 0;
     if (!json_is_object(json))
         return fail_type("interpolation", "an object", json, err);
-    if (closed && !json_is_boolean(closed))
-        return fail_type("closed", "true or false", closed, err);
     if ((rc = check_keys(json, "interpolation", known, err)) ||
         (rc = read_name(json, "positions", spl_path_positions_names, &positions, err)) ||
         (rc = read_name(json, "rotations", spl_path_rotations_names, &rotations, err)) ||
-        (rc = read_name(json, "ease", spl_path_ease_names, &ease, err)))
+        (rc = read_name(json, "ease", spl_path_ease_names, &ease, err)) ||
+        (rc = read_flag(json, "closed", &path->closed, err)))
         return rc;
     *motion = (struct spl_path_motion){positions, rotations, ease};
-    if (closed)
-        path->closed = json_is_true(closed);
     return 0;
 }
 
@@ -210,13 +218,11 @@ static int check_limits(const struct spl_view *settings, const struct spl_camera
 
 static int check_video(const json_t *body, struct spl_tour_spec *out, struct spl_error *err)
 {
-    const json_t *video = json_object_get(body, "video");
     const struct spl_view_request *view = &out->view;
-    if (video && !json_is_boolean(video))
-        return fail_type("video", "true or false", video, err);
-    out->video = json_is_true(video);
-    if (!out->video)
-        return 0;
+    out->video = false;
+    int rc = read_flag(body, "video", &out->video, err);
+    if (rc || !out->video)
+        return rc;
     bool picture = view->encode.format == SPL_FORMAT_JPEG ||
                    (view->encode.format == SPL_FORMAT_PNG && view->layer == SPL_LAYER_COLOR);
     if (!picture || view->container)

@@ -76,7 +76,7 @@ static const struct {
     {"TUM", "# timestamp tx ty tz qx qy qz qw\r\n\n  " TUM "\n", fov_pixel, true, false, 0},
     {"splatd",
      "{\"frames\":[{\"camera\":{\"matrix\":" MATRIX ",\"convention\":\"opengl\",\"fx\":500,\"fy\":510,\"cx\":331.25,"
-     "\"cy\":228.5},\"width\":640,\"height\":480}],\"fps\":12.5,\"closed\":true}",
+     "\"cy\":228.5},\"width\":640,\"height\":480}],\"fps\":12.5,\"closed\":1}",
      lens_pixel, true, true, 12.5},
     {"splatd, fov", "{\"keyframes\":[{\"camera\":{\"matrix\":" MATRIX ",\"convention\":\"opengl\",\"fov\":60}}]}",
      fov_pixel, false, false, 0},
@@ -268,7 +268,7 @@ static void test_bad_paths_are_named(void **state)
         {"{\"keyframes\":[],\"frames\":[]}", "frames"},
         {"{\"keyframes\":[],\"fps\":0}", "fps"},
         {"{\"keyframes\":[],\"fps\":1e-300}", "fps"},
-        {"{\"keyframes\":[],\"closed\":1}", "closed"},
+        {"{\"keyframes\":[],\"closed\":2}", "closed"},
         {OWN("{}"), "keyframes[1].camera"},
         {OWN("{\"camera\":{\"eye\":[0,0,0],\"target\":[1,0,0],\"projection\":\"equirectangular\"}}"),
          "keyframes[1].camera.projection"},

@@ -306,6 +306,24 @@ static void ogc_names_mean_the_same(void **state)
     assert_memory_equal(&a, &b, sizeof a);
 }
 
+static void flags_are_written_alike_in_queries_and_json(void **state)
+{
+    (void)state;
+    static const char *const words[][2] = {{"false", "0"}, {"true", "1"}};
+    struct spl_view_request r;
+    struct spl_error err;
+    char text[64];
+    for (int on = 0; on < 2; on++)
+        for (int i = 0; i < 2; i++) {
+            snprintf(text, sizeof text, "background=white&transparent=%s&wait=%s", words[on][i], words[on][i]);
+            assert_int_equal(query(text, &r, &err), 0);
+            assert_true(r.view.background[3] == (on ? 0 : 255) && r.view.partial == !on);
+            snprintf(text, sizeof text, "{\"transparent\": %s, \"wait\": %s}", words[on][i], words[on][i]);
+            assert_int_equal(json(text, &r, &err), 0);
+            assert_true(r.view.background[3] == (on ? 0 : 255) && r.view.partial == !on);
+        }
+}
+
 static void demands_arrive(void **state)
 {
     (void)state;
@@ -504,7 +522,7 @@ static void queries_are_refused_by_name(void **state)
         {"background=12345", "background"},
         {"background=%231234567", "background"},
         {"BackgroundColor=0xGG0000", "BackgroundColor"},
-        {"transparent=maybe", "transparent"}, {"wait=2", "wait"}, {"wait=true", "wait"},
+        {"transparent=maybe", "transparent"}, {"transparent=01", "transparent"}, {"wait=2", "wait"}, {"wait=", "wait"},
         {"depth_scale=0", "depth_scale"},
         {"depth_scale=-1000", "depth_scale"},
         {"depth_scale=1e300", "depth_scale"},
@@ -556,8 +574,7 @@ static void bodies_are_refused_by_name(void **state)
         {"{\"width\":true}", "width"},
         {"{\"width\":640,\"camera\":{\"width\":640}}", "width"},
         {"{\"layer\":1}", "layer"},
-        {"{\"transparent\":1}", "transparent"},
-        {"{\"wait\":1}", "wait"},
+        {"{\"transparent\":0.5}", "transparent"}, {"{\"wait\":-1}", "wait"}, {"{\"wait\":null}", "wait"},
         {"{\"transparent\":\"true\"}", "transparent"},
         {"{\"background\":[1,2,3]}", "background"},
         {"{\"camera\":{\"matrix\":[1,2,3],\"convention\":\"opencv\"}}", "matrix"},
@@ -731,6 +748,8 @@ static void refusals_of_bodies_say_what_to_write(void **state)
          "'convention' is needed where 'matrix' is given: opengl or opencv"},
         {"{\"camera\":{\"matrix\":[[1,0,0,0]],\"convention\":\"opengl\"}}",
          "3 or 4 rows of 4; it is an array of 1 rows"},
+        {"{\"wait\":2}", "wait must be true, false, 1 or 0, not another number"},
+        {"{\"transparent\":\"true\"}", "transparent must be true, false, 1 or 0, not text"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct spl_view_request r;
@@ -770,6 +789,7 @@ int main(void)
         cmocka_unit_test(queries_are_refused_by_name),
         cmocka_unit_test(bodies_are_refused_by_name),
         cmocka_unit_test(percent_decoding_is_exact),
+        cmocka_unit_test(flags_are_written_alike_in_queries_and_json),
         cmocka_unit_test(demands_arrive),
         cmocka_unit_test(a_side_that_is_left_out_follows),
         cmocka_unit_test(matrices_are_taken_as_rows),
