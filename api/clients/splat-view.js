@@ -18,8 +18,8 @@
 // may be.
 
 const HOME = new URL(import.meta.url).origin;
-// Every other attribute goes into the page's fragment, where the page takes those that it knows.
-const OWN = ["src", "dataset", "label", "token", "signed", "id", "class", "style", "hidden"];
+// Every other attribute goes into the page's fragment, but for HTML's own: the page says which it does not know.
+const OWN = ["src", "dataset", "label", "token", "signed", "class", "tabindex"];
 
 class SplatView extends HTMLElement {
   camera = null;
@@ -61,7 +61,7 @@ class SplatView extends HTMLElement {
   #show() {
     const dataset = this.getAttribute("dataset");
     if (!dataset) return;
-    const given = [...this.attributes].filter(({name}) => !OWN.includes(name));
+    const given = [...this.attributes].filter(({name}) => !OWN.includes(name) && !name.includes("-") && !(name in HTMLElement.prototype));
     const fragment = given.map(({name, value}) => `${name}=${encodeURIComponent(value)}`).join("&");
     const signed = this.hasAttribute("signed") ? `?${this.getAttribute("signed")}` : "";
     const page = new URL(`/embed/${encodeURIComponent(dataset)}${signed}`, this.getAttribute("src") || HOME).href;

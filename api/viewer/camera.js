@@ -167,10 +167,12 @@ export function params({flat, fov, ...camera}, back) {
   return {...rounded({...camera, eye, fov: 1}), fov: undefined, projection: "orthographic", view_height: Number(height.toPrecision(6))};
 }
 
-/** The other way round: of parameters, with what they leave out from `home`. */
-export function fromParams({projection, view_height: height, ...given}, home) {
-  const camera = {...home, ...given};
+/** The other way round: of parameters, with what they leave out from `home`, for a picture of so many rows. */
+export function fromParams({projection, units_per_pixel: pixel, view_height: high, ...given}, home, rows) {
+  const camera = {...home, ...given},
+    height = pixel === undefined ? high : pixel * rows;
   if (projection !== "orthographic" && height === undefined) return camera;
+  if (!given.up) camera.up = upOf(home, camera);
   const far = height ? height / 2 / Math.tan((camera.fov * Math.PI) / 360) : distance(camera);
   return {...camera, flat: true, eye: sub(camera.target, times(axes(camera).forward, far))};
 }
@@ -178,12 +180,22 @@ export function fromParams({projection, view_height: height, ...given}, home) {
 /** Which of x, y, z is up: z unless it is y that is. */
 export const upIndex = (home) => (Math.abs(home.up[1]) > Math.abs(home.up[2]) ? 1 : 2);
 
+/** North of a plan. */
+const northOf = (home) => cross([0, 0, 0].with(upIndex(home), 1), [1, 0, 0]);
+
+/** What is up in a flat picture where nobody says, as the service has it: what is at home, but north where one looks along that. */
+export function upOf(home, {eye, target}) {
+  const forward = sub(target, eye),
+    along = dot(forward, home.up);
+  return along * along < dot(forward, forward) * dot(home.up, home.up) * (1 - 1e-12) ? home.up : northOf(home);
+}
+
 /** The same target from one of its sides ("top", "front", "side"), flat; `home` says what is up. */
 export function fromSide(camera, side, home) {
   const x = [1, 0, 0],
-    up = [0, 0, 0].with(upIndex(home), 1);
-  const ahead = cross(up, x); // north, of z up
-  const [direction, upward] = {top: [times(up, -1), ahead], front: [ahead, up], side: [times(x, -1), up]}[side];
+    up = [0, 0, 0].with(upIndex(home), 1),
+    north = northOf(home);
+  const [direction, upward] = {top: [times(up, -1), north], front: [north, up], side: [times(x, -1), up]}[side];
   return {...camera, flat: true, up: upward, eye: sub(camera.target, times(direction, distance(camera)))};
 }
 

@@ -7,7 +7,7 @@ import {Annotations} from "./annotations.js";
 import {attach} from "./input.js";
 import {parse} from "./link.js";
 import {loadTable} from "./methods.js";
-import {notices} from "./notice.js";
+import {notices, say} from "./notice.js";
 import {named, toWorld} from "./place.js";
 import {Problem, askJson, setPass, setToken} from "./service.js";
 import {keptOf} from "./soft_setting.js";
@@ -28,19 +28,22 @@ async function open() {
   try {
     const [dataset] = await Promise.all([askJson(`/v1/datasets/${encodeURIComponent(id)}`), loadTable()]);
     const wrong = [],
-      wanted = parse(location.hash, wrong);
+      unknown = [],
+      wanted = parse(location.hash, wrong, unknown);
     if (wrong.length) throw new Problem("refused", wrong.join(". "));
-    const {dataset: _, view: __, eye, target, up, fov, projection, view_height, layer = "color", budget, mark, ...setting} = {
-      ...named(dataset, wanted, stage.size),
-      ...(await toWorld(dataset, wanted)),
+    const own = await toWorld(dataset, wanted);
+    const {dataset: _, view: __, eye, target, up, fov, projection, view_height, units_per_pixel, layer = "color", budget, mark, ...setting} = {
+      ...named(dataset, own, stage.size),
+      ...own,
     };
-    const given = Object.entries({eye, target, up, fov, projection, view_height}).filter(([, value]) => value !== undefined);
+    const given = Object.entries({eye, target, up, fov, projection, view_height, units_per_pixel}).filter(([, value]) => value !== undefined);
     document.title = dataset.title ?? id;
     stage.element.ariaLabel = `View of ${id}`;
     stage.settings = budget ? {layer, budget, ...keptOf(setting)} : {layer, ...setting};
     stage.report(null);
     stage.open(dataset, Object.fromEntries(given));
     annotations.open(mark);
+    if (unknown.length) say(unknown.join(". "));
   } catch (problem) {
     stage.report(problem);
     if (problem.kind === "token" && !asked) parent.postMessage({splatd: "token"}, "*");

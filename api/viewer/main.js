@@ -12,7 +12,7 @@ import {Gallery} from "./gallery.js";
 import {attach} from "./input.js";
 import {copy, curl, parse} from "./link.js";
 import {loadTable} from "./methods.js";
-import {notices} from "./notice.js";
+import {notices, say} from "./notice.js";
 import {choices, Picture} from "./picture.js";
 import {named, toWorld} from "./place.js";
 import {Points} from "./points.js";
@@ -30,7 +30,7 @@ import {renderTours} from "./tour_render.js";
 import {Views} from "./views.js";
 
 const $ = (id) => document.getElementById(id);
-const CAMERA = ["eye", "target", "up", "fov", "projection", "view_height"];
+const CAMERA = ["eye", "target", "up", "fov", "projection", "view_height", "units_per_pixel"];
 const cameraOf = (wanted) => Object.fromEntries(CAMERA.filter((name) => wanted[name]).map((name) => [name, wanted[name]]));
 
 const stage = new Stage($("stage"));
@@ -45,12 +45,6 @@ const views = new Views(stage, say);
 const stations = new Stations(stage, say);
 new Handles(stage, clip, $("handles"), $("box"));
 attach(stage);
-
-function say(text) {
-  $("said").textContent = "";
-  $("said").getBoundingClientRect(); // so that the same words are shown, and read, again
-  $("said").textContent = text;
-}
 
 let dataset = null; // that the controls are set for
 let parts = null; // {picture, colors, soft}, once there is a table of methods
@@ -126,7 +120,8 @@ async function open() {
       wanted = parse(fragment, wrong);
     const ids = datasets.map(({id}) => id);
     if (turn !== opening) return;
-    if (!wanted.dataset && datasets.length > 1) return showGallery(datasets, keptOf(wanted));
+    const complain = () => wrong.length && say(wrong.join(". "));
+    if (!wanted.dataset && datasets.length > 1) return complain(), showGallery(datasets, keptOf(wanted));
     if (gallery.shown) showGallery(null);
     const id = wanted.dataset ?? datasets[0]?.id;
     if (!id) throw new Problem("gone", "No dataset is served yet", 5);
@@ -137,7 +132,8 @@ async function open() {
       if (title) [...$("dataset").options].find(({value}) => value === other).textContent = title;
     $("all").hidden = ids.length < 2;
     if (found instanceof Error) throw found;
-    Object.assign(wanted, named(found, wanted, stage.size), await toWorld(found, wanted));
+    const given = await toWorld(found, wanted);
+    Object.assign(wanted, named(found, given, stage.size), given);
     if (turn !== opening) return;
     dataset = found;
     $("panel").classList.remove("idle");
@@ -160,7 +156,7 @@ async function open() {
     annotations.open(wanted.mark);
     tour.open(id);
     chart.open(dataset);
-    if (wrong.length) say(wrong.join(". "));
+    complain();
   } catch (problem) {
     if (turn !== opening) return;
     stage.close();

@@ -1,4 +1,4 @@
-// What stands over the picture when there is none, or none that is new.
+// What stands over the picture when there is none, or none that is new, and what is said in passing.
 
 import {hasToken} from "./service.js";
 
@@ -10,6 +10,14 @@ const TITLES = {
   token: "A token is needed",
   offline: "No connection",
 };
+
+/** Says what passes, below. */
+export function say(text) {
+  const said = document.getElementById("said");
+  said.textContent = "";
+  said.getBoundingClientRect(); // so that the same words are shown, and read, again
+  said.textContent = text;
+}
 
 /** Shows the stage's state in `box`; its button asks again, by `open` when nothing is open yet. Who has shown no token yet
  * is told `where` to get one in: the service's own words are for programs. */

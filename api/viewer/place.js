@@ -1,7 +1,7 @@
 // Cameras by longitude and latitude, which the service knows where to find in the dataset's world, in which everything else
 // here thinks; by the names that the dataset's views have; and by the numbers of its stations.
 
-import {add, distance, fitted, times} from "./camera.js";
+import {add, distance, fitted, times, upOf} from "./camera.js";
 import {Problem, ask, askJson, query} from "./service.js";
 
 /** Eye, target and up of a station: ahead by a tenth of the dataset's size. */
@@ -35,12 +35,15 @@ async function clipToWorld(dataset, crs, {eye, target, clip}) {
   return JSON.parse(said).clip.join(" and ");
 }
 
-/** Camera, as a view's parameters, and settings of the view that `wanted` names, in an image of this size; nothing where it names none. */
-export function named(dataset, {view: name, fov: own}, size) {
+/** Camera, as a view's parameters, and settings of the view that `wanted`, in the world, names, in an image of this size; nothing
+ * where it names none. */
+export function named(dataset, {view: name, fov: own, ...wanted}, size) {
   if (name === undefined) return {};
   const view = dataset.views.find((one) => one.name === name);
   if (!view) throw new Problem("gone", `${dataset.id} has no view '${name}'`);
   const {eye, target, up, fov, projection, view_height, settings} = view;
+  const kind = wanted.projection ?? (own === undefined ? projection : undefined),
+    isFlat = kind === "orthographic" || (wanted.view_height ?? wanted.units_per_pixel) !== undefined;
   const text = (value, joint) => [value].flat().join(joint);
   return {
     ...settings,
@@ -49,7 +52,7 @@ export function named(dataset, {view: name, fov: own}, size) {
     ...(settings && "class" in settings && {class: text(settings.class, ",")}),
     eye,
     target,
-    up,
+    up: isFlat ? upOf({up}, {eye, target, ...wanted}) : up,
     ...(projection && own === undefined ? {projection, view_height} : {fov: fitted([fov, fov], size)}),
   };
 }

@@ -80,7 +80,7 @@ export class Stage extends EventTarget {
     this.dataset = dataset;
     this.first = this.home;
     this.least = Math.hypot(...dataset.bounds.max.map((x, i) => x - dataset.bounds.min[i])) * 1e-3 || 1e-3;
-    this.camera = fromParams(camera ?? {}, this.first);
+    this.camera = fromParams(camera ?? {}, this.first, this.size[1]);
     this.ahead = this.camera.flat && camera.eye && camera.target ? distance(this.camera) - distance(camera) : 0;
     this.dispatchEvent(new Event("camera"));
     this.refresh();

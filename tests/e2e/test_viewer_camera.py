@@ -119,6 +119,39 @@ def test_plans_and_elevations():
             assert abs(eye - float(found["near"]) - 0.1) < 1e-4 and abs(eye - float(found["far"]) + 0.05) < 1e-4, found
 
 
+def test_links_to_plans():
+    """As the service takes them: up is +y where nothing else is said and one looks down, and a pixel's height will do."""
+    down = "eye=0.1,0.2,9&target=0.1,0.2,0"
+
+    def up(query):
+        reply = daemon.ask(f"/v1/datasets/wall/view?{query}&width=64&height=64", method="HEAD")
+        assert reply.status == 200, (query, reply.status)
+        return [-x for x in json.loads(reply.headers["Splatd-Camera"])["rotation"][3:6]]
+
+    flat = f"{down}&projection=orthographic&view_height=3"
+    for address in f"{SITE}/#dataset=wall&{flat}", f"{SITE}/embed/wall#{flat}":
+        with page(address) as tab:
+            assert list(map(float, sent(tab)["up"].split(","))) == up(flat) == [0, 1, 0] and settled(tab)[1] > 0
+            lies = "m.upOf({up: [0, 1, 0]}, {eye: [1, 9, 0], target: [1, 0, 0]})"  # where +y itself is up
+            assert tab.run(f"import('/viewer/camera.js').then(m => {lies})") == [0, 0, -1]
+    with tempfile.TemporaryDirectory() as folder:
+        scan = pathlib.Path(folder, "scan.xyz")
+        scan.write_text("".join(f"{x / 4} {y / 4} 0\n" for x in range(41) for y in range(21)))
+        subprocess.run([REAL, "pack", scan, "-o", f"{folder}/site.spld", "--view", "low=eye=10,-9,2,target=10,5,0,fov=70"],
+                       check=True, capture_output=True)
+        with Daemon(REAL, datasets=[f"{folder}/site.spld"]) as other:
+            for address in "/#dataset=site&", "/embed/site#":  # a view by name says what is up, but not to whom looks along that
+                with page(f"http://127.0.0.1:{other.port}{address}view=low&{flat}") as tab:
+                    assert sent(tab)["up"] == "0,1,0", sent(tab)
+    for address in f"{SITE}/#dataset=wall&{down}&units_per_pixel=0.01", f"{SITE}/embed/wall#{down}&units_per_pixel=0.01":
+        with page(address) as tab:
+            height = tab.run("document.querySelector('#stage').clientHeight")
+            assert sent(tab)["projection"] == "orthographic" and abs(float(sent(tab)["view_height"]) - height / 100) < 1e-3, sent(tab)
+    steep = f"{SITE}/#dataset=wall&{down}"  # refused by the service as well: of a pinhole nobody knows what is up there
+    with page(steep, ready="!document.querySelector('#notice').hidden", complaints="400") as tab:
+        assert "up is parallel" in tab.text("#notice p")
+
+
 def test_front_and_side_do_not_follow_stray_heights():
     """A few heights of -9999 widen the bounds, not what is framed; a street's length is none of them."""
     dataset = daemon.ask("/v1/datasets/wall").json()

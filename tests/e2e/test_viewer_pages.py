@@ -12,7 +12,7 @@ import threading
 import time
 import urllib.parse
 
-from viewer import DIGEST, REST, SITE, VIEWS, chromium, far, link, main, middle, next_link, page, sent, settled
+from viewer import DIGEST, REST, SITE, VIEWS, chromium, daemon, far, link, main, middle, next_link, page, sent, settled
 from harness import REAL, TEXTURED, WALL, Daemon
 
 CARDS = "[...document.querySelectorAll('#gallery a')]"
@@ -50,6 +50,8 @@ def test_several_datasets_are_a_gallery():
                 assert far(link(tab)["eye"], [10, -9, 2]) < 1e-3
                 tab.run("history.back()")
                 tab.until(f"{CARDS}.length === 2 && document.querySelector('#stage').hidden")
+                tab.run("location.hash = '#datset=wall'")
+                tab.until("document.querySelector('#said').textContent.startsWith('datset of the link is left out')")
                 tab.run("location.hash = '#dataset=wall'")
                 tab.until(f"{REST} && document.title.startsWith('wall')")
                 tab.press_on("#all")
@@ -64,6 +66,20 @@ def test_wrong_links_say_so():
         told = tab.text("#said")
         assert "eye of the link is left out: it has to be three numbers, not '1,2'" in told and "fov of the link is left out" in told, told
         assert "target" not in told, told
+    odd = "eye=3,0,1&target=0,0,1&projecton=orthographic&layers=depth"
+    own = "&width=64&height=64&format=png&quality=9&wait=1&data-id=7"  # of a view's URL, or of HTML; what the page sees to itself
+    for address in f"{SITE}/#dataset=wall&{odd}{own}", f"{SITE}/embed/wall#{odd}{own}":
+        with page(address, ready=f"{REST} && !!document.querySelector('#said').textContent") as tab:
+            said = [f"{name} of the link is left out: the page knows no such parameter" for name in ("projecton", "layers")]
+            assert tab.text("#said") == ". ".join(said), tab.text("#said")
+    known = urllib.parse.urlencode({one["name"]: one["default"] for one in daemon.ask("/v1/methods").json()["parameters"]})
+    with page(f"{SITE}/#dataset=wall&eye=3,0,1&target=0,0,1&{known}{own}") as tab:
+        assert tab.text("#said") == "", tab.text("#said")
+    for heights, said in (("view_height=0", "view_height of the link is left out: it has to be above 0, not '0'"),
+                          ("units_per_pixel=-1", "units_per_pixel of the link is left out: it has to be above 0, not '-1'"),
+                          ("units_per_pixel=1&view_height=2", "units_per_pixel of the link is left out: view_height says it already")):
+        with page(f"{SITE}/#dataset=wall&eye=3,0,1&target=0,0,1&{heights}", ready="!!document.querySelector('#said').textContent") as tab:
+            assert tab.text("#said") == said, tab.text("#said")
     with page(f"{SITE}/?dataset=wall", ready="document.querySelector('.problem') !== null", complaints="400") as tab:
         assert "dataset" in tab.text(".problem p")
         tab.press_on(".problem a")
@@ -247,7 +263,7 @@ def elsewhere(site, element):
 
 
 def test_splat_view_on_another_origin():
-    element = '<splat-view dataset="wall" eye="3,0,1" target="0,0,1" method="fill" kernel="9" class="wide"></splat-view>'
+    element = '<splat-view dataset="wall" eye="3,0,1" target="0,0,1" method="fill" kernel="9" class="wide" id="v" title="The wall" role="img" tabindex="0" data-v-7></splat-view>'
     with elsewhere(SITE, element) as url:
         with page(url, ready="document.querySelector('splat-view')?.camera", size=(500, 400)) as tab:
             assert tab.run("document.querySelector('splat-view').camera.eye") == [3, 0, 1]
@@ -275,6 +291,11 @@ def test_a_token_is_asked_for():
                 assert not tab.run("document.querySelector('#panel').hidden")
                 tab.click(300, 300)  # there is nothing to pick yet, nor to set
                 assert tab.text("#said") == ""
+                for width in 900, 700, 390:  # one may read all of it
+                    tab.resize((width, 600))
+                    apart = "((a, b) => a.top >= b.bottom || a.right <= b.left)(...['#notice', '#toggle'].map(n => document.querySelector(n).getBoundingClientRect()))"
+                    assert tab.run(apart), f"{width} pixels"
+                tab.resize((900, 600))
                 assert tab.run("[...document.querySelectorAll('#panel :is(button, select, input)')].filter(e => e.offsetParent).map(e => e.id || e.form.id)") \
                     == ["dataset", "token", "token"]
                 for text in ("some-other-token-than-that", token):
