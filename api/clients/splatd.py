@@ -2,7 +2,7 @@
 
     from splatd import Splatd, ring
     hall = Splatd("http://127.0.0.1:8080").dataset("hall")
-    for i, camera in enumerate(ring(hall.center, 36, radius=6, height=3)):
+    for i, camera in enumerate(ring((0, 0, 1), 36, radius=6, height=3)):
         with open(f"view{i:02}.jpg", "wb") as file:
             file.write(hall.view(**camera, width=1280, height=720, fov=50).bytes)
     hall.cloud(eye=[4, 5, 6], target=[0, 0, 1], clip="z<2.3", class_=[2, 6]).save("cloud.ply")   # needs numpy
