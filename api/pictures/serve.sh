@@ -1,6 +1,7 @@
 # For the scripts beside it: `serve ARGUMENT…` starts a daemon on a free port that ends with the script, and waits until it
 # answers; $service is its address, $out/log what it says.
 serve() {
+    : >"$out/log" # before it is read: what another script has left there names a daemon that is gone
     splatd serve --listen 127.0.0.1:0 --ops-listen 127.0.0.1:0 "$@" 2>"$out/log" &
     daemon=$!
     trap 'kill $daemon' EXIT
