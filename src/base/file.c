@@ -115,6 +115,13 @@ static void sweep(const char *begin, const char *end, bool (*is_left)(const char
     globfree(&found);
 }
 
+/* ANYTHING.PID-N */
+static bool is_of_any_writer(const char *end)
+{
+    const char *dot = strrchr(end, '.');
+    return dot && is_of_a_writer(dot + 1);
+}
+
 void spl_file_sweep(const char *begin, const char *end)
 {
     sweep(begin, end, NULL);
@@ -130,6 +137,19 @@ void spl_file_sweep_beside(const char *path)
     free(begin);
 }
 
+void spl_file_sweep_folder(const char *folder, const char *ending)
+{
+    char *begin = NULL, *end = NULL;
+    if (asprintf(&begin, "%s/.", folder) < 0)
+        begin = NULL;
+    if (asprintf(&end, "?*%s.[0-9]*-[0-9]*", ending) < 0)
+        end = NULL;
+    if (begin && end)
+        sweep(begin, end, is_of_any_writer);
+    free(begin);
+    free(end);
+}
+
 /* Says that the new file is in use; false where another's sweep came before. File systems without locks are not swept
  * either. */
 static bool lock(int fd)
@@ -137,6 +157,33 @@ static bool lock(int fd)
     struct stat status;
     flock(fd, LOCK_EX | LOCK_NB);
     return fstat(fd, &status) || status.st_nlink;
+}
+
+/* Removes what a killed process of this user left under the name; false, with EEXIST, where it is something else. */
+static bool remove_left(const char *path)
+{
+    struct stat status;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    bool left = fd < 0 ? errno == ENOENT // gone meanwhile
+                       : !fstat(fd, &status) && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
+                             !(flock(fd, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK) && !unlink(path);
+    if (fd >= 0)
+        close(fd);
+    errno = EEXIST;
+    return left;
+}
+
+int spl_file_create(const char *path, unsigned permissions)
+{
+    for (;;) { // again where another's sweep came before our lock
+        int fd = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, (mode_t)permissions);
+        if (fd >= 0 && lock(fd))
+            return fd;
+        if (fd >= 0)
+            close(fd);
+        else if (errno != EEXIST || !remove_left(path))
+            return -1;
+    }
 }
 
 /* Opens a file of its own beside `path`; its name, owned by the caller, goes to *beside. -1 with errno. */

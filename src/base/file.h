@@ -27,6 +27,14 @@ void spl_file_sweep(const char *begin, const char *end);
 /* The same of spl_file_replace() at `path`. Not part of it: it looks through the whole folder. */
 void spl_file_sweep_beside(const char *path);
 
+/* The same of every file of `folder` whose name ends with `ending`, which begins with a dot. */
+void spl_file_sweep_folder(const char *folder, const char *ending);
+
+/* Makes a file at `path`, to read and to write, and locks it: never one that is there already, which in a folder that
+ * others may write to is theirs, or a link to somewhere else. What a killed process of this user left there is removed
+ * first. -1 with errno, EEXIST: something else has the name. */
+int spl_file_create(const char *path, unsigned permissions);
+
 /* Are both there, and one file? Any thread. */
 bool spl_file_is_same(const char *path, const char *other);
 

@@ -1,6 +1,6 @@
 /* Everything goes into PATH.splatd-PID, which the file's own lock says is in use; a rename makes it PATH. In containers
- * that share a folder every process has the number 1: where the name is in use, another one is taken. Owned by one
- * thread at a time. */
+ * that share a folder every process has the number 1: where the name is in use, or is another user's, another one is
+ * taken. Owned by one thread at a time. */
 #include "dataset/part_file.h"
 
 #include <errno.h>
@@ -8,8 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/file.h"
@@ -26,46 +24,30 @@ static int name(const char *path, unsigned in_use, char **out)
     return SPL_E_NOMEM;
 }
 
-/* Of what a killed process of the same number left. */
-static int empty(struct spl_part_file *file, struct spl_error *err)
-{
-    if (!ftruncate(file->fd, 0))
-        return SPL_OK;
-    int rc = spl_fail_errno(err, errno, "cannot empty %s", file->part_path);
-    spl_part_file_finish(file);
-    return rc;
-}
-
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err)
 {
     *file = (struct spl_part_file){.path = strdup(path), .fd = -1};
     int rc = SPL_E_NOMEM;
     spl_file_sweep(path, SPL_UNFINISHED_ANY);
-    for (unsigned in_use = 0;;) { /* again where another's sweep came before our lock */
-        struct stat st;
+    for (unsigned in_use = 0;; in_use++) {
         free(file->part_path);
         if (!file->path || name(path, in_use, &file->part_path)) {
             spl_fail(err, rc, "out of memory for the name of %s", path);
             goto failed;
         }
-        file->fd = open(file->part_path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (file->fd < 0) {
-            const char *slash = strrchr(path, '/');
-            if (errno == ENOENT && slash)
-                rc = spl_fail(err, SPL_E_IO, "cannot create %s: there is no folder '%.*s'", path,
-                              (int)(slash - path) + 1, path);
-            else
-                rc = spl_fail_errno(err, errno, "cannot create %s", file->part_path);
-            goto failed;
-        }
-        /* in use; file systems without locks are not swept either */
-        if (flock(file->fd, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK && in_use < names_most)
-            in_use++;
-        else if (fstat(file->fd, &st) || st.st_nlink)
-            return empty(file, err);
-        close(file->fd);
-        file->fd = -1;
+        file->fd = spl_file_create(file->part_path, 0666);
+        if (file->fd >= 0)
+            return SPL_OK;
+        if (errno != EEXIST || in_use == names_most)
+            break;
     }
+    const int why = errno;
+    const char *slash = strrchr(path, '/');
+    const int folder_bytes = slash ? (int)(slash - path) + 1 : 0;
+    if (why == ENOENT && slash)
+        rc = spl_fail(err, SPL_E_IO, "cannot create %s: there is no folder '%.*s'", path, folder_bytes, path);
+    else
+        rc = spl_fail_errno(err, why, "cannot create %s", file->part_path);
 failed:
     spl_part_file_finish(file);
     return rc;

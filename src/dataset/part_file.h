@@ -15,7 +15,8 @@ struct spl_part_file {
     bool committed;
 };
 
-/* Creates PATH.splatd-PID beside `path`, PATH.splatd-PID-N where another process of this number writes there too, and
+/* Creates PATH.splatd-PID beside `path`, PATH.splatd-PID-N where that name is taken by somebody else, say a process of
+ * this number on another machine, and
  * removes those that killed processes left of it. On failure there is nothing to finish. */
 int spl_part_file_init(struct spl_part_file *file, const char *path, struct spl_error *err);
 

@@ -57,7 +57,7 @@ int spl_texture_file_write(const char *path, const struct spl_texture_source *so
     memcpy(part + length, ".part", sizeof ".part");
     for (uint32_t i = 0; i < origin->photographs; i++)
         header.names_bytes += strlen(origin->names[i]) + 1;
-    int rc = 0, fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    int rc = 0, fd = spl_file_create(part, 0666);
     if (fd < 0 || spl_write_all(fd, &header, sizeof header))
         rc = spl_fail_errno(err, errno, "%s", part);
     if (!rc)

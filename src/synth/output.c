@@ -26,9 +26,13 @@ int spl_output_open(struct spl_output *out, const char *directory, const char *n
         out->temporary = NULL;
         return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }
-    out->fd = open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (out->fd < 0)
-        return spl_fail_errno(err, errno, "%s cannot be created", out->temporary);
+    out->fd = spl_file_create(out->temporary, 0666);
+    if (out->fd < 0) {
+        int rc = spl_fail_errno(err, errno, "%s cannot be created", out->temporary);
+        free(out->temporary); // it may be another's, and stays
+        out->temporary = NULL;
+        return rc;
+    }
     return 0;
 }
 

@@ -4,7 +4,6 @@
 #include "pack/texture/textures.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +21,7 @@ int spl_textures_init(struct spl_textures *textures, const char *output, uint64_
     if (asprintf(&path, "%s" SPL_UNFINISHED "-textures", output, (long)getpid()) < 0)
         return spl_fail(err, SPL_E_NOMEM, "out of memory for the name of %s", output);
     int rc = SPL_OK;
-    textures->fd = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
+    textures->fd = spl_file_create(path, 0600);
     if (textures->fd < 0)
         rc = spl_fail_errno(err, errno, "cannot create %s", path);
     else

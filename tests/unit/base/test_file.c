@@ -119,6 +119,67 @@ static void what_killed_writers_left_is_swept(void **state)
         unlink(beside[i]);
 }
 
+/* The same of any file of the folder whose name has that ending. */
+static void what_they_left_of_any_file_is_swept(void **state)
+{
+    (void)state;
+    static const char *const names[] = {
+        ".a.views.json.123-0",   ".b.c-1.views.json.99999-17", ".a.views.json.2026-01",     ".a.views.json.1-2.bak",
+        ".a.profile.json.123-0", "a.views.json.123-0",         ".a.views.json.copy.123-45", ".views.json.1-2"};
+    char beside[8][sizeof folder + 64];
+    for (int i = 0; i < 8; i++) {
+        snprintf(beside[i], sizeof beside[i], "%s/%s", folder, names[i]);
+        int fd = open(beside[i], O_WRONLY | O_CREAT, 0666);
+        assert_true(fd >= 0);
+        close(fd);
+    }
+    spl_file_sweep_folder(folder, ".views.json");
+    for (int i = 0; i < 8; i++)
+        assert_int_equal(access(beside[i], F_OK), i < 2 ? -1 : 0);
+    for (int i = 2; i < 8; i++)
+        unlink(beside[i]);
+}
+
+/* A file of one's own: what a killed one left goes, what is another's or in use is neither written to nor removed. */
+static void a_name_that_is_taken_is_refused(void **state)
+{
+    (void)state;
+    char mine[sizeof path + 16], other[sizeof path + 16];
+    struct stat status;
+    snprintf(mine, sizeof mine, "%s.mine", path);
+    snprintf(other, sizeof other, "%s.other", path);
+    int fd = open(other, O_WRONLY | O_CREAT, 0666);
+    assert_true(fd >= 0 && write(fd, "precious", 8) == 8 && !close(fd));
+    for (int i = 0; i < 2; i++) { // a link to another file, one that leads nowhere
+        assert_int_equal(symlink(i ? "nowhere" : other, mine), 0);
+        errno = 0;
+        assert_int_equal(spl_file_create(mine, 0600), -1);
+        assert_int_equal(errno, EEXIST);
+        assert_int_equal(unlink(mine), 0);
+    }
+    assert_int_equal(link(other, mine), 0); // another name of a file of ours: the name goes, the file does not
+    fd = spl_file_create(mine, 0600);
+    assert_true(fd >= 0 && !stat(other, &status) && status.st_size == 8);
+    errno = 0;
+    assert_int_equal(spl_file_create(mine, 0600), -1); // in use
+    assert_int_equal(errno, EEXIST);
+    close(fd);
+    assert_true((fd = spl_file_create(mine, 0600)) >= 0 && !fstat(fd, &status) && !status.st_size);
+    assert_true((status.st_mode & 0777) == 0600 && status.st_nlink == 1);
+    close(fd);
+    assert_int_equal(unlink(mine), 0);
+    assert_int_equal(mkdir(mine, 0700), 0);
+    assert_int_equal(spl_file_create(mine, 0600), -1);
+    assert_int_equal(rmdir(mine), 0);
+    if (!geteuid()) { // only root gives files away
+        fd = open(mine, O_WRONLY | O_CREAT, 0666);
+        assert_true(fd >= 0 && !fchown(fd, 65534, 65534) && !close(fd));
+        assert_int_equal(spl_file_create(mine, 0600), -1);
+        assert_int_equal(unlink(mine), 0);
+    }
+    unlink(other);
+}
+
 static void *write_own_letter(void *letter)
 {
     char *bytes = malloc(LONG);
@@ -188,6 +249,8 @@ int main(void)
         cmocka_unit_test(replaces_as_a_whole),
         cmocka_unit_test(a_failure_leaves_what_was_there),
         cmocka_unit_test(what_killed_writers_left_is_swept),
+        cmocka_unit_test(what_they_left_of_any_file_is_swept),
+        cmocka_unit_test(a_name_that_is_taken_is_refused),
         cmocka_unit_test(writers_never_mix),
         cmocka_unit_test(a_pipe_is_opened_at_once_and_read_as_it_writes),
     };

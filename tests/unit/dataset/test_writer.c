@@ -1,6 +1,7 @@
 /* The writer's promises: pages of bounded size, and never a broken file under the target's name. */
 #include <fcntl.h>
 #include <glob.h>
+#include <grp.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -10,6 +11,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -170,6 +172,56 @@ static void test_two_writers_of_one_number(void **state)
     unlink(path);
 }
 
+/* 0, or 1 where it cannot be written whole. */
+static int write_short(const char *target)
+{
+    struct spl_part_file file;
+    if (spl_part_file_init(&file, target, NULL))
+        return 1;
+    int rc = spl_part_file_write(&file, 0, "short", 5, NULL) || spl_part_file_commit(&file, NULL);
+    spl_part_file_finish(&file);
+    return rc;
+}
+
+/* Who may write to the folder, too, foresees the name: nothing goes into what lies there under it. */
+static void test_what_others_put_under_the_name(void **state)
+{
+    (void)state;
+    char precious[sizeof path + 16], sticky[sizeof folder + 16], target[sizeof sticky + 16], name[sizeof target + 32];
+    struct stat status;
+    snprintf(precious, sizeof precious, "%s.precious", path);
+    fclose(fopen(precious, "w"));
+    assert_int_equal(symlink(precious, part_path), 0);
+    assert_int_equal(write_short(path), 0);
+    expect_target("short");
+    assert_true(!stat(precious, &status) && !status.st_size && !unlink(part_path) && !unlink(precious));
+    unlink(path);
+    if (geteuid()) // only root is two users
+        return;
+    snprintf(sticky, sizeof sticky, "%s/sticky", folder);
+    snprintf(target, sizeof target, "%s/x.spld", sticky);
+    assert_true(!chmod(folder, 0711) && !mkdir(sticky, 0700) && !chmod(sticky, 01777));
+    pid_t pid = fork();
+    if (!pid) {
+        if (setgroups(0, NULL) || setresgid(65534, 65534, 65534) || setresuid(65534, 65534, 65534))
+            _exit(77);
+        kill(getpid(), SIGSTOP); // while root puts a file in its way
+        _exit(write_short(target));
+    }
+    int code;
+    assert_true(pid > 0 && waitpid(pid, &code, WUNTRACED) == pid && WIFSTOPPED(code));
+    snprintf(name, sizeof name, "%s.splatd-%ld", target, (long)pid);
+    FILE *theirs = fopen(name, "w");
+    assert_true(theirs && fputs("another's", theirs) >= 0 && !fchmod(fileno(theirs), 0666) && !fclose(theirs));
+    assert_int_equal(kill(pid, SIGCONT), 0);
+    assert_int_equal(waitpid(pid, &code, 0), pid);
+    assert_true(WIFEXITED(code));
+    assert_int_equal(WEXITSTATUS(code), 0);
+    assert_true(!stat(target, &status) && status.st_uid == 65534 && status.st_size == 5);
+    assert_true(!stat(name, &status) && status.st_uid == 0 && status.st_size == 9);
+    assert_true(!unlink(target) && !unlink(name) && !rmdir(sticky) && !chmod(folder, 0700));
+}
+
 static void test_full_disk(void **state)
 {
     (void)state;
@@ -276,6 +328,7 @@ int main(void)
         cmocka_unit_test(test_unfinished_leaves_the_old_file),
         cmocka_unit_test(test_replaced_while_mapped),
         cmocka_unit_test(test_two_writers_of_one_number),
+        cmocka_unit_test(test_what_others_put_under_the_name),
         cmocka_unit_test(test_full_disk),
         cmocka_unit_test(test_bad_targets),
         cmocka_unit_test(test_refused_memory),
