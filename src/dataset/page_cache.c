@@ -2,6 +2,9 @@
  * bytes. Written under a name of its own and renamed, so that a reader sees all of a block or none, whoever writes the
  * same one beside it. A file's time of change is when it was last used.
  *
+ * Folders are opened without following links and used by their descriptors, and only those that are this user's alone:
+ * what others put there while they could is neither read nor written to.
+ *
  * Invariant: what read() gives is what write() was given under the same key and number. Nothing is synced: after a
  * power failure a file may have lost bytes, and its checksum says so.
  *
@@ -46,7 +49,8 @@ struct spl_page_cache {
     atomic_uint references;
     uint64_t bytes_max;
     _Atomic uint64_t used, rests_until_ns, numbers;
-    atomic_bool said; /* that the disk fails */
+    atomic_bool said;        /* that the disk fails */
+    atomic_bool said_others; /* that something of others has a folder's place */
     pthread_mutex_t looking;
     char folder[];
 };
@@ -59,14 +63,52 @@ struct spl_page_key spl_page_key_of(const char *shown, const char *state, uint64
     return (struct spl_page_key){sum.low64, sum.high64};
 }
 
-/* Of a block, of its folder where `block` is NULL. False where it is too long to be a name of a file. */
-static bool name_of(const struct spl_page_cache *cache, struct spl_page_key key, const uint64_t *block,
-                    char out[PATH_MAX])
+enum { name_bytes = 40 }; /* of a block's file, or of its folder */
+
+static void name_block(uint64_t block, char out[name_bytes])
 {
-    int used = snprintf(out, PATH_MAX, "%s/%016" PRIx64 "%016" PRIx64, cache->folder, key.high, key.low);
-    if (block && used > 0 && used < PATH_MAX)
-        used += snprintf(out + used, (size_t)(PATH_MAX - used), "/%010" PRIx64, *block);
-    return used > 0 && used < PATH_MAX;
+    snprintf(out, name_bytes, "%010" PRIx64, block);
+}
+
+static bool is_ours(const struct stat *status)
+{
+    return status->st_uid == geteuid() && !(status->st_mode & 022);
+}
+
+/* Something of others has the place of a folder of ours. */
+static void leave_alone(struct spl_page_cache *cache, const char *name)
+{
+    spl_remote_count(cache_failures, 1);
+    if (!atomic_exchange(&cache->said_others, true))
+        spl_log_warn("page-cache: %s/%s is no folder of this service alone, so it is left alone; remove it, and "
+                     "whatever else others have put there",
+                     cache->folder, name);
+}
+
+/* The folder of a key, made where it is missing and `make` says so; -1 with errno, *others: something of others is
+ * there. */
+static int open_key(const struct spl_page_cache *cache, struct spl_page_key key, bool make, char name[name_bytes],
+                    bool *others)
+{
+    struct stat status;
+    int top = open(cache->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC), fd = -1;
+    *others = false;
+    snprintf(name, name_bytes, "%016" PRIx64 "%016" PRIx64, key.high, key.low);
+    if (top < 0)
+        return -1;
+    if (!make || !mkdirat(top, name, 0700) || errno == EEXIST) {
+        fd = openat(top, name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);
+        *others = fd < 0 ? errno == ENOTDIR || errno == ELOOP || errno == EACCES
+                         : fstat(fd, &status) || !is_ours(&status);
+    }
+    int why = errno;
+    if (fd >= 0 && *others) {
+        close(fd);
+        fd = -1;
+    }
+    close(top);
+    errno = why;
+    return fd;
 }
 
 /* A file that a look has found. */
@@ -89,7 +131,7 @@ static int compare(const void *a, const void *b)
                                   : (p->tv_nsec > q->tv_nsec) - (p->tv_nsec < q->tv_nsec);
 }
 
-/* Is it a file that name_of() makes, or one beside it that is being written? */
+/* Is it a file that name_block() names, or one beside it that is being written? */
 static bool is_block(const char *name)
 {
     size_t digits = strspn(name, "0123456789abcdef");
@@ -100,11 +142,11 @@ static bool is_block(const char *name)
 static void list_blocks(int folder, const char *name, struct listing *list)
 {
     int fd = openat(folder, name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);
-    DIR *dir = fd < 0 ? NULL : fdopendir(fd);
+    struct stat status;
+    DIR *dir = fd < 0 || fstat(fd, &status) || !is_ours(&status) ? NULL : fdopendir(fd);
     if (!dir && fd >= 0)
         close(fd);
     for (struct dirent *item; dir && (item = readdir(dir));) {
-        struct stat status;
         if (item->d_name[0] == '.' || fstatat(fd, item->d_name, &status, AT_SYMLINK_NOFOLLOW) ||
             !S_ISREG(status.st_mode) || strlen(name) + strlen(item->d_name) + 2 > sizeof list->items->name)
             continue;
@@ -126,7 +168,7 @@ static void list_blocks(int folder, const char *name, struct listing *list)
         closedir(dir);
 }
 
-/* Is it a folder that name_of() makes? Others are not ours. */
+/* Is it a folder that open_key() makes? Others are not ours. */
 static bool is_key(const char *name)
 {
     return strspn(name, "0123456789abcdef") == 32 && !name[32];
@@ -180,11 +222,11 @@ int spl_page_cache_open(const char *folder, uint64_t bytes_max, struct spl_page_
         code = errno;
     if (!code && !S_ISDIR(status.st_mode))
         code = ENOTDIR;
-    if (!code && (status.st_uid != geteuid() || (status.st_mode & 022))) { // who writes there says what is shown
-        spl_fail_field(
-            err, SPL_E_USAGE, "page-cache",
-            "page-cache: %s belongs to others, or others may write to it; it has to be the service's alone (chmod 700)",
-            cache->folder);
+    if (!code && !is_ours(&status)) { // who writes there says what is shown
+        spl_fail_field(err, SPL_E_USAGE, "page-cache",
+                       "page-cache: %s belongs to others, or others may write to it; it has to be the service's alone: "
+                       "remove what others have put there, then chmod 700",
+                       cache->folder);
         spl_page_cache_let_go(cache);
         return SPL_E_USAGE;
     }
@@ -235,12 +277,18 @@ static bool read_all(int fd, void *out, size_t bytes)
 
 bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block, void *out, size_t bytes)
 {
-    char name[PATH_MAX], more;
+    char name[name_bytes], more;
+    bool others;
     struct header header = {0};
-    int fd =
-        cache && name_of(cache, key, &block, name) ? open(name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK) : -1;
-    if (fd < 0)
+    int folder = cache ? open_key(cache, key, false, name, &others) : -1;
+    if (folder < 0)
         return false;
+    name_block(block, name);
+    int fd = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (fd < 0) {
+        close(folder);
+        return false;
+    }
     bool sound = read_all(fd, &header, sizeof header) && !memcmp(header.magic, magic, sizeof magic) &&
                  header.low == key.low && header.high == key.high && header.block == block && header.bytes == bytes &&
                  read_all(fd, out, bytes) && read(fd, &more, 1) == 0 && XXH3_64bits(out, bytes) == header.hash;
@@ -249,8 +297,9 @@ bool spl_page_cache_read(struct spl_page_cache *cache, struct spl_page_key key, 
     close(fd);
     if (!sound) {
         spl_remote_count(cache_spoilt, 1);
-        unlink(name);
+        unlinkat(folder, name, 0);
     }
+    close(folder);
     return sound;
 }
 
@@ -282,32 +331,40 @@ static void give_up(struct spl_page_cache *cache, int code)
 void spl_page_cache_write(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block, const void *data,
                           size_t bytes)
 {
-    char name[PATH_MAX], beside[PATH_MAX + 64], folder[PATH_MAX];
+    char name[name_bytes], beside[name_bytes + 64];
     struct header header = {.low = key.low, .high = key.high, .block = block, .bytes = bytes};
-    if (!cache || spl_remaining_ns(atomic_load(&cache->rests_until_ns)) || !name_of(cache, key, &block, name) ||
-        !name_of(cache, key, NULL, folder) || !make_room(cache, sizeof header + bytes))
+    if (!cache || spl_remaining_ns(atomic_load(&cache->rests_until_ns)) || !make_room(cache, sizeof header + bytes))
         return;
     memcpy(header.magic, magic, sizeof magic);
     header.hash = XXH3_64bits(data, bytes);
-    snprintf(beside, sizeof beside, "%s-%ld-%llu-%llu", name, (long)getpid(), (unsigned long long)spl_now_ns(),
-             (unsigned long long)atomic_fetch_add(&cache->numbers, 1)); // containers have equal process numbers
-    int fd = -1;
+    int folder = -1, fd = -1, code = 0;
     for (int i = 0; i < 2 && fd < 0; i++) { // another process may have removed the empty folder
-        if (mkdir(folder, 0700) && errno != EEXIST)
-            break;
-        fd = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+        bool others;
+        if (folder >= 0)
+            close(folder);
+        folder = open_key(cache, key, true, name, &others);
+        if (others) {
+            leave_alone(cache, name);
+            return;
+        }
+        name_block(block, name);
+        snprintf(beside, sizeof beside, "%s-%ld-%llu-%llu", name, (long)getpid(), (unsigned long long)spl_now_ns(),
+                 (unsigned long long)atomic_fetch_add(&cache->numbers, 1)); // containers have equal process numbers
+        fd = folder < 0 ? -1 : openat(folder, beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+        code = fd < 0 ? errno : 0;
     }
-    int code = fd < 0 ? errno : 0;
     if (fd >= 0) {
         if (spl_write_all(fd, &header, sizeof header) || spl_write_all(fd, data, bytes))
             code = errno;
         if (close(fd) && !code)
             code = errno;
-        if (!code && rename(beside, name))
+        if (!code && renameat(folder, beside, folder, name))
             code = errno;
         if (code)
-            unlink(beside);
+            unlinkat(folder, beside, 0);
     }
+    if (folder >= 0)
+        close(folder);
     if (code) {
         give_up(cache, code);
         return;
@@ -318,7 +375,12 @@ void spl_page_cache_write(struct spl_page_cache *cache, struct spl_page_key key,
 
 void spl_page_cache_drop(struct spl_page_cache *cache, struct spl_page_key key, uint64_t block)
 {
-    char name[PATH_MAX];
-    if (cache && name_of(cache, key, &block, name))
-        unlink(name);
+    char name[name_bytes];
+    bool others;
+    int folder = cache ? open_key(cache, key, false, name, &others) : -1;
+    if (folder < 0)
+        return;
+    name_block(block, name);
+    unlinkat(folder, name, 0);
+    close(folder);
 }

@@ -259,11 +259,77 @@ static void test_folders_that_will_not_do(void **state)
     spl_page_cache_let_go(cache);
 }
 
+/* What others put in the place of a dataset's folder, while the cache's own was open to them. */
+static void test_what_others_put_there_is_not_used(void **state)
+{
+    (void)state;
+    struct spl_page_key key = spl_page_key_of("https://h/others", "\"1\"", 5),
+                        own = spl_page_key_of("https://h/own", "\"1\"", 5);
+    char place[400], elsewhere[400], block[500];
+    unsigned files;
+    path_of(key, 0, place);
+    *strrchr(place, '/') = '\0';
+    snprintf(elsewhere, sizeof elsewhere, "%s", in_folder("elsewhere"));
+    snprintf(block, sizeof block, "%s/%010x", elsewhere, 0);
+    for (int i = 0; i < 4; i++) {
+        struct spl_page_cache *cache = open_cache(1 << 20);
+        put(cache, key, 0, 1);
+        assert_true(holds(cache, key, 0, 1));
+        if (i == 0)
+            assert_int_equal(chmod(place, 0777), 0);
+        else if (i == 1 && geteuid())
+            goto next; /* only root gives files away */
+        else if (i == 1)
+            assert_int_equal(chown(place, 65534, 65534), 0);
+        else
+            assert_int_equal(rename(place, elsewhere), 0);
+        if (i == 2)
+            assert_int_equal(symlink(elsewhere, place), 0);
+        else if (i == 3)
+            fclose(fopen(place, "w"));
+        uint64_t before = atomic_load(&spl_remote_counts.cache_failures);
+        assert_false(holds(cache, key, 0, 1));
+        put(cache, key, 1, 2);
+        assert_false(holds(cache, key, 1, 2));
+        assert_int_equal(atomic_load(&spl_remote_counts.cache_failures), before + 1);
+        spl_page_cache_drop(cache, key, 0);
+        put(cache, own, 0, 3); /* others do not suffer for it */
+        assert_true(holds(cache, own, 0, 3));
+        spl_page_cache_drop(cache, own, 0);
+        spl_page_cache_let_go(cache);
+        cache = open_cache(1); /* nor is it written over or made room of */
+        spl_page_cache_let_go(cache);
+        if (i > 1) {
+            assert_int_equal(access(block, F_OK), 0);
+            assert_int_equal(folder_count(elsewhere), 1);
+            assert_int_equal(unlink(place), 0);
+            assert_int_equal(rename(elsewhere, place), 0);
+        }
+        assert_true(measure(&files) && files == 1);
+    next:
+        assert_int_equal(chmod(place, 0700), 0);
+        assert_int_equal(chown(place, geteuid(), getegid()), 0);
+    }
+}
+
+static void test_the_folder_is_the_services_alone(void **state)
+{
+    (void)state;
+    struct spl_page_cache *cache;
+    struct spl_error err = {0};
+    assert_int_equal(chmod(folder, 0770), 0);
+    assert_int_equal(spl_page_cache_open(folder, 1 << 20, &cache, &err), SPL_E_USAGE);
+    assert_non_null(strstr(err.message, "chmod 700"));
+    assert_non_null(strstr(err.message, "remove what others have put there"));
+}
+
 #define TEST(name) cmocka_unit_test_setup(name, set_up)
 int main(void)
 {
     const struct CMUnitTest tests[] = {TEST(test_what_was_written),    TEST(test_what_was_spoilt_is_gone),
                                        TEST(test_the_bound),           TEST(test_what_is_not_ours_stays),
-                                       TEST(test_a_disk_that_takes_nothing), TEST(test_folders_that_will_not_do)};
+                                       TEST(test_a_disk_that_takes_nothing), TEST(test_folders_that_will_not_do),
+                                       TEST(test_what_others_put_there_is_not_used),
+                                       TEST(test_the_folder_is_the_services_alone)};
     return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }
