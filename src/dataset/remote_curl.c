@@ -84,14 +84,43 @@ static void copy(char *out, size_t size, const char *value, size_t bytes)
         snprintf(out, size, "%.*s", (int)bytes, value);
 }
 
+/* Digits alone, at *at and before `end`; the largest number stands for larger ones. Moves *at behind them; false where
+ * there are none. */
+static bool read_number(const char **at, const char *end, uint64_t *out)
+{
+    const char *begin = *at;
+    for (*out = 0; *at < end && **at >= '0' && **at <= '9'; ++*at) {
+        const uint64_t digit = (uint64_t)(**at - '0');
+        *out = *out > (UINT64_MAX - digit) / 10 ? UINT64_MAX : 10 * *out + digit;
+    }
+    return *at > begin;
+}
+
+static bool skip(const char **at, const char *end, char c)
+{
+    return *at < end && *(*at)++ == c;
+}
+
+/* "bytes FIRST-LAST/TOTAL" */
 static void read_range(struct spl_remote_reply *reply, const char *value, size_t bytes)
 {
-    char text[100];
-    int end = 0;
-    snprintf(text, sizeof text, "%.*s", bytes < sizeof text ? (int)bytes : 0, value);
-    reply->ranged = sscanf(text, "bytes %" SCNu64 "-%" SCNu64 "/%" SCNu64 "%n", &reply->first, &reply->last,
-                           &reply->total, &end) == 3 &&
-                    end > 0 && !text[end] && !strchr(text, '+') && !strstr(text, "--");
+    const char *at = value + 5, *end = value + bytes;
+    reply->ranged = false;
+    if (bytes < 5 || strncasecmp(value, "bytes", 5))
+        return;
+    while (at < end && (*at == ' ' || *at == '\t'))
+        at++;
+    reply->ranged = read_number(&at, end, &reply->first) && skip(&at, end, '-') &&
+                    read_number(&at, end, &reply->last) && skip(&at, end, '/') &&
+                    read_number(&at, end, &reply->total) && at == end && reply->total < UINT64_MAX;
+}
+
+/* Seconds; a date is left to curl, which gives up numbers that are too large. */
+static void read_retry_after(struct spl_remote_reply *reply, const char *value, size_t bytes)
+{
+    uint64_t seconds;
+    const char *at = value, *end = value + bytes;
+    reply->retry_after_s = read_number(&at, end, &seconds) && at == end ? seconds : 0;
 }
 
 static size_t on_header(char *line, size_t one, size_t length, void *context)
@@ -109,6 +138,8 @@ static size_t on_header(char *line, size_t one, size_t length, void *context)
             reply->status = 10 * reply->status + (*c - '0');
     } else if ((value = value_of(line, length, "content-range", &bytes))) {
         read_range(reply, value, bytes);
+    } else if ((value = value_of(line, length, "retry-after", &bytes))) {
+        read_retry_after(reply, value, bytes);
     } else if ((value = value_of(line, length, "etag", &bytes))) {
         copy(reply->etag, sizeof reply->etag, value, bytes);
     } else if ((value = value_of(line, length, "last-modified", &bytes))) {
@@ -344,7 +375,8 @@ static void ask(void *context, const struct spl_remote_ask *what, struct spl_rem
     } else {
         CURLcode code = server->curl->curl_easy_perform(handle);
         curl_off_t seconds = 0;
-        if (!server->curl->curl_easy_getinfo(handle, CURLINFO_RETRY_AFTER, &seconds) && seconds > 0)
+        if (!reply->retry_after_s && !server->curl->curl_easy_getinfo(handle, CURLINFO_RETRY_AFTER, &seconds) &&
+            seconds > 0)
             reply->retry_after_s = (uint64_t)seconds;
         read_code(&e);
         if (reply->status == 206 && !server->bound)

@@ -19,9 +19,10 @@ class File:
     request; there "drip", too (four bytes a second of it come)."""
 
     def __init__(self, data, etag='"1"', faults=(), always=None, ranges=True, conditions=True, delay_s=0, gzip=False,
-                 account=None, gate=None):
+                 account=None, gate=None, content_range="bytes {0}-{1}/{2}"):
         self.data, self.etag, self.faults, self.always = data, etag, list(faults), always
         self.ranges, self.conditions, self.delay_s, self.gzip, self.account = ranges, conditions, delay_s, gzip, account
+        self.content_range = content_range  # of the first and last byte and of how many there are
         self.gate = gate  # an event: until it is set, nothing is answered
         self.requests, self.lock = [], threading.Lock()  # (first, last) of each, or None
 
@@ -111,7 +112,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if fault == "flip":
             body[len(body) // 2] ^= 16
         self.send_response(206)
-        self.send_header("Content-Range", f"bytes {first}-{last}/{len(data)}")
+        self.send_header("Content-Range", file.content_range.format(first, last, len(data)))
         self.send_header("Content-Length", str(len(body)))
         if etag:
             self.send_header("ETag", etag)

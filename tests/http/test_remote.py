@@ -94,6 +94,10 @@ def test_what_is_refused_is_a_state():
         "whole": (File(DATA, ranges=False), "answers 200", "no byte ranges"), "packed": (File(DATA, gzip=True), "packs what it sends", "switch"),
         "text": (File(b"no dataset at all" * 9), "not a packed dataset", "pack"), "short": (File(DATA[:-1000]), "truncated", "missing"),
         "longer": (File(DATA, always="extra"), "cannot read", "more bytes than the length that it says"),
+        **{f"range-{i}": (File(DATA, content_range=told), "answers other bytes", "what stands between") for i, told in enumerate(
+            ("bytes {0}-{1}/-5", "bytes -{0}-{1}/{2}", "bytes {0}-+{1}/{2}", "bytes {0}-{1}/99999999999999999999", "bytes {0}-{1}/*"))},
+        **{f"later-{i}": (File(DATA, always=(503, after)), "given up after 1 attempts, at the last it answers 503", "")
+           for i, after in enumerate(("99999999999999999999", "18446744073709551615", "9223372036854775808", "3600"))},
         "down": (File(DATA, always="reset"), "given up after", "attempts"), "loop": (None, "redirects", ""),
         "spoilt": (File(spoilt), None, ""), "missing": (None, "answers 404 (NoSuchKey)", "path")}
     with Server({f"/s/{name}.spld": file for name, (file, *_) in files.items() if file}, moved={"/s/loop.spld": "/s/loop.spld"}) as server:
