@@ -1,7 +1,7 @@
 /* Preloaded into a daemon: until the file that SLOW_DISK_GATE names is there, a dataset's file cannot be opened, and no
- * file gets a name that ends in SLOW_DISK_NAME; while the one that SLOW_DISK_READS names is there, only as many reads
- * end as the number in it says; as on a disk that is slow or a share that does not answer. Names of hosts that end in
- * .slow take ten minutes. */
+ * file gets a name that ends in SLOW_DISK_NAME, or loses one that does; while the one that SLOW_DISK_READS names is
+ * there, only as many reads end as the number in it says; as on a disk that is slow or a share that does not answer.
+ * Names of hosts that end in .slow take ten minutes. */
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -37,6 +37,12 @@ __attribute__((visibility("default"))) int rename(const char *from, const char *
 {
     wait_for_gate(to, getenv("SLOW_DISK_NAME"));
     return (int)syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0);
+}
+
+__attribute__((visibility("default"))) int unlink(const char *path)
+{
+    wait_for_gate(path, getenv("SLOW_DISK_NAME"));
+    return (int)syscall(SYS_unlinkat, AT_FDCWD, path, 0);
 }
 
 /* How many reads may end; -1 = any number. */

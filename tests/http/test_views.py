@@ -1,13 +1,17 @@
 """Views by name, titles and thumbnails: what a dataset was packed with, what clients save beside it, that this lasts, and
 who may. Wrong links are pages for browsers."""
 import contextlib
+import http.client
 import json
 import math
 import os
 import pathlib
+import signal
 import socket
 import subprocess
 import tempfile
+import threading
+import time
 
 import openapi
 from harness import FAKE, REAL, WALL, Daemon, Reply, eventually, npy, run
@@ -38,8 +42,8 @@ def serving(*args, binary=FAKE, files=(WALL,), **kw):
         tokens.chmod(0o600)
 
         @contextlib.contextmanager
-        def start():
-            with Daemon(binary, "--watch", "30", "--tokens", str(tokens), *args, datasets=[str(home)], **kw) as d:
+        def start(also=(), **more):
+            with Daemon(binary, "--watch", "30", "--tokens", str(tokens), *args, datasets=[str(home), *map(str, also)], **kw, **more) as d:
                 yield d
         yield home, start
 
@@ -160,6 +164,89 @@ def test_views_are_saved_and_last():
             assert delete(d, "a.b_c-1").status == 404
             assert d.ask("/v1/datasets/wall", "DELETE", headers=AUTH).status == 204
             assert list(home.iterdir()) == []
+
+
+def test_a_dataset_goes_with_its_views_or_not_at_all():
+    with serving(files=(WALL,)) as (home, start):
+        in_the_way = home / "wall.profile.json" / "in the way"
+        with start() as d:
+            assert put(d, "door", DOOR).status == 201
+            in_the_way.mkdir(parents=True)
+            refused = d.ask("/v1/datasets/wall", "DELETE", headers=AUTH)
+            assert refused.status == 500 and str(home) not in refused.json()["detail"], refused.body
+            assert list(views(d)) == ["door"] and get(d, "view=door&width=16&height=16").status == 200
+            assert sorted(p.name for p in home.iterdir()) == ["wall.profile.json", "wall.spld", "wall.views.json"]
+            (home / "folder.spld").mkdir()
+            (home / "folder.views.json").write_text("{}")
+            eventually(lambda: any(slot["id"] == "folder" for slot in d.ask("/v1/datasets", headers=AUTH).json()["datasets"]))
+            assert d.ask("/v1/datasets/folder", "DELETE", headers=AUTH).status == 500
+            (home / "folder.spld").rmdir()
+            (home / "folder.views.json").unlink()
+        with start() as d:  # another process
+            assert list(views(d)) == ["door"]
+            in_the_way.rmdir()
+            in_the_way.parent.rmdir()
+            assert d.ask("/v1/datasets/wall", "DELETE", headers=AUTH).status == 204 and list(home.iterdir()) == []
+
+
+def test_a_removal_that_is_killed_is_finished():
+    """What lay beside the dataset does not become the next one's."""
+    def remove(d):
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            d.ask("/v1/datasets/wall", "DELETE", headers=AUTH)
+    wall = pathlib.Path(WALL).read_bytes()
+    for again in "PUT", "by its operator":
+        with serving(files=(WALL,)) as (home, start):
+            gate = home.parent / "gate"
+            slow = {"LD_PRELOAD": os.environ["SPLATD_SLOW_DISK"], "SLOW_DISK_GATE": str(gate), "SLOW_DISK_NAME": "wall.views.json"}
+            with start() as d:
+                assert put(d, "door", DOOR).status == 201
+            gate.touch()
+            with start(**slow) as d:
+                gate.unlink()
+                removing = threading.Thread(target=remove, args=(d,))
+                removing.start()
+                eventually(lambda: (home / ".removed-wall.spld").exists())
+                assert sorted(p.name for p in home.iterdir()) == [".removed-wall.spld", "wall.views.json"]
+                d.stop(signal.SIGKILL)
+                removing.join()
+            if again != "PUT":
+                (home / "wall.spld").write_bytes(wall)
+            with start() as d:
+                if again == "PUT":
+                    assert list(home.iterdir()) == []
+                    assert d.ask("/v1/datasets/wall", "PUT", wall, {**AUTH, "Content-Type": "application/octet-stream"}).status == 201
+                assert views(d) == {} and [p.name for p in home.iterdir()] == ["wall.spld"]
+
+
+def test_what_kills_left_is_swept_at_start():
+    with serving(files=(WALL,)) as (home, start):
+        other = home.parent / "other"
+        other.mkdir()
+        for folder in home, other:
+            (folder / ".wall.views.json.4194305-7").write_text("{")  # no process has such a number
+            (folder / ".wall.views.json.2026-01").write_text("of somebody")
+            (folder / "gone.views.json").write_text("{}")
+            (folder / "gone.profile.json").write_text("{}")
+            (folder / "gone.spld").write_text("no dataset")
+            (folder / "gone.spld").rename(folder / ".removed-gone.spld")
+            (folder / "moved.views.json").write_text("{}")  # its dataset is elsewhere for now
+        if not os.geteuid():  # nobody says to us what to remove by putting a file there
+            for name in "theirs.views.json", ".removed-theirs.spld":
+                (other / name).write_text("")
+            os.chown(other / name, 65534, 65534)
+            other.chmod(0o1777)
+        with start(also=[other]) as d:
+            assert sorted(p.name for p in home.iterdir()) == [".wall.views.json.2026-01", "moved.views.json", "wall.spld"]
+            assert {p.name for p in other.iterdir()} - {"theirs.views.json"} == {".wall.views.json.2026-01", "moved.views.json"} | (
+                set() if os.geteuid() else {".removed-theirs.spld"})
+            assert os.geteuid() or (other / "theirs.views.json").exists()
+            (home / "gone.spld").write_text("no dataset")
+            (home / "gone.spld").rename(home / ".removed-gone.spld")
+            time.sleep(0.1)  # what came after it is not its own
+            (home / "gone.views.json").write_text("{}")
+            assert d.ask("/v1/datasets/more", "PUT", b"none", {**AUTH, "Content-Type": "application/octet-stream"}).status == 422
+            assert sorted(p.name for p in home.iterdir()) == [".wall.views.json.2026-01", "gone.views.json", "moved.views.json", "wall.spld"]
 
 
 def test_a_saved_view_keeps_what_it_shows():

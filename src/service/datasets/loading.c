@@ -27,8 +27,8 @@ static void run(uv_work_t *work)
     struct loading *loading = work->data;
     const struct spl_service_options *options = loading->service->options;
     loading->directory = spl_catalog_first_directory(options->datasets.items, options->datasets.count);
-    if (loading->directory)
-        spl_store_sweep(loading->directory);
+    for (size_t i = 0; i < options->datasets.count; i++)
+        spl_store_sweep(options->datasets.items[i]); // does nothing to files and URLs
     if (*options->page_cache && spl_page_cache_open(options->page_cache, options->page_cache_bytes,
                                                     &loading->service->library->page_cache, &loading->err))
         return;

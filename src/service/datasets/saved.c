@@ -59,7 +59,7 @@ char *spl_saved_path(const char *dataset_path, struct spl_error *err)
     size_t length = strlen(dataset_path);
     bool ends = length > 5 && !strcmp(dataset_path + length - 5, ".spld");
     char *path = NULL;
-    if (asprintf(&path, "%.*s.views.json", (int)(ends ? length - 5 : length), dataset_path) < 0) {
+    if (asprintf(&path, "%.*s" SPL_SAVED_ENDING, (int)(ends ? length - 5 : length), dataset_path) < 0) {
         spl_fail(err, SPL_E_NOMEM, "out of memory for the path of a dataset's views");
         return NULL;
     }

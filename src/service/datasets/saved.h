@@ -39,6 +39,7 @@ const char *spl_saved_get_path(const struct spl_saved *saved);
 /* The new version's list takes what has been saved since the file was read for it. */
 void spl_saved_inherit(struct spl_saved *saved, struct spl_saved *before);
 
+#define SPL_SAVED_ENDING ".views.json"
 /* NAME.views.json of NAME.spld; NULL without memory. */
 char *spl_saved_path(const char *dataset_path, struct spl_error *err);
 

@@ -1,11 +1,14 @@
 /* Files come in under a hidden folder beside their place, so that a rename puts them there whole, synced and verified,
  * or not at all, whatever crashes in between. The folder's file already has its final name, since a dataset's id is its
- * file's stem. Runs on threads of the pool. */
+ * file's stem. Files go by a rename to .removed-NAME.spld, which outlasts what lies beside them: a crash leaves either
+ * all of a dataset, or that name, by which the next sweep knows whose views and profile have no dataset any more. Runs
+ * on threads of the pool. */
 #include "service/datasets/store.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +21,8 @@
 #include "base/file.h"
 #include "measure/profile.h"
 
-static const char prefix[] = ".incoming-";
+static const char prefix[] = ".incoming-", removed[] = ".removed-";
+static pthread_mutex_t removing = PTHREAD_MUTEX_INITIALIZER; /* so that no sweep finishes what is not left */
 enum { fresh_s = 1, stale_s = 24 * 3600 }; /* not locked yet; where there are no locks */
 
 static int fail(struct spl_incoming *incoming, struct spl_error *err, const char *what)
@@ -65,6 +69,68 @@ static bool is_left(int directory, const char *folder, time_t age_s)
     return left;
 }
 
+/* The profile and the views beside a dataset's file. */
+struct beside {
+    char *paths[2]; // owned
+};
+
+static void free_beside(struct beside *beside)
+{
+    free(beside->paths[0]);
+    free(beside->paths[1]);
+}
+
+static int name_beside(const char *path, struct beside *beside, struct spl_error *err)
+{
+    *beside = (struct beside){.paths = {spl_profile_path(path, err), spl_saved_path(path, err)}};
+    if (beside->paths[0] && beside->paths[1])
+        return 0;
+    free_beside(beside);
+    return SPL_E_NOMEM;
+}
+
+static bool is_after(const struct timespec *a, const struct timespec *b)
+{
+    return a->tv_sec != b->tv_sec ? a->tv_sec > b->tv_sec : a->tv_nsec > b->tv_nsec;
+}
+
+/* Removes what lay beside a dataset when that was renamed to `name`. What was put there since is another's. */
+static void finish_removal(const char *directory, const char *name)
+{
+    char *path = NULL, *aside = NULL;
+    struct beside beside = {0};
+    struct stat status, since;
+    if (asprintf(&path, "%s/%s", directory, name + sizeof removed - 1) < 0)
+        path = NULL;
+    if (asprintf(&aside, "%s/%s", directory, name) < 0)
+        aside = NULL;
+    if (!path || !aside || name_beside(path, &beside, NULL))
+        goto done;
+    pthread_mutex_lock(&removing);
+    bool left = !lstat(aside, &since);
+    for (int i = 0; i < 2 && left; i++)
+        if (!lstat(beside.paths[i], &status) && !is_after(&status.st_ctim, &since.st_ctim))
+            left = !unlink(beside.paths[i]) || errno == ENOENT;
+    if (left && !spl_file_sync_folder(path))
+        unlink(aside);
+    pthread_mutex_unlock(&removing);
+    free_beside(&beside);
+done:
+    free(path);
+    free(aside);
+}
+
+/* Is it what a removal leaves? In a folder where nobody renames others' files, others did not leave it for us. */
+static bool is_removed(int directory, const char *name)
+{
+    struct stat status, folder;
+    const size_t length = strlen(name), ending = sizeof ".spld" - 1;
+    return length > sizeof removed - 1 + ending && !strncmp(name, removed, sizeof removed - 1) &&
+           !strcmp(name + length - ending, ".spld") && !fstat(directory, &folder) &&
+           !fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) && !S_ISDIR(status.st_mode) &&
+           (!(folder.st_mode & S_ISVTX) || status.st_uid == geteuid());
+}
+
 void spl_store_sweep(const char *directory)
 {
     DIR *dir = opendir(directory);
@@ -73,12 +139,15 @@ void spl_store_sweep(const char *directory)
     time_t now = time(NULL);
     for (struct dirent *item; (item = readdir(dir));) {
         struct stat status;
-        if (!strncmp(item->d_name, prefix, sizeof prefix - 1) &&
-            !fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW) && S_ISDIR(status.st_mode) &&
-            is_left(dirfd(dir), item->d_name, now - status.st_mtime))
+        if (is_removed(dirfd(dir), item->d_name))
+            finish_removal(directory, item->d_name);
+        else if (!strncmp(item->d_name, prefix, sizeof prefix - 1) &&
+                 !fstatat(dirfd(dir), item->d_name, &status, AT_SYMLINK_NOFOLLOW) && S_ISDIR(status.st_mode) &&
+                 is_left(dirfd(dir), item->d_name, now - status.st_mtime))
             remove_folder(dirfd(dir), item->d_name);
     }
     closedir(dir);
+    spl_file_sweep_folder(directory, SPL_SAVED_ENDING);
 }
 
 /* The folder of `path`, for the caller to free; NULL without memory. */
@@ -201,21 +270,39 @@ void spl_incoming_abort(struct spl_incoming *incoming)
     *incoming = (struct spl_incoming){.no_room = no_room};
 }
 
+/* Its name goes first: once that is on the disk nothing brings the dataset back, and only then what lay beside it may
+ * go. Where that cannot go, the dataset stays; of the two the views come last, since a profile can be made again. */
 int spl_stored_remove(const char *path, struct spl_error *err)
 {
-    char *profile = spl_profile_path(path, err), *views = profile ? spl_saved_path(path, err) : NULL;
-    if (!views) {
-        free(profile);
-        return SPL_E_NOMEM;
+    struct beside beside;
+    struct stat status;
+    char *aside = NULL;
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    int rc = name_beside(path, &beside, err);
+    if (rc)
+        return rc;
+    if (asprintf(&aside, "%.*s%s%s", (int)(name - path), path, removed, name) < 0) {
+        free_beside(&beside);
+        return spl_fail(err, SPL_E_NOMEM, "out of memory for a path");
     }
-    const char *const names[] = {views, profile, path}; // the next dataset of this name inherits neither
-    int rc = 0;
-    for (size_t i = 0; i < sizeof names / sizeof *names && !rc; i++)
-        if (unlink(names[i]) && errno != ENOENT)
-            rc = spl_fail_errno(err, errno, "cannot remove the dataset's file");
-    if (!rc && spl_file_sync_folder(path))
+    pthread_mutex_lock(&removing);
+    const bool folder = !lstat(path, &status) && S_ISDIR(status.st_mode); // it may have that name, and is no dataset
+    const bool moved = !folder && !rename(path, aside);
+    if (folder)
+        rc = spl_fail_errno(err, EISDIR, "cannot remove the dataset's file");
+    else if (!moved && errno != ENOENT)
+        rc = spl_fail_errno(err, errno, "cannot remove the dataset's file");
+    else if (spl_file_sync_folder(path))
         rc = spl_fail_errno(err, errno, "cannot sync the folder of the dataset's file");
-    free(profile);
-    free(views);
+    for (int i = 0; i < 2 && !rc; i++)
+        if (unlink(beside.paths[i]) && errno != ENOENT)
+            rc = spl_fail_errno(err, errno, "cannot remove what lies beside the dataset's file");
+    if (rc && moved)
+        rename(aside, path);
+    else if (!rc && !spl_file_sync_folder(path) && moved)
+        unlink(aside); // else the next sweep does
+    pthread_mutex_unlock(&removing);
+    free_beside(&beside);
+    free(aside);
     return rc;
 }

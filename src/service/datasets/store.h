@@ -16,8 +16,9 @@ struct spl_incoming {
 /* SPL_E_LIMIT with both numbers where `bytes` do not fit on the disk of the file at `path`. Quick: it asks no disk. */
 int spl_store_check_room(const char *path, uint64_t bytes, struct spl_error *err);
 
-/* Removes what uploads have left in `directory` that nobody writes to any more, say after a crash; without locks on its
- * file system, what is older than a day. */
+/* Removes what uploads and savings of views have left in `directory` that nobody writes to any more, say after a crash;
+ * of uploads, without locks on its file system, what is older than a day. Finishes removals. Nothing where it is no
+ * directory. */
 void spl_store_sweep(const char *directory);
 
 /* Makes the file beside `target`, and sweeps there. Nothing is left after a failure, here and below. */
@@ -37,7 +38,8 @@ int spl_incoming_place(struct spl_incoming *incoming, const char *target, struct
 /* Removes it; idempotent. */
 void spl_incoming_abort(struct spl_incoming *incoming);
 
-/* Removes a dataset's file, its profile and the views beside it. One that is not there is removed already. */
+/* Removes a dataset's file, then its profile and the views beside it. One that is not there is removed already. After a
+ * failure it is as it was, perhaps without its profile. */
 int spl_stored_remove(const char *path, struct spl_error *err);
 
 #endif
