@@ -1,6 +1,7 @@
 /* Connections and how long they may take. Each phase has a time limit of its own, which trickling bytes does not
- * extend: libmicrohttpd's own limit is about silence only. A connection that is too slow is shut down here, and
- * libmicrohttpd then sees it closed. Owned by the loop's thread. */
+ * extend: libmicrohttpd's own limit is about silence only. A connection that is too slow is shut down here, as one
+ * whose client has left or sends what libmicrohttpd can make nothing of; it then sees it closed. Owned by the loop's
+ * thread. */
 #include "service/http.h"
 
 #include <poll.h>
@@ -68,20 +69,63 @@ void spl_connection_notify(void *context, struct MHD_Connection *handle, void **
     // a byte out of band would be counted, but not read; without any, what was read is what came, less what waits
     setsockopt(connection->fd, SOL_SOCKET, SO_OOBINLINE, &(int){1}, sizeof(int));
     connection->taken = spl_taken_bytes(connection->fd);
+    connection->looked_at = SPL_TAKEN_UNKNOWN;
     spl_connection_enter(connection, PHASE_READING);
     LIST_INSERT_HEAD(&service->http->connections, connection, link);
     service->http->connections_open++;
     *socket_context = connection;
 }
 
-/* Has the client of an unfinished upload closed its side? libmicrohttpd 0.9.75 waits for an edge of epoll that does not
- * come when the end of the stream arrived with the last data, while the connection was suspended. */
-static bool has_ended_early(const struct connection *connection)
+/* Is more to come of a request, or the first of one, and libmicrohttpd free to take it? */
+static bool is_awaited(const struct connection *connection)
 {
-    struct pollfd socket = {.fd = connection->fd, .events = POLLRDHUP};
+    const struct request *request = connection->request;
+    return connection->phase <= PHASE_UPLOADING &&
+           (!request || !(request->prepared || request->suspended || request->abandoned));
+}
+
+/* Has the client closed its side, with nothing left to read and nothing that is yet to be sent it? Nothing comes of
+ * what is there then, but by a libmicrohttpd that has not had its turn, so this is to last from one sweep to the next.
+ * libmicrohttpd 0.9.75 waits for an edge of epoll that does not come when the end of the stream arrived with the last
+ * data, or while the connection was suspended. */
+static bool has_left(const struct connection *connection)
+{
+    struct pollfd socket = {.fd = connection->fd, .events = POLLRDHUP | POLLOUT};
     int unread = 1;
-    return connection->phase == PHASE_UPLOADING && poll(&socket, 1, 0) > 0 &&
-           socket.revents & (POLLRDHUP | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
+    return is_awaited(connection) && poll(&socket, 1, 0) > 0 && socket.revents & (POLLRDHUP | POLLHUP | POLLERR) &&
+           socket.revents & (POLLOUT | POLLHUP | POLLERR) && !ioctl(connection->fd, FIONREAD, &unread) && !unread;
+}
+
+/* Does libmicrohttpd leave unread what came, and could it send what it may have to say first ("100 Continue")? */
+static bool is_left_unread(const struct connection *connection)
+{
+    struct pollfd socket = {.fd = connection->fd, .events = POLLOUT};
+    int unread = 0;
+    return connection->request && connection->request->started && is_awaited(connection) &&
+           !ioctl(connection->fd, FIONREAD, &unread) && unread > 0 && poll(&socket, 1, 0) > 0 &&
+           socket.revents & POLLOUT;
+}
+
+/* Whoever has a turn reads all that its buffer has room for, so that what does not change over some of them never will:
+ * it holds the beginning of a line without an end. Those that have not begun libmicrohttpd refuses by itself. */
+void spl_connections_refuse_endless(struct spl_service *service)
+{
+    enum { looks_max = 3, look_ms = 5 };
+    struct spl_http *http = service->http;
+    const uint64_t now = spl_now_ns();
+    struct connection *connection;
+    if (now - http->looked_ns < look_ms * SPL_NS_PER_MS)
+        return;
+    http->looked_ns = now;
+    LIST_FOREACH(connection, &http->connections, link)
+    {
+        const uint64_t taken = is_left_unread(connection) ? spl_taken_bytes(connection->fd) : SPL_TAKEN_UNKNOWN;
+        connection->looks = taken != SPL_TAKEN_UNKNOWN && taken == connection->looked_at ? connection->looks + 1 : 0;
+        connection->looked_at = taken;
+        if (connection->looks >= looks_max)
+            spl_refuse_on_socket(connection->request, MHD_HTTP_BAD_REQUEST, MHD_HTTP_HEADER_TRANSFER_ENCODING,
+                                 "the line that a chunk begins with is too long");
+    }
 }
 
 /* libmicrohttpd then sees it closed. A request whose rest does not come is told so, where its first line is there. */
@@ -114,8 +158,10 @@ static void on_slow_timer(uv_timer_t *timer)
     {
         note_taken(connection);
         bool hurry = service->draining && connection->phase == PHASE_READING;
-        if (has_ended_early(connection))
+        const bool left = has_left(connection);
+        if (left && connection->had_left)
             shutdown(connection->fd, SHUT_RDWR);
+        connection->had_left = left;
         if (now - connection->since_ns <= (hurry ? drain_reading_max_ns : phase_max_ns[connection->phase]))
             continue;
         spl_count(service->counters, slow_closed);

@@ -299,8 +299,8 @@ static void on_again(uv_idle_t *again)
 
 /* Not by a timer of 0 ms: libuv runs timers until none is due, so that nothing but MHD would have its turn while a
  * client reads as fast as we write. An idle handle runs once a turn. Now and then there is a rest: MHD also wants to go
- * on while it can make nothing of what fills a buffer (a chunk's first line without an end). */
-void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timeout, uv_idle_cb on_turn)
+ * on while it can make nothing of what fills a buffer (a chunk's first line without an end: connections.c). */
+bool spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timeout, uv_idle_cb on_turn)
 {
     enum { turns_max = 16, rest_ms = 1 };
     MHD_UNSIGNED_LONG_LONG timeout_ms;
@@ -315,13 +315,14 @@ void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_ti
         uv_idle_start(&turns->again, on_turn);
     else
         uv_idle_stop(&turns->again);
+    return wants && !timeout_ms;
 }
 
 void spl_http_pump(struct spl_service *service)
 {
     struct spl_http *http = service->http;
-    if (http->daemon)
-        spl_http_run(http->daemon, &http->turns, on_timer, on_again);
+    if (http->daemon && spl_http_run(http->daemon, &http->turns, on_timer, on_again))
+        spl_connections_refuse_endless(service);
 }
 
 int spl_http_start(struct spl_service *service, struct spl_error *err)

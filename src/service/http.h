@@ -40,6 +40,10 @@ struct connection {
     uint64_t sent_bytes; /* at the end of the last request that was logged */
     uint64_t taken;      /* bytes that libmicrohttpd had read of it when it was looked at last, and has done with since;
                             SPL_TAKEN_UNKNOWN: it may have more to do with them */
+    bool had_left;       /* its client, at the last sweep */
+    uint64_t looked_at;  /* bytes that were read of it when it was looked at last, while more waited; else
+                            SPL_TAKEN_UNKNOWN */
+    unsigned looks;      /* in which these have been the same */
     struct request *request; // may be NULL; the one that is under way
 };
 
@@ -61,6 +65,7 @@ struct spl_http {
     size_t long_bodies; /* of requests, longer than body_max */
     size_t body_bytes;  /* of the others, as far as they are counted */
     uv_timer_t slow_timer; /* connections that take too long */
+    uint64_t looked_ns;    /* when those were looked for last whose buffers are full to no end */
 
     LIST_HEAD(, request) waiting; // the last came first
     size_t waiting_count;
@@ -81,15 +86,19 @@ void spl_http_stop(struct spl_service *service);    /* closes every connection; 
 void spl_http_pump(struct spl_service *service);    /* lets MHD work; call after a resume */
 
 /* Lets a daemon do what it can without waiting, and has one of the handles, whose data is the service, call back when
- * it wants to go on. */
+ * it wants to go on; true: that is at once. */
 void spl_http_turns_init(struct spl_http_turns *turns, struct spl_service *service);
-void spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timer, uv_idle_cb on_again);
+bool spl_http_run(struct MHD_Daemon *daemon, struct spl_http_turns *turns, uv_timer_cb on_timer, uv_idle_cb on_again);
 
 /* connections.c: every connection, and how long its phases may take. */
 void spl_connection_notify(void *service, struct MHD_Connection *handle, void **socket_context,
                            enum MHD_ConnectionNotificationCode code);
 void spl_connection_enter(struct connection *connection, enum phase phase); /* its time begins */
 void spl_connections_watch(struct spl_service *service);                    /* from now on the slow ones are closed */
+
+/* connections.c: answers and ends those in whose buffers libmicrohttpd waits for the end of a line and has no room for
+ * it. To be called when it wants to go on at once, as it does with these forever; behind its turn. */
+void spl_connections_refuse_endless(struct spl_service *service);
 
 /* framing.c: false, with the reply set, for a request whose end another reader could see elsewhere. `line` and
  * `version` are libmicrohttpd's method, where the request's bytes begin, and version. */

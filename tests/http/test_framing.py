@@ -3,6 +3,7 @@ route, lengths that can be read in two ways."""
 import contextlib
 import json
 import re
+import signal
 import socket
 import tempfile
 import time
@@ -251,6 +252,86 @@ def test_chunks_that_are_none_are_answered_once_and_at_once():
                         assert status == expected, (path, body[:40], status, text)
                         check_problem(Problem(status, answer, text), "POST")
                         assert answer["connection"].lower() == "close" and wire.ended(), (path, body[:40], answer)
+        assert not d.status()["counters"]["slow_closed"], "it took until a client that is slow is cut"
+
+
+# Lines of a body in chunks that libmicrohttpd has no room for; it goes on asking itself whether their end is there.
+ENDLESS = [b"2;" + b"e" * 24000, b"2\r\n{}\r\n2;" + b"e" * 24000, b"0" * 24000, b"2" + b" " * 24000, b"0;" + b"e" * 24000]
+
+
+def test_a_chunks_first_line_that_does_not_end_is_told_so():
+    with with_tours() as d:
+        for path in (*BODIES, "/v1/datasets/wall/rays", "/nowhere"):
+            for body in ENDLESS:
+                with Wire(d) as wire:
+                    wire.send(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                              "Transfer-Encoding: chunked\r\n\r\n", body)
+                    status, answer, text = wire.reply()
+                    assert status == 400, (path, body[:9], status, text)
+                    check_problem(Problem(status, answer, text), "POST")
+                    assert answer["connection"].lower() == "close" and wire.ended(), (path, body[:9], answer)
+        assert not d.status()["counters"]["slow_closed"], "it took until a client that is slow is cut"
+
+
+def test_endless_lines_of_clients_that_left_cost_nothing():
+    head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    with Daemon(FAKE) as d:
+        began_s = d.processor_s()
+        for _ in range(200):
+            with Wire(d) as wire:
+                wire.send(head, ENDLESS[0])
+        eventually(lambda: d.status()["connections"] <= 1)
+        assert (busy_s := d.processor_s() - began_s) < 2, busy_s
+        assert not d.status()["counters"]["slow_closed"], "it took until a client that is slow is cut"
+
+
+def test_long_lines_that_end_are_taken_however_slowly():
+    text = json.dumps(SMALL).encode()
+    head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    line = b"%x;" % len(text) + b"e" * 8000
+    with Daemon(FAKE) as d:
+        for pause_s, pieces in (0, 1), (0.02, 40):
+            with Wire(d) as wire, Wire(d) as late:
+                for at in range(0, len(line), len(line) // pieces):
+                    wire.send((head if not at else "").encode() + line[at:at + len(line) // pieces])
+                    time.sleep(pause_s)
+                wire.send(b"\r\n" + text + b"\r\n0\r\n\r\n")
+                assert wire.reply()[0] == 200
+                late.send((head.encode() + line + b"\r\n" + text + b"\r\n0\r\n\r\n") * 40)
+                time.sleep(0.3)
+                assert [late.reply()[0] for _ in range(40)] == [200] * 40
+
+
+def test_who_has_closed_its_side_gets_all_that_it_asked_for():
+    """However late it reads; its requests lie in libmicrohttpd's buffer and the kernel's until then."""
+    text = json.dumps({"width": 256, "height": 256, "layer": "depth", "format": "npy"}).encode()
+    head = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    request = f"{head}Transfer-Encoding: chunked\r\n\r\n".encode() + chunked(text, 20)
+    with Daemon(FAKE) as d, Wire(d) as wire:
+        wire.send(request)
+        assert wire.reply()[0] == 200
+        wire.send(request * 100)  # a picture that is kept is not waited for
+        wire.socket.shutdown(socket.SHUT_WR)
+        for i in range(100):
+            if i % 25 == 0:
+                time.sleep(1.2)  # looked at every half a second
+            status, _, body = wire.reply()
+            assert status == 200 and len(body) > 256 * 256 * 4, (i, status)
+
+
+def test_clients_that_left_amid_a_request_are_let_go():
+    """The end of their stream came with their last bytes, so libmicrohttpd does not see it."""
+    post = f"POST {VIEW} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    rays = "POST /v1/datasets/wall/rays HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    chunks = "Transfer-Encoding: chunked\r\n\r\n2;" + "e" * 4000
+    halves = ["GET", "GET /v1/methods HTTP/1.1\r\nHost:", post + chunks, post + "Content-Length: 9\r\n\r\n{", rays + chunks]
+    with Daemon(FAKE) as d:
+        d.process.send_signal(signal.SIGSTOP)
+        for half in halves * 4:
+            with Wire(d) as wire:
+                wire.send(half)
+        d.process.send_signal(signal.SIGCONT)
+        eventually(lambda: d.status()["connections"] <= 1)
         assert not d.status()["counters"]["slow_closed"], "it took until a client that is slow is cut"
 
 
