@@ -246,7 +246,6 @@ def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_ope
             (f"tokens = {tokens}", ("tokens, line 2",)), (f"tokens = {folder}", ("tokens", folder)),
             ("url-key = /nowhere", ("url-key", "tokens")), ("listen = 0.0.0.0:0", ("listen", "--allow-anonymous")),
             ("tours = /nowhere/x", ("tours", "/nowhere/x")), (f"tours = {tokens}", ("tours", tokens, "is no folder")),
-            ("dataset = /nowhere/d", ("/nowhere/d", "there is no such file or directory of datasets")),
             ("listen = no-such-name.invalid:80", ("listen", "no-such-name.invalid")), ("queue = 0", ("queue", "1 to 4096")),
         ]:
             for log_format in ("text", "json"):
@@ -269,6 +268,10 @@ def test_a_mistake_in_the_file_is_said_with_file_and_line_before_anything_is_ope
             assert code == 2 and len(lines) == len(said), got
             assert all(word in line and line.count(conf) <= 1 for word, line in zip(said, lines)), got
             assert args == () or conf not in got, got
+        with open(conf, "w") as f:
+            f.write("# mine\ndataset = /nowhere/d\n")
+        code, got = refused("--config", conf, "--listen", "127.0.0.1:0", "--ops-listen", "127.0.0.1:0")  # opening tells
+        assert code == 2 and f"{conf}, line 2: /nowhere/d: there is no such file or directory" in got, got
         big, fifo = os.path.join(folder, "big"), os.path.join(folder, "fifo")
         with open(big, "wb") as f:
             f.truncate(1 << 30)

@@ -149,11 +149,13 @@ def test_head_of_what_is_there_now_promises_nothing():
 
 def test_what_wait_may_be():
     with Daemon(FAKE) as d:
-        for value in ("2", "-1", "true", "", "no"):
+        for value in ("2", "-1", "yes", "", "no"):
             reply = d.ask(f"{VIEW}?wait={value}")
             assert reply.status == 400 and reply.json()["field"] == "wait", reply.body
-        assert d.post({"wait": 0}).json()["field"] == "wait"
-        assert d.post({"wait": True, "width": 16}).status == 200
+        assert d.post({"wait": 2}).json()["field"] == "wait"
+        for value in (True, False, 1, 0):
+            assert d.post({"wait": value, "width": 16}).status == 200
+        assert d.ask(f"{VIEW}?wait=true&width=16").status == 200
         assert d.ask("/v1/datasets/wall/pick?x=1&y=1&wait=0").json()["field"] == "wait"
 
 
